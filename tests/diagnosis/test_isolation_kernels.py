@@ -176,7 +176,7 @@ def excludes(fdi, row, x=0.0):
     """Whether a row of the fault classes excludes the first fault of a diagnosis, at rates of x rad/s."""
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["x"], estimator(fdi)["excluded"] = x, 0
-    adaptive_estimators.ISOLATION_VARIANTS[row].isolate(fdi, measured, 1.0, False)
+    adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY[row].isolate(fdi, measured, 1.0, False)
     return bool(estimator(fdi)["excluded"])
 
 
@@ -369,7 +369,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
 
 
 def test_every_type_starts_with_no_knowledge_of_any_surface():
-    for (fault_class, _), row in adaptive_estimators.ISOLATION_VARIANTS.items():
+    for (fault_class, _), row in adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.items():
         fdi = new_fdi()
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 7
         row.begin(fdi)
@@ -381,7 +381,7 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
 
 def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
     """Without the statistical detector the worst case alone excludes; of types it always does."""
-    rows = list(adaptive_estimators.ISOLATION_VARIANTS)
+    rows = list(adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY)
     for of, statistical, authority, row in (
         ("published", None, "either", ("published", "worst-case")),
         ("published", {}, "either", ("published", "either")),
@@ -416,7 +416,9 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
         fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = POSITION, s, -1.0, 1.0
         fie["frame_mean_effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
-    adaptive_estimators.ISOLATION_VARIANTS["all", "worst-case"].isolate(fdi, measured, 1.0, started)
+    adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY["all", "worst-case"].isolate(
+        fdi, measured, 1.0, started
+    )
     assert (fdi["types"]["frame_index"], fdi["types"]["block"]["n_frames_so_far"]) == (frame, filled)
 
 

@@ -52,6 +52,7 @@ from beaver_ftc.diagnosis.detection.filters import (
 )
 from beaver_ftc.diagnosis.state import (
     CONSTANT_THRESHOLD,
+    DAMAGE_MAY_HAVE_EXCLUDED_OTHERS,
     INTERVAL_THRESHOLD,
     LOSS,
     NOT_ISOLATED,
@@ -59,7 +60,6 @@ from beaver_ftc.diagnosis.state import (
     POSITION,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
-    WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED,
 )
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
@@ -393,7 +393,7 @@ def configure_isolation(
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
     initial_weak_exclusion = (
-        WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED if config.weighs_chance and aircraft.damage else 0
+        DAMAGE_MAY_HAVE_EXCLUDED_OTHERS if config.weighs_chance and aircraft.damage else 0
     )
     isolation["estimator"]["weakly_excluded"] = initial_weak_exclusion
     isolation["config"]["isolation_hold_off_s"] = (

@@ -14,7 +14,7 @@ from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
-WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED = (
+DAMAGE_MAY_HAVE_EXCLUDED_OTHERS = (
     2  # value of `weakly_excluded`: declared damage may have excluded the others
 )
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
@@ -25,7 +25,7 @@ _ALARM_AUTHORITY_CODE_OF_NAME = {
     "statistical": STATISTICAL_DETECTOR,
 }
 LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
-PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
+PITCH_SURFACE_GROUP, LATERAL_SURFACE_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
 
 
@@ -79,12 +79,14 @@ def configure_layout(
     surface_index_by_name = {name: s for s, name in enumerate(aircraft.surfaces)}
     layout["main"] = main_surface_index_by_axis(aircraft)
     layout["dominant_axis"] = aircraft.dominant_axis
-    layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
+    layout["group"] = [
+        PITCH_SURFACE_GROUP if axis == PITCH else LATERAL_SURFACE_GROUP for axis in aircraft.dominant_axis
+    ]
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
-    for group_surfaces in aircraft.groups.values():
-        if len(group_surfaces) == 2:
+    for group_surface_names in aircraft.groups.values():
+        if len(group_surface_names) == 2:
             index_of_first_surface_in_group, index_of_second_surface_in_group = (
-                surface_index_by_name[name] for name in group_surfaces
+                surface_index_by_name[name] for name in group_surface_names
             )
             layout["partner"][index_of_first_surface_in_group] = index_of_second_surface_in_group
             layout["partner"][index_of_second_surface_in_group] = index_of_first_surface_in_group
@@ -94,21 +96,21 @@ def configure_layout(
 
 def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
     """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    main_surface_index_of_axis = {
+    primary_surface_index_by_axis = {
         aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
     }
     for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in main_surface_index_of_axis:
+        if axis not in primary_surface_index_by_axis:
             raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [main_surface_index_of_axis[axis] for axis in range(3)]
+    return [primary_surface_index_by_axis[axis] for axis in range(3)]
 
 
-_DETECTOR_ROWS = compiled_rows(DETECTORS)
+_DETECTOR_ROW_BY_NAME = compiled_rows(DETECTORS)
 _PLUGIN_SCHEME_KERNEL_PATH = (
     f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
 )
 SCHEME_KERNEL_PATHS = (
-    *dict.fromkeys(row["kernels"] for row in _DETECTOR_ROWS.values()),
+    *dict.fromkeys(row["kernels"] for row in _DETECTOR_ROW_BY_NAME.values()),
     _PLUGIN_SCHEME_KERNEL_PATH,
 )
 PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_SCHEME_KERNEL_PATH)
@@ -117,7 +119,7 @@ PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_SCHEME_KERNEL_PATH)
 def scheme_number(name: str) -> int:
     """Index of the path of a scheme's kernels in SCHEME_KERNEL_PATHS."""
     return (
-        SCHEME_KERNEL_PATHS.index(_DETECTOR_ROWS[name]["kernels"])
-        if name in _DETECTOR_ROWS
+        SCHEME_KERNEL_PATHS.index(_DETECTOR_ROW_BY_NAME[name]["kernels"])
+        if name in _DETECTOR_ROW_BY_NAME
         else PLUGIN_SCHEME_NUMBER
     )

@@ -188,12 +188,14 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
         scheme.prepare_next_frame,
     )
     if scheme.advance_estimators_to_frame is adaptive_estimators.advance_estimators_to_frame:
-        faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["isolation_variant"]]
+        faults = list(adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values())[
+            fdi["config"]["isolation_variant"]
+        ]
         yield from (faults.begin, faults.record_commands, faults.isolate)
         if fdi["statistical"]["test_config"]["enabled"]:
             yield from (
                 adaptive_estimators.update_statistical_tests,
-                adaptive_estimators.prepare_statistical_tests,
+                adaptive_estimators.update_gusts_and_prepare_tests,
             )
     if fdi["sensor_monitor"]["config"]["enabled"]:
         yield whole.monitor_sensors

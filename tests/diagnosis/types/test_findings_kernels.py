@@ -5,7 +5,7 @@ import pytest
 from kernels import put
 
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_SURFACE_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, DEDUCED_HEALTHY
@@ -27,8 +27,8 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     )
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
     fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
-    fdi["layout"]["group"] = 1 - PITCH_GROUP
-    fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
+    fdi["layout"]["group"] = 1 - PITCH_SURFACE_GROUP
+    fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_SURFACE_GROUP
     (
         fdi["types"]["surface"]["position_estimator_excluded"],
         fdi["types"]["surface"]["feasible_sets"]["excluded"],
@@ -171,7 +171,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
 
 def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     alarmed = [0, 0]
-    alarmed[PITCH_GROUP] = 1
+    alarmed[PITCH_SURFACE_GROUP] = 1
     found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
     assert found["isolated"] is None
     (plane,) = found["faults"]

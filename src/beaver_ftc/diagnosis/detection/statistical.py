@@ -82,7 +82,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust_estimate,
     configure_gust_velocity_and_speed_error,
 )
-from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE, WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
+from beaver_ftc.diagnosis.state import DAMAGE_MAY_HAVE_EXCLUDED_OTHERS, LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
@@ -878,12 +878,12 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator_indices, surfa
     Its log-likelihood ratio must be larger by more than `isolation_llr_margin`.
 
     estimators: of the isolation; loss_estimator_indices (n,): of each surface's loss, or -1. If the estimator
-    is weakly excluded by WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED, excluded losses are alternatives as well.
+    is weakly excluded by DAMAGE_MAY_HAVE_EXCLUDED_OTHERS, excluded losses are alternatives as well.
     """
     includes_excluded_losses = (
         loss_estimator_indices[surface_index] >= 0
         and estimators[loss_estimator_indices[surface_index]].weakly_excluded
-        == WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
+        == DAMAGE_MAY_HAVE_EXCLUDED_OTHERS
     )
     for block in blocks:
         loss_llr_lower_bound = 0.0

@@ -32,19 +32,19 @@ from beaver_ftc.scenario.schema import Scenario
 
 @sized
 def diagnosis_dtype(
-    n_surfaces: int, statistical_record_size: StatisticalRecordSize = USUAL_RECORD_SIZE
+    n_surfaces: int, statistical_capacities: StatisticalRecordSize = USUAL_RECORD_SIZE
 ) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces; statistical_record_size: rooms of the
+    """The stages of the diagnosis of an aircraft with n surfaces; statistical_capacities: rooms of the
     statistical detector's record."""
     return record(
         config=state.SHARED_CONFIG_RECORD,
-        bound=bound_dtype(n_surfaces, statistical_record_size.n_model_error_bound_boxes),
+        bound=bound_dtype(n_surfaces, statistical_capacities.n_model_error_bound_boxes),
         bank=filters.BANK_RECORD,
         fdae=filters.FDAE_RECORD,
         verdict=conclusions.conclusion_dtype(n_surfaces), layout=state.layout_dtype(n_surfaces),
         isolation=isolation.isolation_dtype(n_surfaces),
         types=registry.fault_types_dtype(n_surfaces),
-        statistical=statistical.statistical_dtype(statistical_record_size),
+        statistical=statistical.statistical_dtype(statistical_capacities),
         sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
         engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n_surfaces),
@@ -67,13 +67,13 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     filters.configure_fdae(fdi["fdae"], scenario)
     monitors.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
-        published.configure_published(fdi, scenario, travel)
+        published.reconfigure_diagnosis_as_published(fdi, scenario, travel)
     registry.configure_fault_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
     fdi["types"]["config"]["has_surface_term_errors"] = fdi["bound"]["has_surface_term_errors"]
     conclusions.reset_conclusion(fdi["verdict"])
 
 
-def carry_over_to_restarted_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
+def prepare_takeover_from_previous_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
     """Prepare a configured diagnosis to take over from the one in `previous_fdi`, of the same flight.
 
     Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.
@@ -108,13 +108,13 @@ def record_isolated_surfaces(fdi, t):
     )
     sole_isolated_surface_index = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
-        is_isolated = (
+        is_surface_isolated = (
             fdi.types.surface[s].status.is_isolated
             if fdi.types.pair.enabled
             else s == sole_isolated_surface_index
         )
         conclusions.update_isolation_interval(
-            conclusion, s, is_isolated and not surface_conclusion_is_void, t
+            conclusion, s, is_surface_isolated and not surface_conclusion_is_void, t
         )
 
 

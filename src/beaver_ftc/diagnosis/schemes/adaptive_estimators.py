@@ -5,8 +5,8 @@ The acceleration by known faults is part of the prediction, so the estimator of 
 A Python plug-in has a scheme of its own (PYTHON_PLUGIN): its verdict replaces ours, and our estimators run
 on, because the laws use them. The scheme `none` (NO_DIAGNOSIS) only begins the detection filters.
 
-The isolation depends on the fault class and on the detectors in authority; a row of ISOLATION_VARIANTS for
-each:
+The isolation depends on the fault class and on the detectors in authority; a row of
+ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY for each:
 
     class        of the bank of estimators excludes  and decides
     published    worst case, statistics, or either   the estimator that is left: a loss of one surface
@@ -94,7 +94,7 @@ def update_detection_filters(fdi, prediction, measured):
 
 
 @kernel
-def update_isolation_estimators(fdi, prediction):
+def update_fault_effects_and_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
     config = fdi.config
     bound_record = fdi.bound
@@ -118,13 +118,13 @@ def update_isolation_estimators(fdi, prediction):
 
 
 @apart
-def begin_without_diagnosis(fdi, prediction, measured):
+def begin_only_detection_filters(fdi, prediction, measured):
     """Begin the detection filters, which the log records (CompiledScheme)."""
     start_detection_filters(fdi, measured.x)
 
 
 NO_DIAGNOSIS = CompiledScheme(
-    begin_without_diagnosis, skip_advance_to_frame, skip_update_verdict, skip_prepare_next_frame,
+    begin_only_detection_filters, skip_advance_to_frame, skip_update_verdict, skip_prepare_next_frame,
     skip_accumulate_substep
 )  # fmt: skip
 
@@ -144,7 +144,7 @@ class IsolationVariant(NamedTuple):
 
 
 @kernel
-def isolate_fault(fdi, measured, t, was_detected_before):
+def start_or_continue_isolation(fdi, measured, t, was_detected_before):
     """From the alarm on, exclude faults and decide; was_detected_before: the alarm came a frame or more ago.
 
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
@@ -154,11 +154,11 @@ def isolate_fault(fdi, measured, t, was_detected_before):
     if not was_detected_before:
         isolation.start_estimators(fdi.isolation, fdi.bound.changing_gyro_error_bound, measured.x)
         begin_isolation_variant(variant_index, fdi)
-    alarm_is_not_initial_error = not sensor_monitor.surface_alarm_may_be_initial_error(
+    alarm_is_not_initial_sensor_error = not sensor_monitor.surface_alarm_may_be_initial_error(
         monitor, fdi.verdict.detected_at_s
     )
     if (
-        alarm_is_not_initial_error
+        alarm_is_not_initial_sensor_error
         and sensor_monitor.allows_surface_isolation(monitor, was_detected_before)
         and not fdi.engine_monitor.output.engine_failed
     ):
@@ -218,7 +218,7 @@ def parity_excludes(fdi, fie):
 
 
 @kernel
-def exclude_by_worst_case(fdi, x, t, isolation_started_earlier):
+def update_and_exclude_by_worst_case(fdi, x, t, isolation_started_earlier):
     """Exclude the faults that are not possible in the worst case."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         if not update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_earlier):
@@ -234,7 +234,7 @@ def decide_isolated_loss(fdi, t):
 @apart
 def isolate_loss_by_worst_case(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case alone (IsolationVariant)."""
-    exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
+    update_and_exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
     decide_isolated_loss(fdi, t)
 
 
@@ -262,8 +262,8 @@ def isolate_loss_by_statistics(fdi, measured, t, isolation_started_earlier):
 @apart
 def isolate_fault_type_by_worst_case(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
-    exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
-    decide_fault_type(fdi, t, isolation_started_earlier)
+    update_and_exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
+    judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier)
 
 
 @apart
@@ -274,11 +274,11 @@ def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_started_ea
             fdi, fie, measured.x, isolation_started_earlier
         ) or parity_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
-    decide_fault_type(fdi, t, isolation_started_earlier)
+    judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier)
 
 
 @kernel
-def decide_fault_type(fdi, t, isolation_started_earlier):
+def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
     """Decide which fault of every type, alone or two at a time, is there."""
     types, conclusion_record, layout, filter_bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     estimators, bound_record = fdi.isolation.estimator, fdi.bound
@@ -324,7 +324,7 @@ def record_surface_commands(fdi, prediction):
     registry.record_commands(fdi.types, prediction.commanded, prediction.frame_means)
 
 
-ISOLATION_VARIANTS = {
+ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY = {
     ("published", "worst-case"): IsolationVariant(
         skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_worst_case
     ),
@@ -343,9 +343,15 @@ ISOLATION_VARIANTS = {
 }
 PUBLISHED_WORST_CASE_VARIANT_INDEX = 0  # the place of the published class without statistics
 
-begin_isolation_variant = one_of([variant.begin for variant in ISOLATION_VARIANTS.values()])
-record_commands_in_variant = one_of([variant.record_commands for variant in ISOLATION_VARIANTS.values()])
-isolate_by_variant = one_of([variant.isolate for variant in ISOLATION_VARIANTS.values()])
+begin_isolation_variant = one_of(
+    [variant.begin for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
+)
+record_commands_in_variant = one_of(
+    [variant.record_commands for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
+)
+isolate_by_variant = one_of(
+    [variant.isolate for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
+)
 
 
 def isolation_variant_index(config: FdiConfig) -> int:
@@ -353,7 +359,7 @@ def isolation_variant_index(config: FdiConfig) -> int:
     isolation_authority = config.authority if config.weighs_chance else "worst-case"
     if config.fault_class == "all" and isolation_authority == "statistical":
         isolation_authority = "either"
-    return list(ISOLATION_VARIANTS).index((config.fault_class, isolation_authority))
+    return list(ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY).index((config.fault_class, isolation_authority))
 
 
 @apart
@@ -361,7 +367,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
     statistical_detector = fdi.statistical
     y = measured.y
-    uncertainty_bound = fdi.statistical.noise.uncertainty_bound
+    uncertainty_bound_rad_s2 = fdi.statistical.noise.uncertainty_bound
     test_config = statistical_detector.test_config
     blocks = statistical_detector.block
     gust = statistical_detector.gust
@@ -369,7 +375,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity_views = statistical_detector.views[: statistical_detector.n_views]
     inertial_gust = statistical_detector.inertial_gust
     frame_means = prediction.frame_means
-    innovation, dt = fdi.bank.output.innovation, fdi.config.dt
+    acceleration_innovation, dt = fdi.bank.output.innovation, fdi.config.dt
     gusts.fill_frame_mean_and_variance_by_gust(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
         gusts.fill_frame_mean_and_variance_by_gust(inertial_gust, prediction.frame_share_per_instant)
@@ -377,9 +383,20 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
     )
-    is_alarm_latched, may_loss_end = statistical_detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
+    has_statistical_alarm_been_raised, may_loss_end = (
+        statistical_detector.alarm.detected_at_s >= 0.0,
+        not fdi.config.abrupt,
+    )
     statistical.update_blocks(
-        test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, may_loss_end
+        test_config,
+        uncertainty_bound_rad_s2,
+        blocks,
+        gust,
+        acceleration_innovation,
+        dt,
+        k,
+        has_statistical_alarm_been_raised,
+        may_loss_end,
     )
     parity.prepare_views_for_frame(
         parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
@@ -392,11 +409,17 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         forces_record,
         gust,
         inertial_gust,
-        innovation,
+        acceleration_innovation,
         y[AIRSPEED],
     )
     parity.update_view_tests(
-        parity_views, test_config, statistical_detector.tone_config, y, dt, k, is_alarm_latched
+        parity_views,
+        test_config,
+        statistical_detector.tone_config,
+        y,
+        dt,
+        k,
+        has_statistical_alarm_been_raised,
     )
     is_model_error_known = fdi.bound.error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
@@ -416,10 +439,10 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
 
 
 @apart
-def prepare_statistical_tests(fdi, prediction, measured, k):
+def update_gusts_and_prepare_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     statistical_detector, dt = fdi.statistical, fdi.config.dt
-    update_gusts_and_forces(
+    update_gusts_and_force_innovations(
         statistical_detector.gust,
         statistical_detector.inertial_gust,
         statistical_detector.forces,
@@ -442,7 +465,7 @@ def prepare_statistical_tests(fdi, prediction, measured, k):
 
 
 @apart
-def add_instant_to_statistical_tests(fdi, prediction, measured):
+def add_instant_to_gusts_and_tests(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
     statistical_detector = fdi.statistical
     instant_duration_s = prediction.frame_share_per_instant * fdi.config.dt
@@ -460,7 +483,7 @@ def add_instant_to_statistical_tests(fdi, prediction, measured):
 
 
 @kernel
-def update_gusts_and_forces(gust, inertial_gust, forces_record, prediction, measured, k, dt):
+def update_gusts_and_force_innovations(gust, inertial_gust, forces_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.accounts_for_gusts:
         gusts.set_gust_rotation_intensity(gust, measured.altitude)
@@ -472,11 +495,15 @@ def update_gusts_and_forces(gust, inertial_gust, forces_record, prediction, meas
     if forces_record.in_use or gust.output.uses_accelerometers:
         gusts.store_accelerometer_reading(gust, measured.force)
     if forces_record.in_use:
-        update_forces_and_inertial_gust(gust, inertial_gust, forces_record, prediction, measured, k, dt)
+        update_force_innovations_and_inertial_gust(
+            gust, inertial_gust, forces_record, prediction, measured, k, dt
+        )
 
 
 @kernel
-def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, prediction, measured, k, dt):
+def update_force_innovations_and_inertial_gust(
+    gust, inertial_gust, forces_record, prediction, measured, k, dt
+):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_all_force_innovations(forces_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.accounts_for_gusts:
@@ -504,7 +531,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     update_detection_filters(fdi, prediction, measured)
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
-    update_isolation_estimators(fdi, prediction)
+    update_fault_effects_and_estimators(fdi, prediction)
     record_commands_in_variant(fdi.config.isolation_variant, fdi, prediction)
     do_weights_leak = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
     filters.advance_fdae(
@@ -525,22 +552,22 @@ def update_verdict(fdi, prediction, measured, t):
         return
     was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
-    alarm_axis = detect_alarm_axis_or_engine_failure(fdi, measured.y, t)
+    alarm_axis = record_engine_failure_or_find_alarm_axis(fdi, measured.y, t)
     if alarm_axis >= 0:
         conclusion.latch_alarm(conclusion_record, alarm_axis, t)
     if conclusion_record.detected:
-        isolate_fault(fdi, measured, t, was_detected_before)
+        start_or_continue_isolation(fdi, measured, t, was_detected_before)
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
-def detect_alarm_axis_or_engine_failure(fdi, y, t):
+def record_engine_failure_or_find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    engine_asymmetry_bound = fdi.bound.error_map.engine_asymmetry_bound_now
+    engine_yawing_moment_coefficient_bound = fdi.bound.error_map.engine_asymmetry_bound_now
     conclusion_record = fdi.verdict
     if not conclusion_record.detected and monitors.detect_engine_failure(
-        fdi.engine_monitor, engine_asymmetry_bound, y
+        fdi.engine_monitor, engine_yawing_moment_coefficient_bound, y
     ):
         conclusion.replace_isolated_estimator(conclusion_record, UNANTICIPATED, t)
         return YAW
@@ -551,14 +578,14 @@ def detect_alarm_axis_or_engine_failure(fdi, y, t):
 def prepare_next_frame(fdi, prediction, measured, k):
     """Prepare the statistical detector, where it is declared (CompiledScheme)."""
     if fdi.statistical.test_config.enabled:
-        prepare_statistical_tests(fdi, prediction, measured, k)
+        update_gusts_and_prepare_tests(fdi, prediction, measured, k)
 
 
 @apart
 def accumulate_substep(fdi, prediction, measured):
     """The same for an instant inside the frame (CompiledScheme)."""
     if fdi.statistical.test_config.enabled:
-        add_instant_to_statistical_tests(fdi, prediction, measured)
+        add_instant_to_gusts_and_tests(fdi, prediction, measured)
 
 
 SCHEME = CompiledScheme(
@@ -567,7 +594,7 @@ SCHEME = CompiledScheme(
 
 
 @apart
-def take_plugin_verdict(fdi, prediction, measured, t):
+def update_verdict_from_plugin(fdi, prediction, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
     filters.form_fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
@@ -579,9 +606,9 @@ def take_plugin_verdict(fdi, prediction, measured, t):
 
 
 PYTHON_PLUGIN = CompiledScheme(
-    begin_without_diagnosis,
+    begin_only_detection_filters,
     advance_estimators_to_frame,
-    take_plugin_verdict,
+    update_verdict_from_plugin,
     prepare_next_frame,
     accumulate_substep,
 )

@@ -35,14 +35,14 @@ from beaver_ftc.scenario.schema import Scenario
 ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
 RATE_CENTRES_RAD_S, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
 N_CENTRES_PER_INPUT = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES_RAD_S), len(TRAVEL_SHARE_CENTRES))
-N_NETWORK_NODES = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
+N_NODES_PER_AXIS = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
 
 # first_centre, centre_spacing: of the centres, by axis and input. weight_limit: of a weight, projection P;
 # infinite without one. output: fhat, rad/s2.
 STATE_NETWORK_RECORD = record(
     config=record(gain=float, weight_limit=float, first_centre=(3, 3), centre_spacing=(3, 3)),
     memory=record(
-        input_basis=(3, N_CENTRES_PER_INPUT[0]), weights=(3, N_NETWORK_NODES), basis=(3, N_NETWORK_NODES)
+        input_basis=(3, N_CENTRES_PER_INPUT[0]), weights=(3, N_NODES_PER_AXIS), basis=(3, N_NODES_PER_AXIS)
     ),
     output=3,
 )
@@ -74,7 +74,7 @@ def configure_state_network(network: np.void, gain: float, weight_limit: float, 
             )
 
 
-def configure_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def reconfigure_diagnosis_as_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n)
     rad: the stops."""
     config, dt, isolation_record = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
@@ -120,13 +120,13 @@ def fill_input_basis(network, i, input_index, n_centres, input_value):
         ),
         n_centres - 1.0,
     )
-    basis_norm = np.sqrt(
+    basis_euclidean_norm = np.sqrt(
         fill_gaussians_and_sum_squares(
             position_in_centre_spacings, n_centres, 0, network.memory.input_basis[input_index]
         )
     )
     for centre_index in range(n_centres):
-        network.memory.input_basis[input_index, centre_index] /= basis_norm
+        network.memory.input_basis[input_index, centre_index] /= basis_euclidean_norm
 
 
 @kernel
@@ -156,14 +156,14 @@ def evaluate_state_network(network, main_surface_indices, x, y, u):
 
 
 @kernel
-def train_state_network(network, training_signal, dt):
-    """th' = P{Gamma Z^T training_signal}, by a step of dt s; training_signal (3,), Z: the basis as it was
+def train_state_network(network, training_residual, dt):
+    """th' = P{Gamma Z^T training_residual}, by a step of dt s; training_residual (3,), Z: the basis as it was
     evaluated."""
     for i in range(3):
-        for node_index in range(N_NETWORK_NODES):
+        for node_index in range(N_NODES_PER_AXIS):
             unlimited_weight = (
                 network.memory.weights[i, node_index]
-                + dt * network.config.gain * network.memory.basis[i, node_index] * training_signal[i]
+                + dt * network.config.gain * network.memory.basis[i, node_index] * training_residual[i]
             )
             network.memory.weights[i, node_index] = min(
                 max(unlimited_weight, -network.config.weight_limit), network.config.weight_limit
@@ -204,7 +204,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     adaptive_estimators.update_detection_filters(fdi, prediction, measured)
-    adaptive_estimators.update_isolation_estimators(fdi, prediction)
+    adaptive_estimators.update_fault_effects_and_estimators(fdi, prediction)
     train_fdae_network(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
         fdi.fdae,
@@ -220,11 +220,11 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
 
 
 @kernel
-def set_all_constant_thresholds(fdi, constant_threshold):
+def set_all_constant_thresholds(fdi, common_threshold_rad_s):
     """Replace all adaptive thresholds by a constant, rad/s."""
-    filters.set_constant_fdae_threshold(fdi.fdae, constant_threshold)
-    filters.set_constant_published_filter_threshold(fdi.bank, constant_threshold)
-    isolation.set_constant_isolation_thresholds(fdi.isolation, constant_threshold)
+    filters.set_constant_fdae_threshold(fdi.fdae, common_threshold_rad_s)
+    filters.set_constant_published_filter_threshold(fdi.bank, common_threshold_rad_s)
+    isolation.set_constant_isolation_thresholds(fdi.isolation, common_threshold_rad_s)
 
 
 @apart
@@ -239,7 +239,7 @@ def update_verdict(fdi, prediction, measured, t):
     if alarm_axis >= 0:
         conclusion.latch_alarm(conclusion_record, alarm_axis, t)
     if conclusion_record.detected:
-        adaptive_estimators.isolate_fault(fdi, measured, t, was_detected_before)
+        adaptive_estimators.start_or_continue_isolation(fdi, measured, t, was_detected_before)
 
 
 SCHEME = CompiledScheme(

@@ -18,7 +18,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
-from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH, PITCH_SURFACE_GROUP, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
@@ -49,7 +49,7 @@ from beaver_ftc.diagnosis.types.verdict import (
 def latch_group_alarms(pair_record, filter_bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for axis in range(3):
-        group_index = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
+        group_index = PITCH_SURFACE_GROUP if axis == PITCH else LATERAL_SURFACE_GROUP
         for filter_index in range(filter_bank.config.n_filters):
             if (
                 abs(filter_bank.output.residual[filter_index, axis])
@@ -139,7 +139,7 @@ def update_pitch_observations(types, layout, estimators, innovation, innovation_
         locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound)
         return
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_GROUP:
+        if layout.group[s] == PITCH_SURFACE_GROUP:
             set_is_anomalous(surface, abs(innovation[PITCH]) > innovation_bound[PITCH])
 
 
@@ -214,7 +214,7 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     types_do_not_explain_flight_yet = both_must_be_at_fault and not (
         verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
     )
-    can_isolate = pair_record.group_has_alarm[LATERAL_GROUP] == 1 and not (
+    can_isolate = pair_record.group_has_alarm[LATERAL_SURFACE_GROUP] == 1 and not (
         fault_is_outside_class or types_do_not_explain_flight_yet
     )
     set_isolation_status(
@@ -338,7 +338,7 @@ def decide_pitch_isolation(types, layout, t):
         return
     sole_surface_index = find_and_store_sole_pitch_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
-        if layout.group[surface_index] == PITCH_GROUP:
+        if layout.group[surface_index] == PITCH_SURFACE_GROUP:
             set_isolation_status(
                 surface,
                 surface_index == sole_surface_index,
@@ -352,7 +352,7 @@ def find_and_store_sole_pitch_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = (
         verdict.find_surface_at_fault(types, layout)
-        if types.pair.group_has_alarm[PITCH_GROUP]
+        if types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
         else NO_SURFACE
     )
     if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
@@ -407,7 +407,7 @@ def first_fault_finding(types, conclusion, layout, s, lateral_fault_outside_clas
 def is_pitch_surface_isolated(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_GROUP and surface.status.is_isolated:
+        if layout.group[s] == PITCH_SURFACE_GROUP and surface.status.is_isolated:
             return True
     return False
 
@@ -418,9 +418,9 @@ def should_be_accommodated(types, layout, s):
     if types.surface[s].status.is_isolated:
         return True
     if (
-        layout.group[s] != PITCH_GROUP
+        layout.group[s] != PITCH_SURFACE_GROUP
         or is_pitch_surface_isolated(types, layout)
-        or not types.pair.group_has_alarm[PITCH_GROUP]
+        or not types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
     ):
         return False
     sole_possible_surface_index = verdict.sole_possible_surface(types.surface, True)

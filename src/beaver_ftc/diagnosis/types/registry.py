@@ -30,7 +30,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import PITCH_GROUP
+from beaver_ftc.diagnosis.state import PITCH_SURFACE_GROUP
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
@@ -376,7 +376,9 @@ def configure_fault_types(
         actuator["min_rate_limited_motion_per_substep"] = min(
             radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
         )
-        surface_record["status"]["may_be_sole_fault"] = not config.pairs or layout["group"][s] == PITCH_GROUP
+        surface_record["status"]["may_be_sole_fault"] = (
+            not config.pairs or layout["group"][s] == PITCH_SURFACE_GROUP
+        )
         surface_record["accommodation"]["mode"] = surface_record["status"]["fault_type"] = -1
 
 

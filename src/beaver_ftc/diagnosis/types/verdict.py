@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_SURFACE_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     REST_HIDES_TYPE,
@@ -635,7 +635,9 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
             or anomaly_is_shorter_than_half_cycle
             or _counts_with_constant_parameter_types(type_index, constant_parameter_type_indices)
         ]
-    second_fault_is_possible = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
+    second_fault_is_possible = (
+        fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_SURFACE_GROUP
+    )
     if second_fault_is_possible and any(
         registry.ACCOMMODATION_MODE_BY_TYPE[type_index] == GIVE_UP
         for type_index in constant_parameter_type_indices

@@ -54,7 +54,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
         "diagnosis.isolation.update_all_fault_effects_and_reach": nothing,
         "diagnosis.isolation.advance_estimators": nothing,
         "diagnosis.isolation.start_estimators": nothing,
-        "diagnosis.schemes.adaptive_estimators.isolate_fault": nothing,
+        "diagnosis.schemes.adaptive_estimators.start_or_continue_isolation": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {

@@ -98,11 +98,11 @@ class DeclaredBounds(NamedTuple):
 
 
 class GustReadout(NamedTuple):
-    """Gusts as the vanes see them. accounts_for_gusts: turbulence is declared; is_gust_measured: its effect
+    """Gusts as the vanes see them. is_turbulence_declared; subtracts_measured_gust: its effect
     is subtracted from the innovation; gust_acceleration_rad_s2 (3,): what the gust does now."""
 
-    accounts_for_gusts: bool
-    is_gust_measured: bool
+    is_turbulence_declared: bool
+    subtracts_measured_gust: bool
     gust_acceleration_rad_s2: np.ndarray
 
 

@@ -198,7 +198,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         its["keep"] = then["drift_decay_factor"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
-    if diagnosis.gust.accounts_for_gusts:
+    if diagnosis.gust.is_turbulence_declared:
         its["air"] = tape.filters["air"][here][1:][:, axes]
         drift += (
             block.factor_on_gust_drift_intensity

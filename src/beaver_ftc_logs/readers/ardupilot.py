@@ -87,5 +87,5 @@ def _silence_stderr() -> Iterator[None]:
 
 
 def _message_name(message_type: str, fields: dict[str, Any]) -> str:
-    instance = next((fields[key] for key in _INSTANCE_FIELDS if isinstance(fields.get(key), int)), 0)
-    return message_type if instance == 0 else f"{message_type}{instance}"
+    instance_number = next((fields[key] for key in _INSTANCE_FIELDS if isinstance(fields.get(key), int)), 0)
+    return message_type if instance_number == 0 else f"{message_type}{instance_number}"

@@ -77,7 +77,7 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
     at(published.network)
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
-    published_scheme.train_fdae_network(published, fdae, detected, DT)
+    published_scheme.train_fdae_network_if_due(published, fdae, detected, DT)
     expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
     np.testing.assert_allclose(
         published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES_PER_AXIS))

@@ -171,7 +171,7 @@ def train_state_network(network, training_residual, dt):
 
 
 @kernel
-def train_fdae_network(published_record, fdae, is_detected, dt):
+def train_fdae_network_if_due(published_record, fdae, is_detected, dt):
     """The FDAE's network learns from the residual the frame began with, once a fault is detected.
 
     Without the dead zone it learns from the first frame on, with any residual.
@@ -205,7 +205,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     adaptive_estimators.update_detection_filters(fdi, prediction, measured)
     adaptive_estimators.update_fault_effects_and_estimators(fdi, prediction)
-    train_fdae_network(published_record, fdi.fdae, fdi.verdict.detected, dt)
+    train_fdae_network_if_due(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
         fdi.fdae,
         bound_record,

@@ -125,7 +125,7 @@ def record(scenario: Scenario) -> Recording:
     by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
     recording = Recording(recorder.context, recorder.seen, *by_frame)
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
-    if scenario.fdi.statistical is not None and diagnosis.gust.is_gust_measured:
+    if scenario.fdi.statistical is not None and diagnosis.gust.subtracts_measured_gust:
         recording.air, recording.air_noise = (
             np.array(air),
             np.sqrt(diagnosis.acceleration_variance_by_input_noise),

@@ -69,7 +69,7 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
     context = context_of(loop.frames, exact, loop.start, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
-    if diagnosis.gust.is_gust_measured:
+    if diagnosis.gust.subtracts_measured_gust:
         context = context_with_measured_gust(context, np.sqrt(diagnosis.acceleration_variance_by_input_noise))
     loop.release()
     return context, coefficients

@@ -196,7 +196,7 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
     config = scenario.fdi
     fdi["bank"]["config"]["decay_factor"] = 0.0
-    filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
+    filters.fill_bank_decay_factors(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
     for_noise = detection_poles_for_noise(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy

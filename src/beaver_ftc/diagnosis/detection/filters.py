@@ -130,7 +130,7 @@ def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ..
     return (config.detection_pole_per_s, *poles_after_published_per_s)[:MAX_POLES]
 
 
-def configure_bank(filter_bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
+def fill_bank_decay_factors(filter_bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
     poles_per_s = filter_poles_per_s(config, declared)
     filter_bank["config"]["n_filters"] = len(poles_per_s)
@@ -488,15 +488,15 @@ def form_fdae_residual(fdae, x):
 
 
 @kernel
-def alarm_axis(filter_bank, authority, statistical_alarm_record):
+def alarm_axis(filter_bank, alarm_authority_code, statistical_alarm_record):
     """The axis on which a detector in authority raises the alarm, or -1.
 
     statistical_alarm_record: `ALARM` of the statistical detector.
     """
-    axis = bank_alarm_axis(filter_bank) if authority != STATISTICAL_DETECTOR else -1
+    axis = bank_alarm_axis(filter_bank) if alarm_authority_code != STATISTICAL_DETECTOR else -1
     if (
         axis < 0
-        and authority != WORST_CASE_DETECTOR
+        and alarm_authority_code != WORST_CASE_DETECTOR
         and statistical_alarm_record.score_over_alarm_level > 1.0
     ):
         axis = statistical_alarm_record.axis

@@ -63,7 +63,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
         _refuse_unavailable_fault_pairs(scenario)
     declared = Declared.of(scenario)
     bounds.configure_uncertainty_bound(fdi["bound"], scenario, declared, prediction["design"])
-    filters.configure_bank(fdi["bank"], config, declared, dt)
+    filters.fill_bank_decay_factors(fdi["bank"], config, declared, dt)
     filters.configure_fdae(fdi["fdae"], scenario)
     monitors.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:

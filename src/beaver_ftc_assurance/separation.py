@@ -68,7 +68,9 @@ class Candidate:
         """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
         relation = RELATIONS[self.kind]
         by_share, by_angle = float(relation.theta_is_share), float(not relation.theta_is_share)
-        ends = [(relation.gain + by_share * end) * u + by_angle * end for end in (self.low, self.high)]
+        ends = [
+            (relation.command_gain + by_share * end) * u + by_angle * end for end in (self.low, self.high)
+        ]
         return np.minimum(*ends), np.maximum(*ends)
 
     def off(self, u: np.ndarray) -> np.ndarray:

@@ -115,7 +115,8 @@ def of_stages(fdi, kernel):
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         **dict.fromkeys(("pair", "pair_record"), types["pair"]),
-        **dict.fromkeys(("conclusion", "surface_conclusion"), fdi["verdict"]), "layout": fdi["layout"],
+        **dict.fromkeys(("conclusion", "surface_conclusion", "previous_conclusion"), fdi["verdict"]),
+        "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
         **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(
@@ -126,9 +127,11 @@ def of_stages(fdi, kernel):
         "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
         "n_substeps": fdi["config"]["n_substeps"],
         **dict.fromkeys(("bank", "filter_bank", "detection_filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
-        "innovation": fdi["bank"]["output"]["innovation"],
+        **dict.fromkeys(("innovation", "innovation_by_axis"), fdi["bank"]["output"]["innovation"]),
         **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
-        "innovation_bound": fdi["bound"]["frame_innovation_bound"],
+        **dict.fromkeys(
+            ("innovation_bound", "innovation_bound_by_axis"), fdi["bound"]["frame_innovation_bound"]
+        ),
         **dict.fromkeys(("noise", "changing_gyro_error_bound"), fdi["bound"]["changing_gyro_error_bound"]),
         "dt": fdi["config"]["dt"],
         **dict.fromkeys(("statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    observed_deflection_error,
+    last_midpoint_deflection_error,
     verdict,
 )
 
@@ -206,7 +206,10 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
 def assess_surface_at_fault(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     surface = types.surface[s]
-    can_be_at_fault, accommodation_mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
+    can_be_at_fault, accommodation_mode = (
+        verdict.estimator_or_deduction_allows_fault(surface),
+        surface.accommodation.mode,
+    )
     if accommodation_mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
     elif accommodation_mode == GIVE_UP:
@@ -217,7 +220,7 @@ def assess_surface_at_fault(assessment, types, layout, estimators, s):
     elif accommodation_mode == SUBTRACT_OFFSET:
         assessment.deflection_offset[s] = verdict.deflection_error(surface, can_be_at_fault)
     elif accommodation_mode == WAIT_FOR_SURFACE:
-        assessment.deflection_lag[s] = observed_deflection_error(surface)
+        assessment.deflection_lag[s] = last_midpoint_deflection_error(surface)
         assessment.any_surface_lags = 1
 
 

@@ -32,7 +32,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types.verdict import estimate_fault_size, fault_findings
+from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_findings
 from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
@@ -408,7 +408,7 @@ def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float 
     surface, types = surfaces.index(str(said.isolated)), fdi["types"]
     pairs = types["pair"]["enabled"]
     status = types["surface"][surface]["status"] if pairs else fdi["verdict"]
-    return estimate_fault_size(fdi, surface, int(status["fault_type"]))
+    return estimate_fault_parameter(fdi, surface, int(status["fault_type"]))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis import TYPE_DESCRIPTIONS as WORDS
+from beaver_ftc.diagnosis import DESCRIPTIONS_IN_TYPE_ORDER as WORDS
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis import DeflectionRelation
 from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS
@@ -28,7 +28,7 @@ OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
 HELD_ANYWHERE = DeflectionRelation(
-    gain=0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
+    command_gain=0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
 )
 
 
@@ -69,8 +69,8 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}
-    if row.excluding_frame_comparison:
-        return {f"{name}_course_{row.excluding_frame_comparison.replace(' ', '_')}": row.stop_direction}
+    if row.excluding_frame_comparison_name:
+        return {f"{name}_course_{row.excluding_frame_comparison_name.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
     actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
@@ -78,7 +78,7 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
         actuator.travel_low_rad, actuator.travel_high_rad
     )
     return {
-        f"{name}_gain": row.deflection_relation.gain,
+        f"{name}_gain": row.deflection_relation.command_gain,
         f"{name}_theta_is_share": float(row.deflection_relation.theta_is_share),
         f"{name}_theta_is_constant": float(row.has_constant_parameter),
         f"{name}_theta_low": low, f"{name}_theta_high": high,
@@ -115,7 +115,7 @@ def _effect_of_relation(
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     actuator = diagnosis.surface_fault_types[surface].actuator
     low, high = relation.theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
-    offset, slope = (relation.gain - 1.0) * Gu, Gu if relation.theta_is_share else G
+    offset, slope = (relation.command_gain - 1.0) * Gu, Gu if relation.theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
     return Hypothesis(

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.pairs import locate_roll_and_yaw_surfaces
+from beaver_ftc.diagnosis.types.pairs import locate_and_test_lateral_surfaces
 from beaver_ftc.diagnosis.types.verdict import fault_findings
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
@@ -109,7 +109,7 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = 0.02
     fdi["bound"]["frame_innovation_bound"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    locate_roll_and_yaw_surfaces(
+    locate_and_test_lateral_surfaces(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],

@@ -65,7 +65,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
 
 def judged(judge, fdi, surface, kind, *given):
     """Take in what a type's row makes of the judged frame."""
-    types.intersect_feasible_set(surface, kind, on(judge, fdi, surface, kind, *given))
+    types.intersect_set_or_exclude_type(surface, kind, on(judge, fdi, surface, kind, *given))
 
 
 def restore_sets(surface):
@@ -122,7 +122,7 @@ def test_what_is_known_of_a_surface_as_it_begins():
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
     judged(commanded_surface.consistent_loss_interval, fdi, surface, CONSTANT_LOSS, 5)
-    judged(commanded_surface.consistent_varying_loss_interval, fdi, surface, VARYING_LOSS, 5)
+    judged(commanded_surface.varying_loss_unlimited_or_empty_set, fdi, surface, VARYING_LOSS, 5)
     assert (
         surface["feasible_sets"]["excluded"][CONSTANT_LOSS]
         == surface["feasible_sets"]["excluded"][VARYING_LOSS]
@@ -140,20 +140,20 @@ def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
         fdi["types"]["config"]["frames_per_block"], surface["commands"]["min_healthy_position"][1] = 5, least
         surface["commands"]["max_healthy_position"][1] = greatest
-        judged(commanded_surface.consistent_varying_loss_interval, fdi, surface, VARYING_LOSS, 5)
+        judged(commanded_surface.varying_loss_unlimited_or_empty_set, fdi, surface, VARYING_LOSS, 5)
         assert surface["feasible_sets"]["excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    types.intersect_feasible_set(surface, STUCK, (-0.1, 0.2))
-    types.intersect_feasible_set(surface, STUCK, (0.0, 0.9))
+    types.intersect_set_or_exclude_type(surface, STUCK, (-0.1, 0.2))
+    types.intersect_set_or_exclude_type(surface, STUCK, (0.0, 0.9))
     assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
     assert types.feasible_set_midpoint(surface, STUCK) == 0.1
     assert not surface["feasible_sets"]["excluded"][STUCK]
-    types.intersect_feasible_set(surface, STUCK, (0.2, 0.9))  # one point is not nothing
+    types.intersect_set_or_exclude_type(surface, STUCK, (0.2, 0.9))  # one point is not nothing
     assert not surface["feasible_sets"]["excluded"][STUCK]
-    types.intersect_feasible_set(surface, STUCK, (0.21, 0.9))
+    types.intersect_set_or_exclude_type(surface, STUCK, (0.21, 0.9))
     assert surface["feasible_sets"]["excluded"][STUCK]
 
 
@@ -165,14 +165,14 @@ def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
 def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval, stands):
     _, surface = new_surface()
     types.set_feasible_set(surface, STUCK, (0.0, 0.2))
-    types.intersect_feasible_set(surface, STUCK, interval)
+    types.intersect_set_or_exclude_type(surface, STUCK, interval)
     assert surface["feasible_sets"]["excluded"][STUCK]
     for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
         surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
             place - 1e-3,
             place + 1e-3,
         )
-        assert registry.agrees_with_rest_position(surface) == (stands and 0.0 <= place <= 0.2), place
+        assert registry.judged_frame_agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
@@ -190,7 +190,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in (
         (BIAS, commanded_surface.bias_interval_of_judged_frame),
-        (GROWING_BIAS, commanded_surface.consistent_growing_bias_interval),
+        (GROWING_BIAS, commanded_surface.update_growing_bias_and_consistent_interval),
     ):
         judged(judge, fdi, surface, kind, 5)
         assert surface["feasible_sets"]["excluded"][kind]
@@ -254,14 +254,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
             offset - 0.01,
             offset + 0.01,
         )
-        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
     assert surface["feasible_sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["min_growth_up"] == surface["growing_bias"]["min_growth_down"] == 0.0
 
 
@@ -285,7 +285,9 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
                 place - 0.01,
                 min(place + 0.01, HIGH),
             )
-            judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+            judged(
+                commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5
+            )
     assert surface["growing_bias"]["has_run_towards_stop"].tolist() == ran
 
 
@@ -298,7 +300,7 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
             place - 0.01,
             place + 0.01,
         )
-        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["has_run_towards_stop"][1] == ran
 
 
@@ -311,7 +313,13 @@ def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0
             place - 0.01,
             place + 0.01,
         )
-        judged(commanded_surface.consistent_rate_limit_interval, fdi, surface, SLOW, (frames or range(99))[k])
+        judged(
+            commanded_surface.update_rate_limit_and_consistent_interval,
+            fdi,
+            surface,
+            SLOW,
+            (frames or range(99))[k],
+        )
     return surface["feasible_sets"]["excluded"][SLOW]
 
 
@@ -364,7 +372,7 @@ def swung(signs, slowest_half_cycle_frames=20):
             0.1 * sign + 0.02,
         )
         on(commanded_surface.add_squared_deflection_error, fdi, surface, OSCILLATORY)
-        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, frame)
+        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
 
 
@@ -463,7 +471,7 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_can_hide
         stop_can_hide_deflection,
     )
     for frame in range(30):
-        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, frame)
+        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, frame)
     assert surface["feasible_sets"]["excluded"][OSCILLATORY] == excluded
 
 
@@ -517,7 +525,7 @@ def test_where_types_have_a_surface():
         HIGH,
         LOW,
     ]
-    assert commanded_surface.loss_theta_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
+    assert commanded_surface.effectiveness_minus_one_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
 
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
@@ -527,10 +535,10 @@ def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fie
         instants,
     )
     surface["commands"]["command_history"][1] = order
-    for which in (held_surface.EARLIER_RELEASE, held_surface.LATER_RELEASE):
+    for which in (held_surface.EARLIER_RELEASES_SLOT, held_surface.LATER_RELEASES_SLOT):
         held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["return_position_low"][held_surface.LATER_RELEASE, STUCK] = low
-    surface["release"]["return_position_high"][held_surface.LATER_RELEASE, STUCK] = high
+    surface["release"]["return_position_low"][held_surface.LATER_RELEASES_SLOT, STUCK] = low
+    surface["release"]["return_position_high"][held_surface.LATER_RELEASES_SLOT, STUCK] = high
     return fdi, surface
 
 
@@ -583,7 +591,7 @@ def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
         assert not on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
-        assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK)
+        assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
         held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK
@@ -654,9 +662,9 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
-    assert on(held_surface.position_at_frame_start, fdi, surface) == (0.1, 0.2, 9)
+    assert on(held_surface.start_position_interval_and_frame, fdi, surface) == (0.1, 0.2, 9)
     fdi["types"]["config"]["frame_shows_single_instant"] = 0
-    assert on(held_surface.position_at_frame_start, fdi, surface) == (0.3, 0.4, 8)
+    assert on(held_surface.start_position_interval_and_frame, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
@@ -674,8 +682,8 @@ def test_from_where_each_type_lets_go(kind):
         held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["return_position_low"][held_surface.EARLIER_RELEASE, STUCK],
-            surface["release"]["return_position_high"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["return_position_low"][held_surface.EARLIER_RELEASES_SLOT, STUCK],
+            surface["release"]["return_position_high"][held_surface.EARLIER_RELEASES_SLOT, STUCK],
         ) = 0.0, 0.1
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
@@ -716,12 +724,12 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
     restore_sets(surface)
     assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.promote_sets_before_release(
+    held_surface.replace_earlier_release_if_impossible(
         surface, STUCK
     )  # no earlier release: the later are the earlier ones now
     held = surface["release"]
     assert (held["return_position_low"][0, STUCK], held["return_position_high"][0, STUCK]) == (0.2, 0.3)
-    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK)
+    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
     assert (
         surface["stuck"]["feasible_low_before_release"].tolist(),
         surface["stuck"]["feasible_high_before_release"].tolist(),
@@ -812,11 +820,11 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
         (low, high)
     )
-    assert not held_surface.is_release_possible(surface, held_surface.EARLIER_RELEASE, STUCK)
+    assert not held_surface.is_release_possible(surface, held_surface.EARLIER_RELEASES_SLOT, STUCK)
     fdi["types"]["config"]["frames_per_block"], before = 1, held["return_position_high"][1, STUCK].copy()
-    held_surface.clear_releases(surface, held_surface.LATER_RELEASE, STUCK)
+    held_surface.clear_releases(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK), (
+    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK), (
         "in one frame nothing is let go within"
     )
     assert before == pytest.approx(high)
@@ -840,7 +848,13 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
         (-1.0, beyond) if side == "low" else (beyond, 1.0)
     )
     assert (
-        on(held_surface.narrow_return_position_interval, fdi, surface, held_surface.LATER_RELEASE, STUCK)
+        on(
+            held_surface.narrow_and_test_return_interval,
+            fdi,
+            surface,
+            held_surface.LATER_RELEASES_SLOT,
+            STUCK,
+        )
         == inside
     )
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
@@ -878,7 +892,7 @@ def test_a_jam_that_looks_healthy_is_what_it_was_before():
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, 10)
+    judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
     assert (swing["error_sign"], swing["n_half_cycles"], swing["sign_since_frame"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
@@ -886,5 +900,5 @@ def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_co
             low,
             high,
         )
-        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, 10)
+        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, 10)
         assert swing["error_sign"] == 0, "on its command it is on no side of it"

@@ -130,8 +130,8 @@ NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
 )
 def test_questions_about_the_types_left(kinds, constant, explained):
     _, surface = one(*kinds)
-    assert sum(map(bool, (verdict.type_remains(surface, kind) for kind in ALL))) == len(kinds)
-    assert all(verdict.type_remains(surface, kind) for kind in kinds)
+    assert sum(map(bool, (verdict.type_is_not_excluded(surface, kind) for kind in ALL))) == len(kinds)
+    assert all(verdict.type_is_not_excluded(surface, kind) for kind in kinds)
     assert bool(verdict.any_constant_parameter_type_remains(surface)) == constant
     assert bool(verdict.any_type_remains(surface)) == (kinds != ())
     for k, half_cycles in enumerate((2, 3)):
@@ -164,14 +164,16 @@ def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_remaining_typ
         else -1
     )
     assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
-    assert verdict.sole_remaining_constant_parameter_type(surface) == one_type
+    assert verdict.sole_constant_type_or_undecided(surface) == one_type
     found = verdict.sole_remaining_type_once_it_shows_itself(surface)
     assert (verdict.FIRST_TYPE_WITH_SAME_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
     fdi = new_case(rudder=None)
-    assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
+    assert [
+        bool(verdict.estimator_or_deduction_allows_fault(fdi["types"]["surface"][s])) for s in range(4)
+    ] == [
         True,
         True,
         False,
@@ -183,7 +185,9 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
         DEDUCED_FAULTY,
         0,
     )
-    assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
+    assert [
+        bool(verdict.estimator_or_deduction_allows_fault(fdi["types"]["surface"][s])) for s in range(4)
+    ] == [
         False,
         True,
         True,
@@ -412,7 +416,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = (
@@ -421,13 +425,13 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+        take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
     assert fdi["verdict"]["accommodated_surface"] == RUDDER
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
     assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
     surface["last_observation"]["position_low"] = 0.1
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
     assert (
         surface["accommodation"]["n_frames_without_sign_of_fault"],
         fdi["verdict"]["accommodated_surface"],
@@ -574,7 +578,7 @@ def test_a_surface_is_where_the_innovation_puts_it():
 def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
-        on(registry.infer_surface_positions, fdi, np.array([0.0, innovation, 0.0]), bound)
+        on(registry.shift_observations_and_infer_positions, fdi, np.array([0.0, innovation, 0.0]), bound)
     assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [1] * 4
     assert fdi["types"]["surface"]["judged_observation"]["is_anomalous"].tolist() == [0] * 4
     assert fdi["types"]["surface"]["earlier_observation"]["is_anomalous"].tolist() == [1] * 4
@@ -601,7 +605,7 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
         surface["last_observation"]["is_anomalous"],
     ) = is_anomalous
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.1, 0.2
-    on(registry.judge_previous_frame, fdi)
+    on(registry.judge_previous_and_advance_frame, fdi)
     assert surface["evidence"]["n_anomalous_frames"] == (6 if judged else 5)
     assert surface["evidence"]["first_anomalous_frame"] == (6 if judged else -1)
     assert (
@@ -626,7 +630,7 @@ def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
             0.1,
             0.2,
         )
-        on(registry.judge_previous_frame, fdi)
+        on(registry.judge_previous_and_advance_frame, fdi)
         counted.append(int(surface["evidence"]["n_anomalous_frames_since_stop_could_hide"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
     assert surface["evidence"]["n_anomalous_frames"] == 8
@@ -670,7 +674,7 @@ def n_rest_frames(low=0.1, high=0.2, frames=1, **fields):
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
-        on(registry.count_rest_as_evidence, fdi, RUDDER)
+        on(registry.count_rest_and_exclude_types, fdi, RUDDER)
     return fdi, surface
 
 
@@ -687,7 +691,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     ]
     fdi, surface = n_rest_frames()
     fdi["types"]["surface"]["status"]["may_be_sole_fault"] = 1, 1, 0, 1
-    on(registry.count_rest_as_evidence, fdi, RUDDER)
+    on(registry.count_rest_and_exclude_types, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist() == [
         1,
         1,
@@ -709,7 +713,7 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
         abrupt,
     )
     fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = GIVE_UP
-    on(registry.judge_previous_frame, fdi)
+    on(registry.judge_previous_and_advance_frame, fdi)
     assert fdi["types"]["surface"]["evidence"]["n_rest_frames"].tolist() == [0, 0, abrupt, 0]
 
 
@@ -734,7 +738,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
         fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][:8] = Z[k]
         fdi["isolation"]["estimator"]["frame_mean_effect"]["acceleration_at_zero_theta"][:8] = offset[k]
         fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][:8] = spread[k]
-        on(registry.observe_and_judge_block, fdi)
+        on(registry.advance_block_and_judge_previous, fdi)
         assert fdi["types"]["block"]["n_frames_so_far"] == (k + 1) % length
         assert fdi["types"]["frame_index"] == (k + 1 == length)
     assert fdi["types"]["block"]["mean_innovation"] == pytest.approx(innovation.mean(axis=0))
@@ -767,7 +771,7 @@ def lateral(one_left=True, other_left=True, alarmed=1, **pair):
     fdi["types"]["pair"]["group_has_alarm"] = 0, alarmed
     for name, value in pair.items():
         fdi["types"]["pair"][name] = value
-    outside = on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
+    outside = on(pairs.isolate_lateral_or_find_unanticipated, fdi, 3.0)
     return [
         bool(fdi["types"]["surface"]["status"]["is_isolated"][AILERON]),
         bool(fdi["types"]["surface"]["status"]["is_isolated"][RUDDER]),
@@ -791,16 +795,16 @@ def test_where_nothing_explains_both_the_fault_is_outside_the_class():
         leave(fdi["types"]["surface"][RUDDER], BIAS)
         fdi["types"]["pair"]["group_has_alarm"] = 0, 1
         leave(fdi["types"]["surface"][s])
-        assert on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
+        assert on(pairs.isolate_lateral_or_find_unanticipated, fdi, 3.0)
         leave(fdi["types"]["surface"][s], OSCILLATORY)  # it may swing yet
-        assert not on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
+        assert not on(pairs.isolate_lateral_or_find_unanticipated, fdi, 3.0)
         assert not fdi["types"]["surface"]["status"]["is_isolated"].any()
 
 
 def test_a_name_notes_when_it_was_given_and_when_its_type():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["status"]["fault_type"] = -1
-    pairs.set_isolation_status(surface, 1, STUCK, 3.0)
+    pairs.update_isolation_type_and_times(surface, 1, STUCK, 3.0)
     assert (
         surface["status"]["is_isolated"],
         surface["status"]["fault_type"],
@@ -812,11 +816,11 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
         3.0,
         3.0,
     )
-    pairs.set_isolation_status(surface, 1, BIAS, 4.0)
+    pairs.update_isolation_type_and_times(surface, 1, BIAS, 4.0)
     assert (surface["status"]["isolated_at_s"], surface["status"]["type_decided_at_s"]) == (3.0, 4.0)
-    pairs.set_isolation_status(surface, 1, BIAS, 5.0)
+    pairs.update_isolation_type_and_times(surface, 1, BIAS, 5.0)
     assert surface["status"]["type_decided_at_s"] == 4.0
-    pairs.set_isolation_status(surface, 0, BIAS, 6.0)
+    pairs.update_isolation_type_and_times(surface, 0, BIAS, 6.0)
     assert (
         surface["status"]["is_isolated"],
         surface["status"]["fault_type"],
@@ -831,7 +835,7 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["last_observation"]["healthy_position"] = 0.1
-    assert types.set_position_from_deflection_error(surface, 0.2, 0.05)
+    assert types.set_position_and_check_reach(surface, 0.2, 0.05)
     assert (
         surface["last_observation"]["position_low"],
         surface["last_observation"]["position_high"],
@@ -841,14 +845,14 @@ def test_a_surface_off_its_command_is_within_its_travel():
         pytest.approx(0.35),
         1,
     )
-    assert types.set_position_from_deflection_error(surface, 0.4, 0.05)
+    assert types.set_position_and_check_reach(surface, 0.4, 0.05)
     assert surface["last_observation"]["position_high"] == 0.5
-    assert not types.set_position_from_deflection_error(surface, 0.5, 0.05)
-    assert types.set_position_from_deflection_error(surface, -0.49, 0.05)
+    assert not types.set_position_and_check_reach(surface, 0.5, 0.05)
+    assert types.set_position_and_check_reach(surface, -0.49, 0.05)
     assert surface["last_observation"]["position_low"] == -0.4
-    types.set_position_from_deflection_error(surface, 0.04, 0.05)
+    types.set_position_and_check_reach(surface, 0.04, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
-    types.set_position_from_deflection_error(surface, 0.05, 0.05)
+    types.set_position_and_check_reach(surface, 0.05, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
 
 
@@ -890,7 +894,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         -1.2 + 0.4,
         0.05,
     )
-    on(pairs.update_pitch_observations, fdi)
+    on(pairs.update_pitch_anomaly_or_location, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (
         flap["last_observation"]["position_low"],
@@ -903,7 +907,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         0.14,
     )
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
-    on(pairs.update_pitch_observations, fdi)
+    on(pairs.update_pitch_anomaly_or_location, fdi)
     assert flap["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY
 
 
@@ -919,7 +923,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
         0.03,
         innovation,
     )
-    on(pairs.update_pitch_observations, fdi)
+    on(pairs.update_pitch_anomaly_or_location, fdi)
     assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [
         0,
         is_anomalous,
@@ -933,19 +937,19 @@ def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     elevator = fdi["types"]["surface"][ELEVATOR]
     fdi["types"]["pair"]["first_pitch_fault_surface"] = NO_SURFACE
     elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK] = 0.1, 0.14
-    on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
+    on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
     known = elevator["first_pitch_fault_sets"]
     assert fdi["types"]["pair"]["first_pitch_fault_surface"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
     elevator["feasible_sets"]["excluded"][STUCK], elevator["feasible_sets"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
-        on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
+        on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
         assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (
             0.1,
             k + 1,
         )
-    on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
+    on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
     assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (0.12, 0)
 
 
@@ -964,8 +968,8 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     elevator["first_pitch_fault_sets"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
     for frame in ("last_observation", "judged_observation", "earlier_observation"):
         fdi["types"]["surface"][frame]["is_anomalous"] = 1
-    assert on(pairs.detect_second_pitch_fault, fdi)
-    assert verdict.sole_remaining_constant_parameter_type(elevator) == STUCK
+    assert on(pairs.begin_second_pitch_fault_if_shown, fdi)
+    assert verdict.sole_constant_type_or_undecided(elevator) == STUCK
     assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible_sets"]["excluded"].any()
     for surface in (elevator, flap):
@@ -983,8 +987,8 @@ def test_a_second_begins_with_what_was_known_of_the_first():
             0,
         )
     assert fdi["types"]["surface"]["status"]["may_be_sole_fault"][[AILERON, RUDDER]].tolist() == [1, 1]
-    assert not on(pairs.detect_second_pitch_fault, _first(new_case(elevator=(STUCK,)), ELEVATOR))
-    assert not on(pairs.detect_second_pitch_fault, _first(new_case(elevator=()), NO_SURFACE))
+    assert not on(pairs.begin_second_pitch_fault_if_shown, _first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not on(pairs.begin_second_pitch_fault_if_shown, _first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
@@ -1004,7 +1008,7 @@ def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patie
     assert (
         bool(
             on(
-                pairs.alternative_types_would_have_shown,
+                pairs.other_types_no_longer_possible,
                 *one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence),
             )
         )
@@ -1020,7 +1024,7 @@ def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
         ((BIAS,), BIAS),
         ((CONSTANT_LOSS,), CONSTANT_LOSS),
     ):
-        assert on(pairs.pitch_fault_type, *one(*kinds)) == found
+        assert on(pairs.pitch_type_unless_given_up, *one(*kinds)) == found
 
 
 def decided(alarmed=(1, 0), **left):
@@ -1082,9 +1086,9 @@ def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
         False,
         True,
     ]
-    assert not on(pairs.is_pitch_surface_isolated, fdi)
+    assert not on(pairs.any_pitch_surface_is_isolated, fdi)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 0, 1
-    assert on(pairs.is_pitch_surface_isolated, fdi)
+    assert on(pairs.any_pitch_surface_is_isolated, fdi)
     assert [bool(on(pairs.should_be_accommodated, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
@@ -1095,7 +1099,7 @@ def test_the_verdict_is_that_of_the_first_named():
         fdi["types"]["surface"]["status"]["type_decided_at_s"][RUDDER],
         fdi["types"]["surface"]["status"]["isolated_at_s"][RUDDER],
     ) = 2.0, 1.5
-    conclude(fdi, pairs.first_fault_finding, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding_values, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated_estimator"], found["fault_type"], found["type_decided_at_s"]) == (
         4 + RUDDER,
@@ -1103,15 +1107,15 @@ def test_the_verdict_is_that_of_the_first_named():
         2.0,
     )
     assert found["isolated_at_s"] == 1.5
-    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
     assert (found["isolated_estimator"], found["fault_type"], found["isolated_at_s"]) == (
         UNANTICIPATED,
         -1,
         4.0,
     )
-    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
-    conclude(fdi, pairs.first_fault_finding, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
     assert (found["isolated_estimator"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
@@ -1126,7 +1130,7 @@ def acted(**left):
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         -1,
@@ -1150,7 +1154,7 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 1, 0, 0
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         accommodation_mode,
@@ -1163,7 +1167,7 @@ def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lea
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
         AILERON,
         SUBTRACT_OFFSET,
@@ -1173,10 +1177,10 @@ def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SUBTRACT_OFFSET, -1, -1]
     fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR] = 1
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, GIVE_UP, -1, -1]
     (
         fdi["types"]["surface"]["last_observation"]["position_low"],
@@ -1187,7 +1191,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
         0.4,
         99,
     )
-    take_lead(fdi, pairs.choose_pair_accommodation)
+    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
 
@@ -1207,7 +1211,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         Z @ off,
         room,
     )
-    on(pairs.locate_roll_and_yaw_surfaces, fdi)
+    on(pairs.locate_and_test_lateral_surfaces, fdi)
     slack = room + spread.sum(axis=1)
     corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
     least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
@@ -1219,7 +1223,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         ) == pytest.approx((least[k], greatest[k]))
     assert not fdi["types"]["pair"]["lateral_fault_outside_class"]
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
-    on(pairs.locate_roll_and_yaw_surfaces, fdi)
+    on(pairs.locate_and_test_lateral_surfaces, fdi)
     assert fdi["types"]["pair"]["lateral_fault_outside_class"]
 
 
@@ -1290,7 +1294,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated_estimator"] = UNANTICIPATED
     fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, 2
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
@@ -1315,7 +1319,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
         4.0,
         3.0,
     )
-    conclude(fdi, pairs.first_fault_finding, s, outside, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_finding_values, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
         assert (found["isolated_estimator"], found["fault_type"]) == (

@@ -284,7 +284,7 @@ def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
     estimators, bound_record = fdi.isolation.estimator, fdi.bound
     verdict.record_position_estimator_exclusions(types.surface, layout, estimators)
     if types.pair.enabled:
-        pairs.observe_and_judge_frame_for_pairs(
+        pairs.observe_pairs_and_judge_previous(
             types, layout, estimators, filter_bank, bound_record.frame_innovation_bound
         )
         conclusion.record_fault_type_finding(
@@ -293,7 +293,7 @@ def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
         )
         return
     if isolation_started_earlier or fdi.isolation.config.uses_reach_test:
-        registry.observe_and_judge_frame(
+        registry.observe_frame_and_judge_previous(
             types, layout, estimators, filter_bank.output.innovation, bound_record
         )
     conclusion.record_fault_type_finding(

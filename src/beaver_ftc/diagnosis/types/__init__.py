@@ -68,17 +68,18 @@ def reachable_range(config, surface, type_index, k):
 class DeflectionRelation(NamedTuple):
     """The deflection p of a surface under a type, by its command u and one parameter theta, all in rad:
 
-    p = gain u + theta, or p = (gain + theta) u where theta is a share of the command (theta_is_share).
+    p = command_gain u + theta, or p = (command_gain + theta) u where theta is a share of the command
+    (theta_is_share).
 
     theta_range_for_travel(low, high): returns the least and greatest theta; low, high: the travel, rad.
     """
 
-    gain: float
+    command_gain: float
     theta_is_share: bool
     theta_range_for_travel: Callable[[float, float], tuple[float, float]]
 
 
-def _no_estimate(fdi: np.void, s: int, type_index: int) -> None:
+def _return_none_as_estimate(fdi: np.void, s: int, type_index: int) -> None:
     """No parameter to estimate."""
 
 
@@ -126,7 +127,7 @@ class FaultType:
                             REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE (it may be there all
                             the same) or REST_POSITION_IS_PARAMETER (its parameter is the deflection at
                             which the surface stands)
-    half_cycles_before_isolating_others
+    half_cycles_before_isolating_other_surface
                             half-cycles of evidence that a fault on another surface needs while this type is
                             left here
     error_depends_on_command
@@ -155,7 +156,7 @@ class FaultType:
 
     deflection_relation     deflection by command and one parameter, where that is all that the type says; of
                             a type that is not constant theta may differ from frame to frame
-    excluding_frame_comparison
+    excluding_frame_comparison_name
                             name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
@@ -187,7 +188,7 @@ class FaultType:
     has_shown: Kernel | None = None
     shows_within_half_cycles: int = 0
     evidence_at_rest: int = REST_IS_UNINFORMATIVE
-    half_cycles_before_isolating_others: int = 1
+    half_cycles_before_isolating_other_surface: int = 1
     error_depends_on_command: bool = True
     can_look_like: tuple[str, ...] = ()
     motion_rules_out: Kernel | None = None
@@ -198,10 +199,12 @@ class FaultType:
     deflection_error: Kernel | None = None
     deflection_error_precedence: int = 100
     deflection_relation: DeflectionRelation | None = None
-    excluding_frame_comparison: str = ""
-    estimate_parameter: Callable[[np.void, int, int], float | None] = _no_estimate
-    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
-    estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
+    excluding_frame_comparison_name: str = ""
+    estimate_parameter: Callable[[np.void, int, int], float | None] = _return_none_as_estimate
+    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = (
+        _return_none_as_estimate
+    )
+    estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _return_none_as_estimate
 
 
 @kernel
@@ -231,7 +234,7 @@ def midpoint_parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
 
 
 @kernel
-def reset_feasible_sets(surface):
+def reset_feasible_sets_to_unlimited(surface):
     """Allow every type with any parameter."""
     surface.feasible_sets.low[:], surface.feasible_sets.high[:] = -np.inf, np.inf
     surface.feasible_sets.excluded[:] = 0
@@ -244,7 +247,7 @@ def set_feasible_set(surface, type_index, interval):
 
 
 @kernel
-def intersect_feasible_set(surface, type_index, other_interval):
+def intersect_set_or_exclude_type(surface, type_index, other_interval):
     """Keep of the set of a type what is also in other_interval; exclude the type when nothing is left. The
     set then holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type
     that it excludes keeps its set."""
@@ -259,7 +262,7 @@ def intersect_feasible_set(surface, type_index, other_interval):
 
 
 @kernel
-def exclude_type(surface, type_index):
+def mark_type_excluded(surface, type_index):
     """Exclude a type."""
     surface.feasible_sets.excluded[type_index] = 1
 
@@ -325,27 +328,41 @@ def copy_observation(target_observation, source_observation):
 
 
 @kernel
-def infer_position(config, surface, fie, axis, innovation, innovation_bound, hypothesis_effect):
-    """Find where a surface can have been: what agrees with the innovation (3,) within innovation_bound (3,).
+def infer_position(
+    config,
+    surface,
+    fie,
+    most_affected_axis,
+    innovation_by_axis,
+    innovation_bound_by_axis,
+    fault_effect_record,
+):
+    """Find where a surface can have been: what agrees with innovation_by_axis (3,) within
+    innovation_bound_by_axis (3,), rad/s2.
 
-    fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
-    of the same frame or block, dtype FAULT_EFFECT_RECORD.
+    fie: its estimator of a position; most_affected_axis: on which it has most effect;
+    fault_effect_record: what that supposes of the same frame or block, dtype FAULT_EFFECT_RECORD.
     """
     last_observation, command_record = surface.last_observation, surface.commands
     last_observation.healthy_position = (
-        -hypothesis_effect.acceleration_at_zero_theta[axis] / hypothesis_effect.regressor[axis]
+        -fault_effect_record.acceleration_at_zero_theta[most_affected_axis]
+        / fault_effect_record.regressor[most_affected_axis]
     )
     last_observation.weighted_mean_error_per_position_range = (
         0.25
         * (command_record.max_acceleration_per_rad - command_record.min_acceleration_per_rad)
-        / abs(hypothesis_effect.regressor[axis])
+        / abs(fault_effect_record.regressor[most_affected_axis])
     )
     last_observation.position_low, last_observation.position_high = fie.theta_min, fie.theta_max
     for i in range(3):
-        if config.frames_per_block > 1 and i != axis and hypothesis_effect.regressor[i] != 0.0:
+        if (
+            config.frames_per_block > 1
+            and i != most_affected_axis
+            and fault_effect_record.regressor[i] != 0.0
+        ):
             continue  # over a block the axes weigh what varies differently
         axis_position_low, axis_position_high = isolation.consistent_theta_interval_on_axis(
-            innovation, innovation_bound, fie, hypothesis_effect, i
+            innovation_by_axis, innovation_bound_by_axis, fie, fault_effect_record, i
         )
         last_observation.position_low, last_observation.position_high = (
             max(last_observation.position_low, axis_position_low),
@@ -354,8 +371,8 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     mark_stops_that_can_hide_deflection(
         surface,
         2.0
-        * (innovation_bound[axis] + hypothesis_effect.error_bound[axis])
-        / abs(hypothesis_effect.regressor[axis]),
+        * (innovation_bound_by_axis[most_affected_axis] + fault_effect_record.error_bound[most_affected_axis])
+        / abs(fault_effect_record.regressor[most_affected_axis]),
     )
 
 
@@ -372,16 +389,16 @@ def mark_stops_that_can_hide_deflection(surface, position_interval_width):
 
 
 @kernel
-def set_position_from_deflection_error(surface, deflection_error, deflection_error_tolerance):
+def set_position_and_check_reach(surface, deflection_error, deflection_error_tolerance):
     """A surface was off its command by deflection_error +- deflection_error_tolerance (rad). False:
     nowhere within its reach."""
-    last_observation, actuator = surface.last_observation, surface.actuator
+    last_observation, actuator_limits = surface.last_observation, surface.actuator
     last_observation.position_low = max(
-        actuator.reachable_low,
+        actuator_limits.reachable_low,
         last_observation.healthy_position + deflection_error - deflection_error_tolerance,
     )
     last_observation.position_high = min(
-        actuator.reachable_high,
+        actuator_limits.reachable_high,
         last_observation.healthy_position + deflection_error + deflection_error_tolerance,
     )
     last_observation.is_anomalous = abs(deflection_error) > deflection_error_tolerance
@@ -390,7 +407,7 @@ def set_position_from_deflection_error(surface, deflection_error, deflection_err
 
 
 @kernel
-def set_position_of_known_fault(surface, position_low, position_high):
+def set_known_position_and_clear_anomaly(surface, position_low, position_high):
     """Set the interval (position_low, position_high) rad in which a surface with a known fault was;
     the frame is no longer anomalous for it."""
     (
@@ -401,9 +418,9 @@ def set_position_of_known_fault(surface, position_low, position_high):
 
 
 @kernel
-def set_is_anomalous(surface, is_anomalous):
+def set_is_anomalous(surface, innovation_exceeds_uncertainty):
     """Set whether the elapsed frame is anomalous: more than the declared uncertainty was at work."""
-    surface.last_observation.is_anomalous = is_anomalous
+    surface.last_observation.is_anomalous = innovation_exceeds_uncertainty
 
 
 @kernel
@@ -415,7 +432,7 @@ def mark_observations_not_anomalous(surface):
 
 
 @kernel
-def observed_deflection_error(surface):
+def last_midpoint_deflection_error(surface):
     """Return the deflection error of the surface in the elapsed frame, rad: the middle of where it can have
     been."""
     return (
@@ -424,8 +441,8 @@ def observed_deflection_error(surface):
     )
 
 
-def read_observed_deflection_error(surface: np.void) -> float:
-    """`observed_deflection_error` of a record outside compiled code, rad."""
+def read_last_midpoint_deflection_error(surface: np.void) -> float:
+    """`last_midpoint_deflection_error` of a record outside compiled code, rad."""
     last_observation = surface["last_observation"]
     return float(
         0.5 * (last_observation["position_low"] + last_observation["position_high"])

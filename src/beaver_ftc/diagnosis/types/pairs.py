@@ -11,7 +11,7 @@ fault. Once that was named, with its constant, a second fault that refutes it is
 whose deflection follows from what is known of the first, taken to last. Anything else stays open.
 
 A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
-conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 """
 
 import numpy as np
@@ -23,13 +23,13 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
+    last_midpoint_deflection_error,
     mark_observations_not_anomalous,
-    observed_deflection_error,
     registry,
     restore_first_pitch_fault_sets,
     set_is_anomalous,
-    set_position_from_deflection_error,
-    set_position_of_known_fault,
+    set_known_position_and_clear_anomaly,
+    set_position_and_check_reach,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import (
@@ -40,8 +40,8 @@ from beaver_ftc.diagnosis.types.registry import (
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
     any_constant_parameter_type_remains,
-    can_be_at_fault,
-    type_remains,
+    estimator_or_deduction_allows_fault,
+    type_is_not_excluded,
 )
 
 
@@ -59,22 +59,26 @@ def latch_group_alarms(pair_record, filter_bank):
 
 
 @kernel
-def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovation_bound):
+def locate_and_test_lateral_surfaces(types, layout, estimators, innovation_by_axis, innovation_bound_by_axis):
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
-    innovation (3,), |eta| <= innovation_bound (3,) rad/s2."""
+    innovation_by_axis (3,), |eta| <= innovation_bound_by_axis (3,) rad/s2."""
     aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
-    aileron_effect = estimators[layout.position_estimator[aileron_index]].frame_mean_effect
-    rudder_effect = estimators[layout.position_estimator[rudder_index]].frame_mean_effect
-    aileron_roll_acceleration_per_rad = aileron_effect.regressor[ROLL]
-    aileron_yaw_acceleration_per_rad = aileron_effect.regressor[YAW]
-    rudder_roll_acceleration_per_rad = rudder_effect.regressor[ROLL]
-    rudder_yaw_acceleration_per_rad = rudder_effect.regressor[YAW]
-    roll_innovation, yaw_innovation = innovation[ROLL], innovation[YAW]
+    aileron_effect_record = estimators[layout.position_estimator[aileron_index]].frame_mean_effect
+    rudder_effect_record = estimators[layout.position_estimator[rudder_index]].frame_mean_effect
+    aileron_roll_acceleration_per_rad = aileron_effect_record.regressor[ROLL]
+    aileron_yaw_acceleration_per_rad = aileron_effect_record.regressor[YAW]
+    rudder_roll_acceleration_per_rad = rudder_effect_record.regressor[ROLL]
+    rudder_yaw_acceleration_per_rad = rudder_effect_record.regressor[YAW]
+    roll_innovation, yaw_innovation = innovation_by_axis[ROLL], innovation_by_axis[YAW]
     roll_innovation_tolerance = (
-        innovation_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
+        innovation_bound_by_axis[ROLL]
+        + aileron_effect_record.error_bound[ROLL]
+        + rudder_effect_record.error_bound[ROLL]
     )
     yaw_innovation_tolerance = (
-        innovation_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
+        innovation_bound_by_axis[YAW]
+        + aileron_effect_record.error_bound[YAW]
+        + rudder_effect_record.error_bound[YAW]
     )
     determinant = (
         aileron_roll_acceleration_per_rad * rudder_yaw_acceleration_per_rad
@@ -88,7 +92,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
         + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
     ) / abs_determinant
-    aileron_is_within_reach = set_position_from_deflection_error(
+    aileron_is_within_reach = set_position_and_check_reach(
         types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
     rudder_deflection_error = (
@@ -100,7 +104,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
     ) / abs_determinant
     if not (
-        set_position_from_deflection_error(
+        set_position_and_check_reach(
             types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
         )
         and aileron_is_within_reach
@@ -114,7 +118,7 @@ def constant_parameter_types_deflection_range(config, surface, k):
     of a constant that are left."""
     min_deflection, max_deflection = np.inf, -np.inf
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-        if type_remains(surface, type_index):
+        if type_is_not_excluded(surface, type_index):
             type_min_deflection, type_max_deflection = possible_deflection_range(
                 config, surface, type_index, k
             )
@@ -128,7 +132,7 @@ def constant_parameter_types_deflection_range(config, surface, k):
 
 
 @kernel
-def update_pitch_observations(types, layout, estimators, innovation, innovation_bound):
+def update_pitch_anomaly_or_location(types, layout, estimators, innovation_by_axis, innovation_bound_by_axis):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
     first_fault_surface_index = types.pair.first_pitch_fault_surface
@@ -136,74 +140,93 @@ def update_pitch_observations(types, layout, estimators, innovation, innovation_
         first_fault_surface_index != NO_SURFACE
         and not types.surface[first_fault_surface_index].status.may_be_sole_fault
     ):
-        locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound)
+        locate_or_clear_second_pitch_surface(
+            types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
+        )
         return
     for s, surface in enumerate(types.surface):
         if layout.group[s] == PITCH_SURFACE_GROUP:
-            set_is_anomalous(surface, abs(innovation[PITCH]) > innovation_bound[PITCH])
+            set_is_anomalous(surface, abs(innovation_by_axis[PITCH]) > innovation_bound_by_axis[PITCH])
 
 
 @kernel
-def locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound):
+def locate_or_clear_second_pitch_surface(
+    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
+):
     """Find the position of the second surface, given the sets of the first."""
     first_fault_surface_index = types.pair.first_pitch_fault_surface
     second_surface_index = layout.partner[first_fault_surface_index]
-    first_effect = estimators[layout.position_estimator[first_fault_surface_index]].frame_mean_effect
-    second_effect = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
+    first_effect_record = estimators[layout.position_estimator[first_fault_surface_index]].frame_mean_effect
+    second_effect_record = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
     first_surface = types.surface[first_fault_surface_index]
     first_surface_min_deflection, first_surface_max_deflection = constant_parameter_types_deflection_range(
         types.config, first_surface, types.frame_index
     )
-    set_position_of_known_fault(first_surface, first_surface_min_deflection, first_surface_max_deflection)
-    second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
-    first_fault_acceleration = first_regressor * observed_deflection_error(first_surface)
+    set_known_position_and_clear_anomaly(
+        first_surface, first_surface_min_deflection, first_surface_max_deflection
+    )
+    second_pitch_acceleration_per_rad, first_pitch_acceleration_per_rad = (
+        second_effect_record.regressor[PITCH],
+        first_effect_record.regressor[PITCH],
+    )
+    first_fault_acceleration = first_pitch_acceleration_per_rad * last_midpoint_deflection_error(
+        first_surface
+    )
     acceleration_tolerance = (
-        abs(first_regressor) * 0.5 * (first_surface_max_deflection - first_surface_min_deflection)
+        abs(first_pitch_acceleration_per_rad)
+        * 0.5
+        * (first_surface_max_deflection - first_surface_min_deflection)
     )
     acceleration_tolerance += (
-        innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
+        innovation_bound_by_axis[PITCH]
+        + first_effect_record.error_bound[PITCH]
+        + second_effect_record.error_bound[PITCH]
     )
-    if not set_position_from_deflection_error(
+    if not set_position_and_check_reach(
         types.surface[second_surface_index],
-        (innovation[PITCH] - first_fault_acceleration) / second_regressor,
-        acceleration_tolerance / abs(second_regressor),
+        (innovation_by_axis[PITCH] - first_fault_acceleration) / second_pitch_acceleration_per_rad,
+        acceleration_tolerance / abs(second_pitch_acceleration_per_rad),
     ):
         types.surface[second_surface_index].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
-def observe_and_judge_frame_for_pairs(types, layout, estimators, filter_bank, innovation_bound):
-    """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
-    it."""
+def observe_pairs_and_judge_previous(types, layout, estimators, filter_bank, innovation_bound_by_axis):
+    """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound_by_axis (3,):
+    bound on the innovation."""
     latch_group_alarms(types.pair, filter_bank)
-    registry.infer_surface_positions(
-        types, layout, estimators, filter_bank.output.innovation, innovation_bound
+    registry.shift_observations_and_infer_positions(
+        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
     )
-    locate_roll_and_yaw_surfaces(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
-    update_pitch_observations(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
-    registry.judge_previous_frame(types)
+    locate_and_test_lateral_surfaces(
+        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
+    )
+    update_pitch_anomaly_or_location(
+        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
+    )
+    registry.judge_previous_and_advance_frame(types)
 
 
 @kernel
-def set_isolation_status(surface, is_isolated, type_index, t):
+def update_isolation_type_and_times(surface, is_isolated, type_index, t):
     """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
     type_index = type_index if is_isolated else -1
-    status = surface.status
-    if is_isolated and not status.is_isolated:
-        status.isolated_at_s = t
-    if type_index != status.fault_type:
-        status.type_decided_at_s = t
-    status.is_isolated, status.fault_type = is_isolated, type_index
+    finding_record = surface.status
+    if is_isolated and not finding_record.is_isolated:
+        finding_record.isolated_at_s = t
+    if type_index != finding_record.fault_type:
+        finding_record.type_decided_at_s = t
+    finding_record.is_isolated, finding_record.fault_type = is_isolated, type_index
 
 
 @kernel
-def decide_roll_and_yaw_isolation(types, layout, t):
+def isolate_lateral_or_find_unanticipated(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw. Returns whether the fault of this plane is outside
     the class."""
     config, pair_record = types.config, types.pair
     roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_alone_can_be_at_fault = can_be_at_fault(roll_surface)
-    yaw_alone_can_be_at_fault = can_be_at_fault(yaw_surface)
+    roll_alone_can_be_at_fault = estimator_or_deduction_allows_fault(roll_surface)
+    yaw_alone_can_be_at_fault = estimator_or_deduction_allows_fault(yaw_surface)
     both_must_be_at_fault = not roll_alone_can_be_at_fault and not yaw_alone_can_be_at_fault
     class_is_refuted = (
         pair_record.lateral_fault_outside_class == 1
@@ -217,13 +240,13 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     can_isolate = pair_record.group_has_alarm[LATERAL_SURFACE_GROUP] == 1 and not (
         fault_is_outside_class or types_do_not_explain_flight_yet
     )
-    set_isolation_status(
+    update_isolation_type_and_times(
         roll_surface,
         can_isolate and not yaw_alone_can_be_at_fault,
         verdict.fault_type_on_surface(config, roll_surface),
         t,
     )
-    set_isolation_status(
+    update_isolation_type_and_times(
         yaw_surface,
         can_isolate and not roll_alone_can_be_at_fault,
         verdict.fault_type_on_surface(config, yaw_surface),
@@ -233,7 +256,7 @@ def decide_roll_and_yaw_isolation(types, layout, t):
 
 
 @kernel
-def store_first_pitch_fault_sets(types, s):
+def store_first_fault_sets_when_due(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
@@ -273,13 +296,13 @@ def begin_second_pitch_fault(types, layout):
 
 
 @kernel
-def alternative_types_would_have_shown(config, surface):
+def other_types_no_longer_possible(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    may_be_command_independent_type = verdict.can_be_another_type(
-        surface, verdict.sole_remaining_constant_parameter_type(surface), False
+    command_independent_type_may_imitate = verdict.can_be_another_type(
+        surface, verdict.sole_constant_type_or_undecided(surface), False
     )
-    another_type_is_possible = may_be_command_independent_type or verdict.remaining_type_can_hide_at_rest(
-        config, surface
+    another_type_is_possible = (
+        command_independent_type_may_imitate or verdict.remaining_type_can_hide_at_rest(config, surface)
     )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
@@ -290,7 +313,7 @@ def alternative_types_would_have_shown(config, surface):
 
 
 @kernel
-def detect_second_pitch_fault(types, layout):
+def begin_second_pitch_fault_if_shown(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
     if (
         types.pair.first_pitch_fault_surface == NO_SURFACE
@@ -299,14 +322,15 @@ def detect_second_pitch_fault(types, layout):
         return False
     first_surface = types.surface[types.pair.first_pitch_fault_surface]
     if first_surface.status.may_be_sole_fault and not (
-        can_be_at_fault(first_surface) and any_constant_parameter_type_remains(first_surface)
+        estimator_or_deduction_allows_fault(first_surface)
+        and any_constant_parameter_type_remains(first_surface)
     ):
         begin_second_pitch_fault(types, layout)
     return not first_surface.status.may_be_sole_fault
 
 
 @kernel
-def pitch_fault_type(config, surface):
+def pitch_type_unless_given_up(config, surface):
     """The type of the one fault of pitch, or -1 while it is open.
 
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
@@ -322,27 +346,29 @@ def pitch_fault_type(config, surface):
 @kernel
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if detect_second_pitch_fault(types, layout):
+    if begin_second_pitch_fault_if_shown(types, layout):
         first_surface = types.surface[types.pair.first_pitch_fault_surface]
         second_surface_index = layout.partner[types.pair.first_pitch_fault_surface]
         second_surface = types.surface[second_surface_index]
-        set_isolation_status(first_surface, 1, first_surface.status.fault_type, t)
+        update_isolation_type_and_times(first_surface, 1, first_surface.status.fault_type, t)
         second_shows_fault = (
             second_surface.evidence.n_anomalous_frames > 0
-            and can_be_at_fault(second_surface)
+            and estimator_or_deduction_allows_fault(second_surface)
             and verdict.any_type_explains_flight(second_surface)
         )
-        set_isolation_status(
+        update_isolation_type_and_times(
             second_surface, second_shows_fault, verdict.fault_type_on_surface(types.config, second_surface), t
         )
         return
     sole_surface_index = find_and_store_sole_pitch_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
         if layout.group[surface_index] == PITCH_SURFACE_GROUP:
-            set_isolation_status(
+            update_isolation_type_and_times(
                 surface,
                 surface_index == sole_surface_index,
-                pitch_fault_type(types.config, surface) if surface_index == sole_surface_index else -1,
+                pitch_type_unless_given_up(types.config, surface)
+                if surface_index == sole_surface_index
+                else -1,
                 t,
             )
 
@@ -357,54 +383,67 @@ def find_and_store_sole_pitch_fault(types, layout):
     )
     if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
         return NO_SURFACE
-    if alternative_types_would_have_shown(types.config, types.surface[s]):
-        store_first_pitch_fault_sets(types, s)
+    if other_types_no_longer_possible(types.config, types.surface[s]):
+        store_first_fault_sets_when_due(types, s)
     return s
 
 
 @kernel
-def decide_pair_isolation_and_accommodation(types, conclusion, layout, t):
+def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
     `conclusion.record_fault_type_finding`: its isolated estimator is of the one named first, the law acts on
-    all. conclusion: that of the frame before."""
-    lateral_fault_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
+    all. previous_conclusion: that of the frame before."""
+    lateral_fault_outside_class = isolate_lateral_or_find_unanticipated(types, layout, t)
     decide_pitch_isolation(types, layout, t)
     first_isolated_surface_index = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        status, first_status = surface.status, types.surface[max(first_isolated_surface_index, 0)].status
-        if status.is_isolated and (
-            first_isolated_surface_index < 0 or status.isolated_at_s < first_status.isolated_at_s
+        finding_record, first_finding_record = (
+            surface.status,
+            types.surface[max(first_isolated_surface_index, 0)].status,
+        )
+        if finding_record.is_isolated and (
+            first_isolated_surface_index < 0
+            or finding_record.isolated_at_s < first_finding_record.isolated_at_s
         ):
             first_isolated_surface_index = s
-    isolated_estimator, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
-        types, conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
+    isolated_estimator_index, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding_values(
+        types, previous_conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
     )
-    accommodated_surface, accommodation_mode = choose_pair_accommodation(types, layout)
+    accommodated_surface_index, accommodation_mode = set_pair_accommodation_choose_lead(types, layout)
     return (
-        isolated_estimator,
+        isolated_estimator_index,
         isolated_at_s,
         fault_type,
         type_decided_at_s,
-        accommodated_surface,
+        accommodated_surface_index,
         accommodation_mode,
     )
 
 
 @kernel
-def first_fault_finding(types, conclusion, layout, s, lateral_fault_outside_class, t):
+def first_fault_finding_values(types, previous_conclusion, layout, s, lateral_fault_outside_class, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
     if s >= 0:
-        status = types.surface[s].status
-        isolated_estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
-        return isolated_estimator, status.isolated_at_s, status.fault_type, status.type_decided_at_s
-    isolated_estimator = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
-    isolated_at_s = t if isolated_estimator != conclusion.isolated_estimator else conclusion.isolated_at_s
-    return isolated_estimator, isolated_at_s, -1, conclusion.type_decided_at_s
+        finding_record = types.surface[s].status
+        isolated_estimator_index = verdict.estimator_of_fault(layout, s, finding_record.fault_type)
+        return (
+            isolated_estimator_index,
+            finding_record.isolated_at_s,
+            finding_record.fault_type,
+            finding_record.type_decided_at_s,
+        )
+    isolated_estimator_index = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
+    isolated_at_s = (
+        t
+        if isolated_estimator_index != previous_conclusion.isolated_estimator
+        else previous_conclusion.isolated_at_s
+    )
+    return isolated_estimator_index, isolated_at_s, -1, previous_conclusion.type_decided_at_s
 
 
 @kernel
-def is_pitch_surface_isolated(types, layout):
+def any_pitch_surface_is_isolated(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
         if layout.group[s] == PITCH_SURFACE_GROUP and surface.status.is_isolated:
@@ -419,7 +458,7 @@ def should_be_accommodated(types, layout, s):
         return True
     if (
         layout.group[s] != PITCH_SURFACE_GROUP
-        or is_pitch_surface_isolated(types, layout)
+        or any_pitch_surface_is_isolated(types, layout)
         or not types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
     ):
         return False
@@ -428,14 +467,14 @@ def should_be_accommodated(types, layout, s):
 
 
 @kernel
-def choose_pair_accommodation(types, layout):
+def set_pair_accommodation_choose_lead(types, layout):
     """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
     is done about it: a replaced elevator leads before all others."""
-    accommodated_surface, accommodation_mode = NO_SURFACE, -1
+    accommodated_surface_index, accommodation_mode = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         verdict.set_accommodation_mode(surface, -1)
         if should_be_accommodated(types, layout, s):
-            may_be_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
+            may_be_at_fault = surface.status.is_isolated == 1 or estimator_or_deduction_allows_fault(surface)
             surface_mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
             if verdict.update_fault_presence(types.config, surface, surface_mode, may_be_at_fault):
                 verdict.set_accommodation_mode(surface, surface_mode)
@@ -443,6 +482,6 @@ def choose_pair_accommodation(types, layout):
                     SCALE_COMMAND,
                     GIVE_UP,
                 )
-                if accommodated_surface == NO_SURFACE or elevator_is_scaled_or_given_up:
-                    accommodated_surface, accommodation_mode = s, surface_mode
-    return accommodated_surface, accommodation_mode
+                if accommodated_surface_index == NO_SURFACE or elevator_is_scaled_or_given_up:
+                    accommodated_surface_index, accommodation_mode = s, surface_mode
+    return accommodated_surface_index, accommodation_mode

@@ -39,10 +39,10 @@ from beaver_ftc.diagnosis.types import (
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
-    exclude_type,
     infer_position,
-    intersect_feasible_set,
-    reset_feasible_sets,
+    intersect_set_or_exclude_type,
+    mark_type_excluded,
+    reset_feasible_sets_to_unlimited,
     set_feasible_set,
     set_is_anomalous,
     set_last_position_to_reachable_range,
@@ -73,7 +73,7 @@ TYPES = _load_ordered_types()
 N_TYPES = len(TYPES)
 N_CONSTANT_PARAMETER_TYPES = sum(row.has_constant_parameter for row in TYPES)
 TYPE_NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
-TYPE_DESCRIPTIONS: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
+DESCRIPTIONS_IN_TYPE_ORDER: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
 FIRST_TYPE_WITH_SAME_NAME = tuple(
     TYPE_NAMES.index(name) for name in TYPE_NAMES
 )  # the first type of the same name
@@ -99,7 +99,7 @@ ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, MEANING_OF_REST_BY_TYPE = (
     _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
 SHOWS_WITHIN_HALF_CYCLES = _column_of_types("shows_within_half_cycles")
-HALF_CYCLES_BEFORE_ISOLATING_OTHERS = _column_of_types("half_cycles_before_isolating_others")
+HALF_CYCLES_BEFORE_ISOLATING_OTHER_SURFACE = _column_of_types("half_cycles_before_isolating_other_surface")
 ERROR_DEPENDS_ON_COMMAND = _column_of_types("error_depends_on_command")
 MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
 CAN_LOOK_LIKE = np.array(
@@ -129,8 +129,10 @@ TYPE_INDEX_AT_END_OF_RANGE = np.array(
 
 def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direction: int = 0) -> int:
     """The number of a type, by its name in the table; stop_direction: of the stop to which it runs."""
-    sought_key = (name, has_constant_parameter, stop_direction)
-    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought_key)
+    sought_type_attributes = (name, has_constant_parameter, stop_direction)
+    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(
+        sought_type_attributes
+    )
 
 
 def _compile_kernel(
@@ -209,7 +211,7 @@ set_parameter_range_each = _kernel_calling_each_type("parameter_range", "surface
 before_judging_frame_each = _kernel_calling_each_type("before_judging_frame", "config, surface, type_index")
 on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_KERNEL_ARGUMENTS)
 intersect_consistent_interval_each = _kernel_calling_each_type(
-    "consistent_interval", _FRAME_KERNEL_ARGUMENTS, intersect_feasible_set
+    "consistent_interval", _FRAME_KERNEL_ARGUMENTS, intersect_set_or_exclude_type
 )
 on_possible_release_each = _kernel_calling_each_type("on_possible_release", _FRAME_KERNEL_ARGUMENTS)
 set_feasible_set_after_frame_each = _kernel_calling_each_type(
@@ -250,7 +252,7 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 # Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
 # rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
 # was in it, rad.
-ANOMALY_COUNTS_RECORD = record(
+ANOMALOUS_FRAME_EVIDENCE_RECORD = record(
     n_anomalous_frames=int,
     n_rest_frames=int,
     n_anomalous_frames_since_stop_could_hide=int,
@@ -260,7 +262,7 @@ ANOMALY_COUNTS_RECORD = record(
 )
 
 # Whether the surface may be the only one at fault; what decides whether it can be at fault:
-# DECIDED_BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
+# ESTIMATOR_DECIDES_POSSIBLE_FAULT, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
 SURFACE_FINDING_RECORD = record(
     may_be_sole_fault=int,
@@ -275,7 +277,7 @@ SURFACE_FINDING_RECORD = record(
 ACCOMMODATION_RECORD = record(mode=int, n_frames_without_sign_of_fault=int)
 
 # Where a surface can be that a type has held and released, rad: table/held_surface.py.
-RELEASE_RECORD = record(
+POSSIBLE_RELEASES_BY_TYPE_RECORD = record(
     return_position_low=(2, N_TYPES), return_position_high=(2, N_TYPES), has_released=(int, N_TYPES),
     held_position_min=N_TYPES, held_position_max=N_TYPES,  # where it is held by then
 )  # fmt: skip
@@ -319,7 +321,8 @@ def surface_types_dtype() -> np.dtype:
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
-        evidence=ANOMALY_COUNTS_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD,
+        evidence=ANOMALOUS_FRAME_EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD,
+        release=POSSIBLE_RELEASES_BY_TYPE_RECORD,
         **memory_dtypes,
         position_estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
         first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
@@ -365,16 +368,21 @@ def configure_fault_types(
         zip(surface_names, types["surface"], *travel, strict=True)
     ):
         rate_limit_deg_s = getattr(scenario.actuators, surface_name).rate_limit_deg_s
-        actuator = surface_record["actuator"]
-        actuator["travel_low"], actuator["travel_high"] = travel_low, travel_high
-        actuator["reachable_low"], actuator["reachable_high"] = min(travel_low, 0.0), max(travel_high, 0.0)
-        actuator["approach_share_per_substep"], actuator["max_motion_per_substep"] = (
+        actuator_record = surface_record["actuator"]
+        actuator_record["travel_low"], actuator_record["travel_high"] = travel_low, travel_high
+        actuator_record["reachable_low"], actuator_record["reachable_high"] = (
+            min(travel_low, 0.0),
+            max(travel_high, 0.0),
+        )
+        actuator_record["approach_share_per_substep"], actuator_record["max_motion_per_substep"] = (
             prediction_actuators["approach"][s],
             prediction_actuators["step"][s],
         )
-        actuator["min_runaway_rate"] = 0.5 * (radians(rate_limit_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S)
-        actuator["min_rate_limited_motion_per_substep"] = min(
-            radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
+        actuator_record["min_runaway_rate"] = 0.5 * (
+            radians(rate_limit_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S
+        )
+        actuator_record["min_rate_limited_motion_per_substep"] = min(
+            radians(config.slowest_rate_deg_s) * substep_s, actuator_record["max_motion_per_substep"]
         )
         surface_record["status"]["may_be_sole_fault"] = (
             not config.pairs or layout["group"][s] == PITCH_SURFACE_GROUP
@@ -392,7 +400,7 @@ def restart_fault_types(types):
 @kernel
 def restart_fault_types_of_surface(surface):
     """Nothing is known of this surface yet."""
-    reset_feasible_sets(surface)
+    reset_feasible_sets_to_unlimited(surface)
     set_parameter_range_each(surface)
     set_last_position_to_reachable_range(surface)
     surface.evidence.first_anomalous_frame = -1
@@ -403,9 +411,10 @@ def restart_fault_types_of_surface(surface):
 
 
 @kernel
-def record_commands(types, commanded_rad, frame_means):
+def record_commands(types, commanded_rad, frame_means_and_extremes):
     """Add a frame to the commands of the surfaces: commanded_rad (n,); positions of healthy surfaces and
-    their least and greatest effectiveness within it: frame_means of a `model_prediction.frame_means_dtype`.
+    their least and greatest effectiveness within it: frame_means_and_extremes, of a
+    `model_prediction.frame_means_dtype`.
     """
     frames_per_block = types.config.frames_per_block
     for s, surface in enumerate(types.surface):
@@ -435,38 +444,46 @@ def record_commands(types, commanded_rad, frame_means):
             max(command_record.max_command[0], limited_command),
         )
         command_record.min_healthy_position[0] = min(
-            command_record.min_healthy_position[0], frame_means.u_min[s]
+            command_record.min_healthy_position[0], frame_means_and_extremes.u_min[s]
         )
         command_record.max_healthy_position[0] = max(
-            command_record.max_healthy_position[0], frame_means.u_max[s]
+            command_record.max_healthy_position[0], frame_means_and_extremes.u_max[s]
         )
         command_record.min_acceleration_per_rad = min(
-            command_record.min_acceleration_per_rad, frame_means.G_min[s]
+            command_record.min_acceleration_per_rad, frame_means_and_extremes.G_min[s]
         )
         command_record.max_acceleration_per_rad = max(
-            command_record.max_acceleration_per_rad, frame_means.G_max[s]
+            command_record.max_acceleration_per_rad, frame_means_and_extremes.G_max[s]
         )
 
 
 @kernel
-def infer_surface_positions(types, layout, estimators, innovation, innovation_bound):
+def shift_observations_and_infer_positions(
+    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
+):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
-    innovation_bound (3,): on its innovation (3,) without a fault, rad/s2.
+    innovation_bound_by_axis (3,): on innovation_by_axis (3,) without a fault, rad/s2.
     """
-    is_anomalous = not isolation.uncertainty_explains_innovation(innovation, innovation_bound)
+    innovation_exceeds_uncertainty = not isolation.uncertainty_explains_innovation(
+        innovation_by_axis, innovation_bound_by_axis
+    )
     for s, surface in enumerate(types.surface):
         shift_observations(surface)
-        set_is_anomalous(surface, is_anomalous)
+        set_is_anomalous(surface, innovation_exceeds_uncertainty)
         fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        mean_effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
-        infer_position(types.config, surface, fie, axis, innovation, innovation_bound, mean_effect)
+        mean_effect_record = (
+            fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
+        )
+        infer_position(
+            types.config, surface, fie, axis, innovation_by_axis, innovation_bound_by_axis, mean_effect_record
+        )
 
 
 @kernel
-def count_anomalous_frame(surface):
+def increment_anomalous_frame_counts(surface):
     """Count a frame as evidence, and as evidence since a stop could last hide a swing
-    (`judge_previous_frame`)."""
+    (`judge_previous_and_advance_frame`)."""
     surface.evidence.n_anomalous_frames += 1
     surface.evidence.n_anomalous_frames_since_stop_could_hide += 1
 
@@ -474,14 +491,14 @@ def count_anomalous_frame(surface):
 @kernel
 def narrow_feasible_sets(config, surface, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    anomaly_counts, judged_observation = surface.evidence, surface.judged_observation
+    anomaly_evidence, judged_observation = surface.evidence, surface.judged_observation
     if judged_observation.position_low > judged_observation.position_high:
         return
-    if anomaly_counts.first_anomalous_frame < 0:
+    if anomaly_evidence.first_anomalous_frame < 0:
         (
-            anomaly_counts.first_anomalous_frame,
-            anomaly_counts.first_anomalous_position_low,
-            anomaly_counts.first_anomalous_position_high,
+            anomaly_evidence.first_anomalous_frame,
+            anomaly_evidence.first_anomalous_position_low,
+            anomaly_evidence.first_anomalous_position_high,
         ) = (
             k,
             judged_observation.position_low,
@@ -491,7 +508,7 @@ def narrow_feasible_sets(config, surface, k):
 
 
 @kernel
-def judge_previous_frame(types):
+def judge_previous_and_advance_frame(types):
     """Judge the frame before the elapsed one."""
     config, k = types.config, types.frame_index - 1
     for s, surface in enumerate(types.surface):
@@ -503,12 +520,12 @@ def judge_previous_frame(types):
             and surface.accommodation.mode == GIVE_UP
             and not surface.judged_observation.is_anomalous
         ):
-            count_rest_as_evidence(types, s)
+            count_rest_and_exclude_types(types, s)
         elif surface.judged_observation.is_anomalous and (
             config.frame_shows_single_instant
             or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
         ):
-            count_anomalous_frame(surface)
+            increment_anomalous_frame_counts(surface)
             narrow_feasible_sets(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
@@ -524,13 +541,15 @@ def judge_previous_frame(types):
 
 
 @kernel
-def observe_and_judge_frame(types, layout, estimators, innovation, bound_record):
+def observe_frame_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record):
     """Observe the elapsed frame, or the block that it completes, and judge the one before."""
     if types.config.frames_per_block > 1:
-        observe_and_judge_block(types, layout, estimators, innovation, bound_record)
+        advance_block_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record)
         return
-    infer_surface_positions(types, layout, estimators, innovation, bound_record.frame_innovation_bound)
-    judge_previous_frame(types)
+    shift_observations_and_infer_positions(
+        types, layout, estimators, innovation_by_axis, bound_record.frame_innovation_bound
+    )
+    judge_previous_and_advance_frame(types)
 
 
 @kernel
@@ -544,11 +563,11 @@ def begin_frame_block(types, layout, estimators, changing_gyro_error_bound_befor
 
 
 @kernel
-def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
+def add_frame_to_block(types, layout, estimators, innovation_by_axis, eta_bar):
     """Add the elapsed frame to the means over the block."""
     block, frame_share_of_block = types.block, 1.0 / types.config.frames_per_block
     for i in range(3):
-        block.mean_innovation[i] += frame_share_of_block * innovation[i]
+        block.mean_innovation[i] += frame_share_of_block * innovation_by_axis[i]
         block.mean_innovation_bound[i] += frame_share_of_block * eta_bar[i]
     for estimator_index in layout.position_estimator:
         isolation.add_to_mean_effect(
@@ -559,12 +578,12 @@ def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
 
 
 @kernel
-def observe_and_judge_block(types, layout, estimators, innovation, bound_record):
+def advance_block_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record):
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.n_frames_so_far == 0:
         begin_frame_block(types, layout, estimators, bound_record.changing_gyro_error_bound_before)
-    add_frame_to_block(types, layout, estimators, innovation, bound_record.eta_bar)
+    add_frame_to_block(types, layout, estimators, innovation_by_axis, bound_record.eta_bar)
     block.n_frames_so_far += 1
     if block.n_frames_so_far < config.frames_per_block:
         return
@@ -573,25 +592,27 @@ def observe_and_judge_block(types, layout, estimators, innovation, bound_record)
         block.mean_innovation_bound[i] += (
             block.changing_gyro_error_bound_at_start[i] + bound_record.changing_gyro_error_bound[i]
         ) / config.block_duration_s
-    infer_surface_positions(types, layout, estimators, block.mean_innovation, block.mean_innovation_bound)
-    judge_previous_frame(types)
+    shift_observations_and_infer_positions(
+        types, layout, estimators, block.mean_innovation, block.mean_innovation_bound
+    )
+    judge_previous_and_advance_frame(types)
 
 
 @kernel
-def count_rest_as_evidence(types, surface_index):
+def count_rest_and_exclude_types(types, surface_index):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
     fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
     surface = types.surface[surface_index]
-    if not agrees_with_rest_position(surface):
+    if not judged_frame_agrees_with_rest(surface):
         return
     for each_surface_index, each_surface in enumerate(types.surface):
         if each_surface_index == surface_index or (
             surface.status.may_be_sole_fault and each_surface.status.may_be_sole_fault
         ):
-            count_anomalous_frame(each_surface)
+            increment_anomalous_frame_counts(each_surface)
     surface.evidence.n_rest_frames += 1
     if (
         surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
@@ -599,18 +620,21 @@ def count_rest_as_evidence(types, surface_index):
     ):
         for type_index in range(N_TYPES):
             if MEANING_OF_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
-                exclude_type(surface, type_index)
+                mark_type_excluded(surface, type_index)
 
 
 @kernel
-def agrees_with_rest_position(surface):
+def judged_frame_agrees_with_rest(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for type_index in range(N_TYPES):
         set_low, set_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
-        position_is_outside_set = (
+        judged_position_is_outside_set = (
             surface.judged_observation.position_low > set_high
             or surface.judged_observation.position_high < set_low
         )
-        if MEANING_OF_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
+        if (
+            MEANING_OF_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER
+            and judged_position_is_outside_set
+        ):
             return False
     return True

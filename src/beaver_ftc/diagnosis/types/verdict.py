@@ -1,8 +1,8 @@
 """From the types left to a verdict: surface, type, and what the law does; and the findings in words.
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
-of one surface assume that it is at fault; `can_be_at_fault` says whether it can be. types: of
-`fault_types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+of one surface assume that it is at fault; `estimator_or_deduction_allows_fault` says whether it can be.
+types: of `fault_types_dtype`; previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 
 `fault_findings` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and in
 which unit, the type's row says (`FaultType.estimate_parameter`).
@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
     feasible_set_midpoint,
-    observed_deflection_error,
+    last_midpoint_deflection_error,
     registry,
 )
 from beaver_ftc.diagnosis.types.registry import (
@@ -31,7 +31,7 @@ from beaver_ftc.diagnosis.types.registry import (
     DEFLECTION_ERROR_TYPES_BY_PRECEDENCE,
     ERROR_DEPENDS_ON_COMMAND,
     FIRST_TYPE_WITH_SAME_NAME,
-    HALF_CYCLES_BEFORE_ISOLATING_OTHERS,
+    HALF_CYCLES_BEFORE_ISOLATING_OTHER_SURFACE,
     MEANING_OF_REST_BY_TYPE,
     MODE_SERVES_TYPE,
     MUST_SHOW_ITSELF,
@@ -48,7 +48,7 @@ from beaver_ftc.diagnosis.types.registry import (
 NO_SURFACE, SEVERAL_SURFACES = -1, -2
 TYPE_UNDECIDED, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
-DECIDED_BY_ESTIMATOR, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
+ESTIMATOR_DECIDES_POSSIBLE_FAULT, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
 FAULT_ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
 _TIME_TOLERANCE_S = 1e-9
 
@@ -61,15 +61,15 @@ def record_position_estimator_exclusions(surfaces, layout, estimators):
 
 
 @kernel
-def can_be_at_fault(surface):
+def estimator_or_deduction_allows_fault(surface):
     """Whether anything on a surface can be the fault."""
-    if surface.status.can_be_at_fault_basis != DECIDED_BY_ESTIMATOR:
+    if surface.status.can_be_at_fault_basis != ESTIMATOR_DECIDES_POSSIBLE_FAULT:
         return surface.status.can_be_at_fault_basis == DEDUCED_FAULTY
     return not surface.position_estimator_excluded
 
 
 @kernel
-def type_remains(surface, type_index):
+def type_is_not_excluded(surface, type_index):
     """Whether a type is not excluded."""
     return not surface.feasible_sets.excluded[type_index]
 
@@ -90,7 +90,7 @@ def any_type_remains(surface):
 def any_type_explains_flight(surface):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for type_index in range(N_TYPES):
-        if type_remains(surface, type_index) and has_shown(surface, type_index):
+        if type_is_not_excluded(surface, type_index) and has_shown(surface, type_index):
             return True
     return False
 
@@ -100,7 +100,7 @@ def types_would_have_shown(config, surface):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for type_index in range(N_TYPES):
         if (
-            type_remains(surface, type_index)
+            type_is_not_excluded(surface, type_index)
             and surface.evidence.n_anomalous_frames_since_stop_could_hide
             < SHOWS_WITHIN_HALF_CYCLES[type_index] * config.slowest_half_cycle_frames
         ):
@@ -109,12 +109,12 @@ def types_would_have_shown(config, surface):
 
 
 @kernel
-def sole_remaining_type(surface, n_considered_types):
+def sole_remaining_type_or_undecided(surface, n_considered_types):
     """The one of the first n_considered_types that is left, or TYPE_UNDECIDED; of several of one name, the
     first."""
     remaining_type = TYPE_UNDECIDED
     for type_index in range(n_considered_types):
-        if type_remains(surface, type_index):
+        if type_is_not_excluded(surface, type_index):
             if (
                 remaining_type >= 0
                 and FIRST_TYPE_WITH_SAME_NAME[type_index] != FIRST_TYPE_WITH_SAME_NAME[remaining_type]
@@ -125,15 +125,15 @@ def sole_remaining_type(surface, n_considered_types):
 
 
 @kernel
-def sole_remaining_constant_parameter_type(surface):
+def sole_constant_type_or_undecided(surface):
     """The one type of constant parameter left, or TYPE_UNDECIDED."""
-    return sole_remaining_type(surface, N_CONSTANT_PARAMETER_TYPES)
+    return sole_remaining_type_or_undecided(surface, N_CONSTANT_PARAMETER_TYPES)
 
 
 @kernel
 def sole_remaining_type_once_it_shows_itself(surface):
     """The one type left, constant or varying, or TYPE_UNDECIDED: in coarse sets a constant proves nothing."""
-    remaining_type = sole_remaining_type(surface, N_TYPES)
+    remaining_type = sole_remaining_type_or_undecided(surface, N_TYPES)
     return remaining_type if remaining_type >= 0 and has_shown(surface, remaining_type) else TYPE_UNDECIDED
 
 
@@ -148,7 +148,9 @@ def remaining_type_can_hide_at_rest(config, surface):
     ):
         return False
     for type_index in range(N_TYPES):
-        if MEANING_OF_REST_BY_TYPE[type_index] == REST_HIDES_TYPE and type_remains(surface, type_index):
+        if MEANING_OF_REST_BY_TYPE[type_index] == REST_HIDES_TYPE and type_is_not_excluded(
+            surface, type_index
+        ):
             return True
     return False
 
@@ -158,12 +160,12 @@ def can_be_confused_with(surface, type_index, apparent_type):
     """Whether a fault of type `type_index` may look like one of `apparent_type`, or of another type left of
     that name and of constant parameter."""
     for other_type in range(N_CONSTANT_PARAMETER_TYPES):
-        type_can_look_like_other = (
+        given_type_can_look_like_other = (
             FIRST_TYPE_WITH_SAME_NAME[other_type] == FIRST_TYPE_WITH_SAME_NAME[apparent_type]
             and CAN_LOOK_LIKE[type_index, other_type]
-            and type_remains(surface, other_type)
+            and type_is_not_excluded(surface, other_type)
         )
-        if type_can_look_like_other and not motion_rules_out(
+        if given_type_can_look_like_other and not motion_rules_out(
             surface, STOP_DIRECTION_BY_TYPE[other_type], type_index
         ):
             return True
@@ -176,7 +178,7 @@ def can_be_another_type(surface, apparent_type, includes_command_dependent_types
     `includes_command_dependent_types`, one that does not follow the command."""
     if apparent_type >= 0:
         for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-            is_alternative = type_remains(surface, type_index) and (
+            is_alternative = type_is_not_excluded(surface, type_index) and (
                 includes_command_dependent_types or not ERROR_DEPENDS_ON_COMMAND[type_index]
             )
             if is_alternative and can_be_confused_with(surface, type_index, apparent_type):
@@ -192,7 +194,7 @@ def sole_possible_surface(surfaces, needs_constant_parameter_type):
     for s, surface in enumerate(surfaces):
         if (
             surface.status.may_be_sole_fault
-            and can_be_at_fault(surface)
+            and estimator_or_deduction_allows_fault(surface)
             and (any_constant_parameter_type_remains(surface) or not needs_constant_parameter_type)
         ):
             sole_surface_index = s if sole_surface_index == NO_SURFACE else SEVERAL_SURFACES
@@ -234,17 +236,21 @@ def other_surfaces_can_be_dismissed(types, candidate_surface_index):
     """
     config, required_half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != candidate_surface_index and surface.status.may_be_sole_fault and can_be_at_fault(surface):
+        if (
+            s != candidate_surface_index
+            and surface.status.may_be_sole_fault
+            and estimator_or_deduction_allows_fault(surface)
+        ):
             if config.has_surface_term_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
                 return False
             for type_index in range(N_TYPES):
-                if type_remains(surface, type_index):
+                if type_is_not_excluded(surface, type_index):
                     if not ERROR_DEPENDS_ON_COMMAND[type_index]:
                         return False
                     required_half_cycles = max(
-                        required_half_cycles, HALF_CYCLES_BEFORE_ISOLATING_OTHERS[type_index]
+                        required_half_cycles, HALF_CYCLES_BEFORE_ISOLATING_OTHER_SURFACE[type_index]
                     )
     return (
         types.surface[candidate_surface_index].evidence.n_anomalous_frames
@@ -265,7 +271,7 @@ def fault_type_on_surface(config, surface):
         return sole_remaining_type_once_it_shows_itself(surface)
     types_have_had_time_to_show = types_would_have_shown(config, surface)
     if any_constant_parameter_type_remains(surface):
-        remaining_type = sole_remaining_constant_parameter_type(surface)
+        remaining_type = sole_constant_type_or_undecided(surface)
         return (
             remaining_type
             if types_have_had_time_to_show and not can_be_another_type(surface, remaining_type, True)
@@ -287,7 +293,7 @@ def varying_parameter_fault_type_on_surface(surface, types_have_had_time_to_show
     if remaining_type < 0 or not types_have_had_time_to_show:
         return TYPE_UNDECIDED
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_remains(surface, type_index) and CAN_LOOK_LIKE[type_index, remaining_type]:
+        if type_is_not_excluded(surface, type_index) and CAN_LOOK_LIKE[type_index, remaining_type]:
             return TYPE_UNDECIDED
     return remaining_type
 
@@ -298,7 +304,7 @@ def sole_remaining_varying_parameter_type(surface, must_show_itself):
     that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
     remaining_type = NO_TYPE
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_remains(surface, type_index) and MUST_SHOW_ITSELF[type_index] == must_show_itself:
+        if type_is_not_excluded(surface, type_index) and MUST_SHOW_ITSELF[type_index] == must_show_itself:
             remaining_type = type_index if remaining_type == NO_TYPE else TYPE_UNDECIDED
             if remaining_type == TYPE_UNDECIDED:
                 return TYPE_UNDECIDED
@@ -306,14 +312,14 @@ def sole_remaining_varying_parameter_type(surface, must_show_itself):
 
 
 @kernel
-def decide_isolation_and_accommodation(types, conclusion, layout, estimators, t):
+def decide_isolation_and_accommodation(types, previous_conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, for
     `conclusion.record_fault_type_finding`.
 
-    conclusion: that of the frame before, which gives the instants of what has not changed; t s.
+    previous_conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
     surface_index = find_surface_at_fault(types, layout)
-    previous_estimator_index = conclusion.isolated_estimator
+    previous_estimator_index = previous_conclusion.isolated_estimator
     previous_surface_index = (
         estimators[previous_estimator_index].surface
         if previous_estimator_index >= 0
@@ -322,20 +328,22 @@ def decide_isolation_and_accommodation(types, conclusion, layout, estimators, t)
     fault_type = (
         fault_type_on_surface(types.config, types.surface[surface_index]) if surface_index >= 0 else -1
     )
-    isolated_at_s = t if surface_index != previous_surface_index else conclusion.isolated_at_s
-    type_decided_at_s = t if fault_type != conclusion.fault_type else conclusion.type_decided_at_s
-    isolated_estimator = (
+    isolated_at_s = t if surface_index != previous_surface_index else previous_conclusion.isolated_at_s
+    type_decided_at_s = (
+        t if fault_type != previous_conclusion.fault_type else previous_conclusion.type_decided_at_s
+    )
+    isolated_estimator_index = (
         estimator_of_fault(layout, surface_index, fault_type) if surface_index >= 0 else surface_index
     )
-    accommodated_surface, accommodation_mode = choose_accommodated_surface(
-        types, isolated_estimator, layout, estimators
+    accommodated_surface_index, accommodation_mode = choose_and_set_accommodation(
+        types, isolated_estimator_index, layout, estimators
     )
     return (
-        isolated_estimator,
+        isolated_estimator_index,
         isolated_at_s,
         fault_type,
         type_decided_at_s,
-        accommodated_surface,
+        accommodated_surface_index,
         accommodation_mode,
     )
 
@@ -372,13 +380,13 @@ def serves_all_constant_parameter_types(surface, accommodation_mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
     is_mode_of_remaining_type = False
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-        if type_remains(surface, type_index):
+        if type_is_not_excluded(surface, type_index):
             is_mode_of_remaining_type = (
                 is_mode_of_remaining_type or ACCOMMODATION_MODE_BY_TYPE[type_index] == accommodation_mode
             )
             serves_type_at_end_of_range = (
                 TYPE_INDEX_AT_END_OF_RANGE[type_index] >= 0
-                and type_remains(surface, TYPE_INDEX_AT_END_OF_RANGE[type_index])
+                and type_is_not_excluded(surface, TYPE_INDEX_AT_END_OF_RANGE[type_index])
                 and MODE_SERVES_TYPE[accommodation_mode, TYPE_INDEX_AT_END_OF_RANGE[type_index]]
             )
             if not (MODE_SERVES_TYPE[accommodation_mode, type_index] or serves_type_at_end_of_range):
@@ -390,25 +398,28 @@ def serves_all_constant_parameter_types(surface, accommodation_mode):
 def is_mode_of_varying_parameter_type(surface, accommodation_mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_remains(surface, type_index) and ACCOMMODATION_MODE_BY_TYPE[type_index] == accommodation_mode:
+        if (
+            type_is_not_excluded(surface, type_index)
+            and ACCOMMODATION_MODE_BY_TYPE[type_index] == accommodation_mode
+        ):
             return True
     return False
 
 
 @kernel
-def find_presumed_faulty_surface(types, isolated_estimator, layout, estimators):
+def find_presumed_faulty_surface(types, isolated_estimator_index, layout, estimators):
     """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
     is thought to be off, as long as both follow their commands: the moment is the same.
     """
-    if isolated_estimator >= 0:
-        return estimators[isolated_estimator].surface
+    if isolated_estimator_index >= 0:
+        return estimators[isolated_estimator_index].surface
     s = sole_possible_surface(types.surface, True)
     if s >= 0:
         return s
     for s, surface in enumerate(types.surface):
-        if layout.dominant_axis[s] == PITCH and can_be_at_fault(surface):
+        if layout.dominant_axis[s] == PITCH and estimator_or_deduction_allows_fault(surface):
             return s
     return NO_SURFACE
 
@@ -427,9 +438,9 @@ def clear_all_accommodation_modes(surfaces):
 
 
 @kernel
-def choose_accommodated_surface(types, isolated_estimator, layout, estimators):
-    """The surface on which the law acts, or NO_SURFACE, and how; isolated_estimator: if any."""
-    surface_index = find_presumed_faulty_surface(types, isolated_estimator, layout, estimators)
+def choose_and_set_accommodation(types, isolated_estimator_index, layout, estimators):
+    """The surface on which the law acts, or NO_SURFACE, and how; isolated_estimator_index: if any."""
+    surface_index = find_presumed_faulty_surface(types, isolated_estimator_index, layout, estimators)
     clear_all_accommodation_modes(types.surface)
     if surface_index < 0:
         return NO_SURFACE, -1
@@ -446,12 +457,12 @@ def update_fault_presence(config, surface, accommodation_mode, is_at_fault):
     """Whether the fault of a surface shows, or did a moment ago."""
     last_observation, accommodation = surface.last_observation, surface.accommodation
     expected_deflection_rad = deflection_error(surface, is_at_fault) + last_observation.healthy_position
-    fault_shows_in_frame = (
+    frame_agrees_with_fault = (
         last_observation.position_low <= expected_deflection_rad <= last_observation.position_high
         or accommodation_mode == SCALE_COMMAND
     )
     accommodation.n_frames_without_sign_of_fault = (
-        0 if fault_shows_in_frame else accommodation.n_frames_without_sign_of_fault + 1
+        0 if frame_agrees_with_fault else accommodation.n_frames_without_sign_of_fault + 1
     )
     fault_absence_s = accommodation.n_frames_without_sign_of_fault * config.dt
     return fault_absence_s < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
@@ -463,12 +474,12 @@ def deflection_error(surface, is_at_fault):
     frame shows it."""
     if is_at_fault:
         for type_index in DEFLECTION_ERROR_TYPES_BY_PRECEDENCE:
-            if type_remains(surface, type_index):
+            if type_is_not_excluded(surface, type_index):
                 deflection_error_rad = deflection_error_under_type(surface, type_index)
                 if np.isfinite(deflection_error_rad):
                     return deflection_error_rad
                 break
-    return observed_deflection_error(surface)
+    return last_midpoint_deflection_error(surface)
 
 
 @kernel
@@ -478,21 +489,23 @@ def remaining_effectiveness(types, layout, estimators, s):
     The estimator fits both axes of a surface, so with a second fault the set of a constant loss is used.
     """
     surface = types.surface[s]
-    if types.pair.enabled and can_be_at_fault(surface):
+    if types.pair.enabled and estimator_or_deduction_allows_fault(surface):
         for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-            if ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND and type_remains(surface, type_index):
+            if ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND and type_is_not_excluded(
+                surface, type_index
+            ):
                 return feasible_set_midpoint(surface, type_index)
     return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
 
 
-Findings = dict[str, Any]
-_NO_FINDINGS: Findings = {
+FindingDict = dict[str, Any]
+_NO_FINDINGS: FindingDict = {
     "isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None,
     "candidates": (), "faults": (),
 }  # fmt: skip
 
 
-def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> Findings:
+def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:
     """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
 
     surface_names: in the order of the aircraft.
@@ -504,15 +517,15 @@ def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> Findings:
     return _findings_assuming_one_fault(fdi, surface_names)
 
 
-def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findings:
+def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    status_by_surface = fdi["types"]["surface"]["status"]
+    surface_finding_records = fdi["types"]["surface"]["status"]
     isolated_surface_indices = sorted(
-        np.flatnonzero(status_by_surface["is_isolated"]).tolist(),
-        key=lambda s: status_by_surface["isolated_at_s"][s],
+        np.flatnonzero(surface_finding_records["is_isolated"]).tolist(),
+        key=lambda s: surface_finding_records["isolated_at_s"][s],
     )
     faults = [
-        _finding_on_surface(fdi, s, int(status_by_surface["fault_type"][s]), surface_names)
+        _finding_on_surface(fdi, s, int(surface_finding_records["fault_type"][s]), surface_names)
         for s in isolated_surface_indices
     ]
     group_has_alarm = fdi["types"]["pair"]["group_has_alarm"]
@@ -527,7 +540,7 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
     undecided_group_findings = [
         {
             **_NO_FINDINGS,
-            "candidates": tuple(_remaining_candidates(fdi, group_surface_indices, surface_names)),
+            "candidates": tuple(_remaining_candidate_texts(fdi, group_surface_indices, surface_names)),
         }
         for group_alarm, group_surface_indices in zip(group_has_alarm, surface_indices_by_group, strict=True)
         if group_alarm and not set(group_surface_indices) & set(isolated_surface_indices)
@@ -536,21 +549,23 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
         return {**faults[0], "faults": (*faults, *undecided_group_findings)}
     if int(fdi["verdict"]["isolated_estimator"]) == UNANTICIPATED:
         return {**_findings_assuming_one_fault(fdi, surface_names), "faults": tuple(undecided_group_findings)}
-    candidates = tuple(
-        candidate for group_finding in undecided_group_findings for candidate in group_finding["candidates"]
+    candidate_texts = tuple(
+        candidate_text
+        for group_finding in undecided_group_findings
+        for candidate_text in group_finding["candidates"]
     )
-    return {**_NO_FINDINGS, "candidates": candidates, "faults": tuple(undecided_group_findings)}
+    return {**_NO_FINDINGS, "candidates": candidate_texts, "faults": tuple(undecided_group_findings)}
 
 
-def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> Findings:
-    isolated_estimator = int(fdi["verdict"]["isolated_estimator"])
+def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:
+    isolated_estimator_index = int(fdi["verdict"]["isolated_estimator"])
     isolated_at_s = float(fdi["verdict"]["isolated_at_s"])
-    if isolated_estimator == NOT_ISOLATED:
+    if isolated_estimator_index == NOT_ISOLATED:
         return {
             **_NO_FINDINGS,
-            "candidates": tuple(_remaining_candidates(fdi, range(len(surface_names)), surface_names)),
+            "candidates": tuple(_remaining_candidate_texts(fdi, range(len(surface_names)), surface_names)),
         }
-    if isolated_estimator == UNANTICIPATED:
+    if isolated_estimator_index == UNANTICIPATED:
         unanticipated_label = "unanticipated"
         return {
             **_NO_FINDINGS,
@@ -558,7 +573,7 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
             "isolation_type": unanticipated_label,
             "isolation_time_s": isolated_at_s,
         }
-    s = int(fdi["isolation"]["estimator"][isolated_estimator]["surface"])
+    s = int(fdi["isolation"]["estimator"][isolated_estimator_index]["surface"])
     fault_type = int(fdi["verdict"]["fault_type"])
     return {
         **_finding_on_surface(fdi, s, fault_type, surface_names),
@@ -567,7 +582,7 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
     }
 
 
-def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Sequence[str]) -> Findings:
+def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Sequence[str]) -> FindingDict:
     """Return the finding on surface s, which is at fault; fault_type: of which type, -1 if open."""
     surface = fdi["types"]["surface"][s]
     return {
@@ -578,7 +593,7 @@ def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Se
         "candidates": (registry.TYPE_NAMES[fault_type],)
         if fault_type >= 0
         else tuple(_remaining_type_names(fdi, s)),
-        "estimate": estimate_fault_size(fdi, s, fault_type),
+        "estimate": estimate_fault_parameter(fdi, s, fault_type),
         "estimate_interval": _call_type_attribute(
             fault_type, "estimate_parameter_interval", fdi, s, fault_type
         ),
@@ -586,7 +601,7 @@ def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Se
     }
 
 
-def estimate_fault_size(fdi: np.void, s: int, type_index: int) -> float | None:
+def estimate_fault_parameter(fdi: np.void, s: int, type_index: int) -> float | None:
     """Estimate the size of a fault of this type on surface s; None if it has none."""
     estimate: float | None = _call_type_attribute(type_index, "estimate_parameter", fdi, s, type_index)
     return estimate
@@ -623,10 +638,11 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
     if constant_parameter_type_indices and not fdi["types"]["config"]["has_surface_term_errors"]:
-        anomaly_counts = surface["evidence"]
+        anomaly_evidence = surface["evidence"]
         slowest_half_cycle_frames = fdi["types"]["config"]["slowest_half_cycle_frames"]
         anomaly_is_shorter_than_half_cycle = (
-            anomaly_counts["n_anomalous_frames"] - anomaly_counts["n_rest_frames"] < slowest_half_cycle_frames
+            anomaly_evidence["n_anomalous_frames"] - anomaly_evidence["n_rest_frames"]
+            < slowest_half_cycle_frames
         )
         type_indices = [
             type_index
@@ -635,10 +651,10 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
             or anomaly_is_shorter_than_half_cycle
             or _counts_with_constant_parameter_types(type_index, constant_parameter_type_indices)
         ]
-    second_fault_is_possible = (
+    is_pitch_surface_assuming_pair = (
         fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_SURFACE_GROUP
     )
-    if second_fault_is_possible and any(
+    if is_pitch_surface_assuming_pair and any(
         registry.ACCOMMODATION_MODE_BY_TYPE[type_index] == GIVE_UP
         for type_index in constant_parameter_type_indices
     ):
@@ -661,7 +677,7 @@ def _counts_with_constant_parameter_types(
     )
 
 
-def _remaining_candidates(
+def _remaining_candidate_texts(
     fdi: np.void, surface_indices: Iterable[int], surface_names: Sequence[str]
 ) -> Iterator[str]:
     """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.

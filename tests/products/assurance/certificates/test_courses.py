@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc.diagnosis.readout import Actuator, FaultTypesConfig
 from beaver_ftc.diagnosis.types import DeflectionRelation
-from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPE_DESCRIPTIONS, TYPES, type_index_of
+from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES, type_index_of
 from beaver_ftc_assurance.certificates import chance, check_certificate, courses, kinds
 from beaver_ftc_assurance.certificates.courses import Exclusion, SurfaceBounds
 from fault_kinds import STUCK, VARYING_LOSS
@@ -291,16 +291,16 @@ def tape(travel=(-0.2, 0.7), blocks=1):
 @pytest.mark.parametrize("kind", range(N_TYPES))
 def test_the_checker_defines_every_type_as_its_row_does(kind):
     """It is written apart from the rows; of the types of the package it takes nothing from the log."""
-    row, words, travel = TYPES[kind], TYPE_DESCRIPTIONS[kind], (-0.2, 0.7)
-    if row.excluding_frame_comparison:
+    row, words, travel = TYPES[kind], DESCRIPTIONS_IN_TYPE_ORDER[kind], (-0.2, 0.7)
+    if row.excluding_frame_comparison_name:
         assert check_certificate.COURSES[words] == (
-            row.excluding_frame_comparison.replace(" ", "_"),
+            row.excluding_frame_comparison_name.replace(" ", "_"),
             row.stop_direction,
         )
-        assert row.excluding_frame_comparison in courses.RULES
+        assert row.excluding_frame_comparison_name in courses.RULES
     else:
         expected = (
-            row.deflection_relation.gain,
+            row.deflection_relation.command_gain,
             row.deflection_relation.theta_is_share,
             row.has_constant_parameter,
         )
@@ -314,7 +314,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
 @pytest.mark.parametrize(("course", "direction"), [("runaway", -1), ("growing offset", 0), ("", 0)])
 def test_what_a_type_is_that_the_checker_does_not_define_stands_in_the_log(monkeypatch, course, direction):
     added = dataclasses.replace(
-        TYPES[STUCK], name="creeps", excluding_frame_comparison=course, stop_direction=direction,
+        TYPES[STUCK], name="creeps", excluding_frame_comparison_name=course, stop_direction=direction,
         deflection_relation=None
         if course
         else DeflectionRelation(-1.0, True, lambda low, high: (0.5 * low, high)),

@@ -34,7 +34,7 @@ from beaver_ftc.diagnosis.types import (
     feasible_set_midpoint,
     limit_to_travel,
     midpoint_parameter_estimate,
-    read_observed_deflection_error,
+    read_last_midpoint_deflection_error,
 )
 
 
@@ -76,7 +76,7 @@ def loss_deflection_range(config, surface, type_index, k):
 
 
 @kernel
-def consistent_varying_loss_interval(config, surface, type_index, k):
+def varying_loss_unlimited_or_empty_set(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     effectiveness_low, effectiveness_high = effectiveness_interval_of_judged_frame(surface)
     healthy_position_changed_sign = (
@@ -90,44 +90,44 @@ def consistent_varying_loss_interval(config, surface, type_index, k):
     )
 
 
-def loss_theta_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
+def effectiveness_minus_one_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
     """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
     return (
         midpoint_parameter_estimate(fdi, s, type_index) - 1.0
         if fdi["types"]["pair"]["enabled"]
-        else loss_theta_from_isolation_estimator(fdi, s, type_index)
+        else effectiveness_minus_one_from_estimator(fdi, s, type_index)
     )
 
 
-def loss_theta_from_isolation_estimator(fdi: np.void, s: int, type_index: int) -> float:
+def effectiveness_minus_one_from_estimator(fdi: np.void, s: int, type_index: int) -> float:
     """theta as the estimator of a loss has it."""
     estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_estimator"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
-def loss_theta_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
+def effectiveness_minus_one_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
     """Return the interval of theta, or None."""
     effectiveness_low, effectiveness_high = feasible_set(fdi, s, type_index)
     return effectiveness_low - 1.0, effectiveness_high - 1.0
 
 
 LOSS_DEFLECTION_RELATION = DeflectionRelation(
-    gain=1.0, theta_is_share=True, theta_range_for_travel=lambda low, high: (-1.0, 0.0)
+    command_gain=1.0, theta_is_share=True, theta_range_for_travel=lambda low, high: (-1.0, 0.0)
 )
 LOSS = FaultType(
     name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
     parameter_range=effectiveness_range, consistent_interval=consistent_loss_interval,
     possible_deflection_range=loss_deflection_range,
     accommodation_mode=SCALE_COMMAND, type_name_at_end_of_range="float",
-    deflection_relation=LOSS_DEFLECTION_RELATION, estimate_parameter=loss_theta_estimate,
-    estimate_parameter_interval=loss_theta_interval,
+    deflection_relation=LOSS_DEFLECTION_RELATION, estimate_parameter=effectiveness_minus_one_estimate,
+    estimate_parameter_interval=effectiveness_minus_one_interval,
 )  # fmt: skip
 VARYING_LOSS = FaultType(
     name="loss_of_effectiveness", description="loss_of_effectiveness that varies",
     has_constant_parameter=False, sort_rank=1,
-    consistent_interval=consistent_varying_loss_interval, half_cycles_before_isolating_others=2,
+    consistent_interval=varying_loss_unlimited_or_empty_set, half_cycles_before_isolating_other_surface=2,
     accommodation_mode=SCALE_COMMAND, deflection_relation=LOSS_DEFLECTION_RELATION,
-    estimate_parameter=loss_theta_from_isolation_estimator,
+    estimate_parameter=effectiveness_minus_one_from_estimator,
 )  # fmt: skip
 
 
@@ -148,14 +148,22 @@ def offset_interval_of_judged_frame(surface):
     command_record = surface.commands
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
         return isolation.EMPTY_THETA_INTERVAL
-    min_instant_position = position_low - max(healthy_position - command_record.min_healthy_position[1], 0.0)
-    max_instant_position = position_high + max(command_record.max_healthy_position[1] - healthy_position, 0.0)
+    min_surface_position_within_frame = position_low - max(
+        healthy_position - command_record.min_healthy_position[1], 0.0
+    )
+    max_surface_position_within_frame = position_high + max(
+        command_record.max_healthy_position[1] - healthy_position, 0.0
+    )
     offset_low = (
-        position_low - healthy_position if min_instant_position > surface.actuator.travel_low else -np.inf
+        position_low - healthy_position
+        if min_surface_position_within_frame > surface.actuator.travel_low
+        else -np.inf
     )
     return (
         offset_low,
-        position_high - healthy_position if max_instant_position < surface.actuator.travel_high else np.inf,
+        position_high - healthy_position
+        if max_surface_position_within_frame < surface.actuator.travel_high
+        else np.inf,
     )
 
 
@@ -166,7 +174,7 @@ def bias_interval_of_judged_frame(config, surface, type_index, k):
 
 
 @kernel
-def bias_deflection_error(surface, type_index):
+def bias_midpoint_or_infinity(surface, type_index):
     """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
     offset_low, offset_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
     return feasible_set_midpoint(surface, type_index) if offset_high - offset_low < np.inf else np.inf
@@ -188,11 +196,11 @@ def mean_deflection_with_offset(surface, offset_rad, extreme_healthy_position):
     """Return the mean deflection with an offset (rad); if a stop is met at an instant, that at
     `extreme_healthy_position`."""
     command_record = surface.commands
-    actuator = surface.actuator
+    actuator_limits = surface.actuator
     mean_deflection = surface.last_observation.healthy_position + offset_rad
     meets_stop = (
-        command_record.min_healthy_position[0] + offset_rad < actuator.travel_low
-        or command_record.max_healthy_position[0] + offset_rad > actuator.travel_high
+        command_record.min_healthy_position[0] + offset_rad < actuator_limits.travel_low
+        or command_record.max_healthy_position[0] + offset_rad > actuator_limits.travel_high
     )
     return limit_to_travel(surface, extreme_healthy_position + offset_rad) if meets_stop else mean_deflection
 
@@ -258,7 +266,7 @@ def detect_runaway_speed_and_narrow_offset(config, surface, judged_offset_low, j
 
 
 @kernel
-def consistent_growing_bias_interval(config, surface, type_index, k):
+def update_growing_bias_and_consistent_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     judged_offset_low, judged_offset_high = offset_interval_of_judged_frame(surface)
     if judged_offset_low <= judged_offset_high:
@@ -296,23 +304,24 @@ def has_run_towards_stop(surface, stop_direction):
 
 def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Offset in the last frame, rad."""
-    return read_observed_deflection_error(fdi["types"]["surface"][s])
+    return read_last_midpoint_deflection_error(fdi["types"]["surface"][s])
 
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
     consistent_interval=bias_interval_of_judged_frame, possible_deflection_range=bias_deflection_range,
-    accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_precedence=2,
+    accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_midpoint_or_infinity,
+    deflection_error_precedence=2,
     deflection_relation=DeflectionRelation(
         1.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low - high, high - low)
     ),
-    excluding_frame_comparison="offset", estimate_parameter=midpoint_parameter_estimate,
+    excluding_frame_comparison_name="offset", estimate_parameter=midpoint_parameter_estimate,
     estimate_parameter_interval=bias_interval,
 )  # fmt: skip
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
     reset_memory=reset_growing_bias_memory, before_judging_frame=widen_offset_interval,
-    consistent_interval=consistent_growing_bias_interval,
+    consistent_interval=update_growing_bias_and_consistent_interval,
     on_skipped_frame=forget_bias_offset_interval,
     memory_record_name="growing_bias",
     memory_dtype=record(
@@ -325,12 +334,12 @@ GROWING_BIAS = FaultType(
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
     can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"),
     motion_rules_out=has_run_towards_stop,
-    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison="growing offset",
+    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison_name="growing offset",
     estimate_parameter=last_offset_rad,
 )  # fmt: skip
 
 
-MIN_OSCILLATION_HALF_CYCLES = 3
+MIN_OSCILLATION_HALF_CYCLE_ENDS = 3
 
 
 @kernel
@@ -350,7 +359,7 @@ def add_squared_deflection_error(config, surface, type_index):
 
 
 @kernel
-def consistent_oscillation_interval(config, surface, type_index, k):
+def update_oscillation_and_consistent_interval(config, surface, type_index, k):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
     At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
@@ -398,7 +407,7 @@ def skip_oscillation_frame(config, surface, type_index, k):
 @kernel
 def oscillation_has_shown(surface):
     """Whether it has swung for two half-cycles and more."""
-    return surface.oscillatory.n_half_cycles >= MIN_OSCILLATION_HALF_CYCLES
+    return surface.oscillatory.n_half_cycles >= MIN_OSCILLATION_HALF_CYCLE_ENDS
 
 
 def oscillation_amplitude_rad(fdi: np.void, s: int, type_index: int) -> float | None:
@@ -428,7 +437,7 @@ def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float 
 OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
     reset_memory=reset_oscillation_memory, before_judging_frame=add_squared_deflection_error,
-    consistent_interval=consistent_oscillation_interval,
+    consistent_interval=update_oscillation_and_consistent_interval,
     on_skipped_frame=skip_oscillation_frame, memory_record_name="oscillatory",
     memory_dtype=record(
         error_sign=int, sign_since_frame=int,
@@ -439,7 +448,7 @@ OSCILLATORY = FaultType(
     ),
     has_shown=oscillation_has_shown, shows_within_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
     can_look_like=("rate_limit",),
-    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison="swing",
+    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison_name="swing",
     estimate_parameter=oscillation_amplitude_rad,
     estimate_frequency_rad_s=oscillation_frequency_rad_s,
 )  # fmt: skip
@@ -452,7 +461,7 @@ def reset_rate_limit_memory(surface, type_index):
 
 
 @kernel
-def consistent_rate_limit_interval(config, surface, type_index, k):
+def update_rate_limit_and_consistent_interval(config, surface, type_index, k):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
     Of several JSBSim frames in one of ours the first is the old command's.
@@ -522,7 +531,7 @@ def surface_side_of_commands(config, surface):
 
 RATE_LIMIT = FaultType(
     name="rate_limit", has_constant_parameter=False, sort_rank=3,
-    reset_memory=reset_rate_limit_memory, consistent_interval=consistent_rate_limit_interval,
+    reset_memory=reset_rate_limit_memory, consistent_interval=update_rate_limit_and_consistent_interval,
     memory_record_name="rate_limit",
     memory_dtype=record(
         # where it can be while it stands on one side of its command, rad
@@ -532,6 +541,6 @@ RATE_LIMIT = FaultType(
     # a slow surface that has not been seen to creep looks as if it stood still
     evidence_at_rest=REST_HIDES_TYPE, can_look_like=("stuck", "float", "hardover"),
     accommodation_mode=WAIT_FOR_SURFACE,
-    excluding_frame_comparison="approach",
+    excluding_frame_comparison_name="approach",
 )  # fmt: skip
 TYPES = LOSS, VARYING_LOSS, BIAS, GROWING_BIAS, OSCILLATORY, RATE_LIMIT

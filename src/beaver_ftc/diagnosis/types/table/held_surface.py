@@ -42,41 +42,41 @@ from beaver_ftc.diagnosis.types import (
     midpoint_parameter_estimate,
 )
 
-EARLIER_RELEASE, LATER_RELEASE = 0, 1
+EARLIER_RELEASES_SLOT, LATER_RELEASES_SLOT = 0, 1
 STATUS_HELD, STATUS_RETURNING, STATUS_REFUTED = range(3)
 # A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.
 HEALTHY_POSITION_TOLERANCE_RAD = 1e-14
 
 
 @kernel
-def clear_releases(surface, release_slot, type_index):
+def clear_releases(surface, release_slot_index, type_index):
     """No release of this type is possible: the empty interval."""
     (
-        surface.release.return_position_low[release_slot, type_index],
-        surface.release.return_position_high[release_slot, type_index],
+        surface.release.return_position_low[release_slot_index, type_index],
+        surface.release.return_position_high[release_slot_index, type_index],
     ) = np.inf, -np.inf
 
 
 @kernel
-def is_release_possible(surface, release_slot, type_index):
+def is_release_possible(surface, release_slot_index, type_index):
     """Whether a release of this type is possible."""
     return (
-        surface.release.return_position_low[release_slot, type_index]
-        <= surface.release.return_position_high[release_slot, type_index]
+        surface.release.return_position_low[release_slot_index, type_index]
+        <= surface.release.return_position_high[release_slot_index, type_index]
     )
 
 
 @kernel
 def allow_release_before_alarm(surface, type_index):
     """Allow a release before the alarm, from anywhere in the travel."""
-    clear_releases(surface, EARLIER_RELEASE, type_index)
-    surface.release.return_position_low[LATER_RELEASE, type_index] = surface.actuator.travel_low
-    surface.release.return_position_high[LATER_RELEASE, type_index] = surface.actuator.travel_high
-    clear_held_position_interval(surface, type_index)
+    clear_releases(surface, EARLIER_RELEASES_SLOT, type_index)
+    surface.release.return_position_low[LATER_RELEASES_SLOT, type_index] = surface.actuator.travel_low
+    surface.release.return_position_high[LATER_RELEASES_SLOT, type_index] = surface.actuator.travel_high
+    set_held_position_interval_empty(surface, type_index)
 
 
 @kernel
-def clear_held_position_interval(surface, type_index):
+def set_held_position_interval_empty(surface, type_index):
     """This type does not hold the surface in the judged frame: the empty interval."""
     surface.release.held_position_min[type_index], surface.release.held_position_max[type_index] = (
         np.inf,
@@ -144,28 +144,28 @@ def drop_refuted_releases_and_test_return(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
     is_explained = release_within_block_explains_block(config, surface, type_index)
     if not is_explained:
-        clear_held_position_interval(surface, type_index)
-    for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-        if is_release_possible(surface, release_slot, type_index):
-            if narrow_return_position_interval(config, surface, release_slot, type_index):
+        set_held_position_interval_empty(surface, type_index)
+    for release_slot_index in (EARLIER_RELEASES_SLOT, LATER_RELEASES_SLOT):
+        if is_release_possible(surface, release_slot_index, type_index):
+            if narrow_and_test_return_interval(config, surface, release_slot_index, type_index):
                 is_explained = True
             else:
-                clear_releases(surface, release_slot, type_index)
+                clear_releases(surface, release_slot_index, type_index)
     return is_explained
 
 
 @kernel
-def narrow_return_position_interval(config, surface, release_slot, type_index):
+def narrow_and_test_return_interval(config, surface, release_slot_index, type_index):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
     The mean over the frame rises with where the return began, and by no more than that.
     """
-    release = surface.release
+    releases_by_type = surface.release
     mean_position_from_low, _, mean_position_tolerance_from_low = simulate_return_in_frame(
-        config, surface, release.return_position_low[release_slot, type_index]
+        config, surface, releases_by_type.return_position_low[release_slot_index, type_index]
     )
     mean_position_from_high, _, mean_position_tolerance_from_high = simulate_return_in_frame(
-        config, surface, release.return_position_high[release_slot, type_index]
+        config, surface, releases_by_type.return_position_high[release_slot_index, type_index]
     )
     mean_position_tolerance = max(mean_position_tolerance_from_low, mean_position_tolerance_from_high)
     healthy_position = surface.judged_observation.healthy_position
@@ -182,38 +182,40 @@ def narrow_return_position_interval(config, surface, release_slot, type_index):
         or mean_position_from_high + mean_position_tolerance < surface.judged_observation.position_low
     ):
         return False
-    narrowed_low = release.return_position_low[release_slot, type_index] + max(
+    narrowed_low = releases_by_type.return_position_low[release_slot_index, type_index] + max(
         surface.judged_observation.position_low - mean_position_from_low - mean_position_tolerance, 0.0
     )
-    narrowed_high = release.return_position_high[release_slot, type_index] - max(
+    narrowed_high = releases_by_type.return_position_high[release_slot_index, type_index] - max(
         mean_position_from_high - mean_position_tolerance - surface.judged_observation.position_high, 0.0
     )
-    set_return_position_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
+    set_returning_position_interval(
+        releases_by_type, release_slot_index, type_index, narrowed_low, narrowed_high
+    )
     return True
 
 
 @kernel
-def promote_later_releases(surface, type_index):
+def replace_earlier_releases_by_later(surface, type_index):
     """Take the later releases for the earlier ones, when no earlier one is possible any more."""
-    release = surface.release
+    releases_by_type = surface.release
     (
-        release.return_position_low[EARLIER_RELEASE, type_index],
-        release.return_position_high[EARLIER_RELEASE, type_index],
+        releases_by_type.return_position_low[EARLIER_RELEASES_SLOT, type_index],
+        releases_by_type.return_position_high[EARLIER_RELEASES_SLOT, type_index],
     ) = (
-        release.return_position_low[LATER_RELEASE, type_index],
-        release.return_position_high[LATER_RELEASE, type_index],
+        releases_by_type.return_position_low[LATER_RELEASES_SLOT, type_index],
+        releases_by_type.return_position_high[LATER_RELEASES_SLOT, type_index],
     )
-    clear_releases(surface, LATER_RELEASE, type_index)
+    clear_releases(surface, LATER_RELEASES_SLOT, type_index)
 
 
 @kernel
-def set_return_position_interval(
-    release, release_slot, type_index, return_position_low, return_position_high
+def set_returning_position_interval(
+    releases_by_type, release_slot_index, type_index, return_position_low, return_position_high
 ):
     """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
     (
-        release.return_position_low[release_slot, type_index],
-        release.return_position_high[release_slot, type_index],
+        releases_by_type.return_position_low[release_slot_index, type_index],
+        releases_by_type.return_position_high[release_slot_index, type_index],
     ) = (
         min(return_position_low, return_position_high),
         max(return_position_low, return_position_high),
@@ -229,16 +231,16 @@ def update_held_status(config, surface, type_index, held_position_min, held_posi
         config.released_surface_returns_via_actuator
         and drop_refuted_releases_and_test_return(config, surface, type_index)
     )
-    has_released = surface.release.has_released
+    has_released_by_type = surface.release.has_released
     if (
         held_position_min <= surface.judged_observation.position_high
         and held_position_max >= surface.judged_observation.position_low
-        and not has_released[type_index]
+        and not has_released_by_type[type_index]
     ):
         return STATUS_HELD
     if not is_return_possible:
         return STATUS_REFUTED
-    has_released[type_index] = 1
+    has_released_by_type[type_index] = 1
     return STATUS_RETURNING
 
 
@@ -255,7 +257,7 @@ def consistent_held_or_returning_interval(config, surface, type_index, held_posi
 
 
 @kernel
-def position_at_frame_start(config, surface, k):
+def start_position_interval_and_frame(config, surface, k):
     """Return the possible position at the start of the judged frame, (low, high) rad, and the frame that
     shows it.
 
@@ -270,53 +272,57 @@ def position_at_frame_start(config, surface, k):
 def add_release(surface, type_index, held_position_min, held_position_max):
     """Add a release from between held_position_min and held_position_max (rad), where a type may hold the
     surface, if the interval is not empty."""
-    release = surface.release
-    clear_held_position_interval(surface, type_index)
-    if held_position_min <= held_position_max and not release.has_released[type_index]:
-        release.held_position_min[type_index], release.held_position_max[type_index] = (
+    releases_by_type = surface.release
+    set_held_position_interval_empty(surface, type_index)
+    if held_position_min <= held_position_max and not releases_by_type.has_released[type_index]:
+        releases_by_type.held_position_min[type_index], releases_by_type.held_position_max[type_index] = (
             held_position_min,
             held_position_max,
         )
-        release.return_position_low[LATER_RELEASE, type_index] = min(
-            release.return_position_low[LATER_RELEASE, type_index], held_position_min
+        releases_by_type.return_position_low[LATER_RELEASES_SLOT, type_index] = min(
+            releases_by_type.return_position_low[LATER_RELEASES_SLOT, type_index], held_position_min
         )
-        release.return_position_high[LATER_RELEASE, type_index] = max(
-            release.return_position_high[LATER_RELEASE, type_index], held_position_max
+        releases_by_type.return_position_high[LATER_RELEASES_SLOT, type_index] = max(
+            releases_by_type.return_position_high[LATER_RELEASES_SLOT, type_index], held_position_max
         )
 
 
 @kernel
 def propagate_returns(config, surface, type_index):
     """Carry the intervals of returns to the next frame; a surface that looks healthy may be held again."""
-    release = surface.release
+    releases_by_type = surface.release
     if not surface.judged_observation.is_anomalous:
-        release.has_released[type_index] = 0
-    for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-        if is_release_possible(surface, release_slot, type_index):
+        releases_by_type.has_released[type_index] = 0
+    for release_slot_index in (EARLIER_RELEASES_SLOT, LATER_RELEASES_SLOT):
+        if is_release_possible(surface, release_slot_index, type_index):
             _, frame_end_position_low, _ = simulate_return_in_frame(
-                config, surface, release.return_position_low[release_slot, type_index]
+                config, surface, releases_by_type.return_position_low[release_slot_index, type_index]
             )
             _, frame_end_position_high, _ = simulate_return_in_frame(
-                config, surface, release.return_position_high[release_slot, type_index]
+                config, surface, releases_by_type.return_position_high[release_slot_index, type_index]
             )
-            set_return_position_interval(
-                release, release_slot, type_index, frame_end_position_low, frame_end_position_high
+            set_returning_position_interval(
+                releases_by_type,
+                release_slot_index,
+                type_index,
+                frame_end_position_low,
+                frame_end_position_high,
             )
     if (
         config.frames_per_block > 1
-        and release.held_position_min[type_index] <= release.held_position_max[type_index]
+        and releases_by_type.held_position_min[type_index] <= releases_by_type.held_position_max[type_index]
     ):
         _, frame_end_position_low, _ = simulate_return_in_frame(
-            config, surface, release.held_position_min[type_index], -1
+            config, surface, releases_by_type.held_position_min[type_index], -1
         )
         _, frame_end_position_high, _ = simulate_return_in_frame(
-            config, surface, release.held_position_max[type_index], 1
+            config, surface, releases_by_type.held_position_max[type_index], 1
         )
-        release.return_position_low[LATER_RELEASE, type_index] = min(
-            release.return_position_low[LATER_RELEASE, type_index], frame_end_position_low
+        releases_by_type.return_position_low[LATER_RELEASES_SLOT, type_index] = min(
+            releases_by_type.return_position_low[LATER_RELEASES_SLOT, type_index], frame_end_position_low
         )
-        release.return_position_high[LATER_RELEASE, type_index] = max(
-            release.return_position_high[LATER_RELEASE, type_index], frame_end_position_high
+        releases_by_type.return_position_high[LATER_RELEASES_SLOT, type_index] = max(
+            releases_by_type.return_position_high[LATER_RELEASES_SLOT, type_index], frame_end_position_high
         )
 
 
@@ -338,23 +344,23 @@ def reset_stuck_memory(surface, type_index):
 @kernel
 def consistent_stuck_interval(config, surface, type_index, k):
     """It stays where it is."""
-    status = update_held_status(
+    held_status = update_held_status(
         config,
         surface,
         type_index,
         surface.feasible_sets.low[type_index],
         surface.feasible_sets.high[type_index],
     )
-    if status == STATUS_HELD:
+    if held_status == STATUS_HELD:
         return surface.judged_observation.position_low, surface.judged_observation.position_high
-    return EMPTY_SET if status == STATUS_REFUTED else UNLIMITED_SET
+    return EMPTY_SET if held_status == STATUS_REFUTED else UNLIMITED_SET
 
 
 @kernel
 def add_stuck_release(config, surface, type_index, k):
     """Add a release from the interval of the jammed position."""
-    promote_sets_before_release(surface, type_index)
-    start_position_low, start_position_high, _ = position_at_frame_start(config, surface, k)
+    replace_earlier_release_if_impossible(surface, type_index)
+    start_position_low, start_position_high, _ = start_position_interval_and_frame(config, surface, k)
     add_release(
         surface,
         type_index,
@@ -364,25 +370,25 @@ def add_stuck_release(config, surface, type_index, k):
 
 
 @kernel
-def promote_sets_before_release(surface, type_index):
+def replace_earlier_release_if_impossible(surface, type_index):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
     memory = surface.stuck
-    if not is_release_possible(surface, EARLIER_RELEASE, type_index):
+    if not is_release_possible(surface, EARLIER_RELEASES_SLOT, type_index):
         (
-            memory.feasible_low_before_release[EARLIER_RELEASE],
-            memory.feasible_high_before_release[EARLIER_RELEASE],
+            memory.feasible_low_before_release[EARLIER_RELEASES_SLOT],
+            memory.feasible_high_before_release[EARLIER_RELEASES_SLOT],
         ) = (
-            memory.feasible_low_before_release[LATER_RELEASE],
-            memory.feasible_high_before_release[LATER_RELEASE],
+            memory.feasible_low_before_release[LATER_RELEASES_SLOT],
+            memory.feasible_high_before_release[LATER_RELEASES_SLOT],
         )
         (
-            memory.feasible_low_before_release[LATER_RELEASE],
-            memory.feasible_high_before_release[LATER_RELEASE],
+            memory.feasible_low_before_release[LATER_RELEASES_SLOT],
+            memory.feasible_high_before_release[LATER_RELEASES_SLOT],
         ) = (
             surface.feasible_sets.low[type_index],
             surface.feasible_sets.high[type_index],
         )
-        promote_later_releases(surface, type_index)
+        replace_earlier_releases_by_later(surface, type_index)
 
 
 @kernel
@@ -390,11 +396,11 @@ def stuck_set_after_frame(surface, type_index):
     """Return the set of a jam that may begin again where the surface looks healthy: its set as it was before
     the earliest release still possible."""
     if not surface.judged_observation.is_anomalous:
-        for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-            if is_release_possible(surface, release_slot, type_index):
+        for release_slot_index in (EARLIER_RELEASES_SLOT, LATER_RELEASES_SLOT):
+            if is_release_possible(surface, release_slot_index, type_index):
                 return surface.stuck.feasible_low_before_release[
-                    release_slot
-                ], surface.stuck.feasible_high_before_release[release_slot]
+                    release_slot_index
+                ], surface.stuck.feasible_high_before_release[release_slot_index]
     return surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
 
 
@@ -416,7 +422,7 @@ def consistent_float_interval(config, surface, type_index, k):
 @kernel
 def add_float_release(config, surface, type_index, k):
     """Add a release from the neutral position."""
-    start_position_low, start_position_high, _ = position_at_frame_start(config, surface, k)
+    start_position_low, start_position_high, _ = start_position_interval_and_frame(config, surface, k)
     neutral_position = limit_to_travel(surface, 0.0)
     add_release(
         surface,
@@ -547,11 +553,11 @@ def consistent_hardover_down_interval(config, surface, type_index, k):
 @kernel
 def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    start_position_low, start_position_high, observed_frame_index = position_at_frame_start(
+    start_position_low, start_position_high, start_position_frame_index = start_position_interval_and_frame(
         config, surface, k
     )
     start_position_low = max(
-        start_position_low, runaway_up_lower_limit(config, surface, observed_frame_index)
+        start_position_low, runaway_up_lower_limit(config, surface, start_position_frame_index)
     )
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_high = surface.actuator.travel_high
@@ -561,11 +567,11 @@ def add_hardover_up_release(config, surface, type_index, k):
 @kernel
 def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
-    start_position_low, start_position_high, observed_frame_index = position_at_frame_start(
+    start_position_low, start_position_high, start_position_frame_index = start_position_interval_and_frame(
         config, surface, k
     )
     start_position_high = min(
-        start_position_high, runaway_down_upper_limit(config, surface, observed_frame_index)
+        start_position_high, runaway_down_upper_limit(config, surface, start_position_frame_index)
     )
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_low = surface.actuator.travel_low
@@ -600,7 +606,7 @@ HARDOVER_UP = FaultType(
     on_possible_release=add_hardover_up_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
     stop_direction=1,
-    accommodation_mode=GIVE_UP, excluding_frame_comparison="runaway",
+    accommodation_mode=GIVE_UP, excluding_frame_comparison_name="runaway",
     estimate_parameter=upper_stop_deflection_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
@@ -609,7 +615,7 @@ HARDOVER_DOWN = FaultType(
     on_possible_release=add_hardover_down_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
     stop_direction=-1,
-    accommodation_mode=GIVE_UP, excluding_frame_comparison="runaway",
+    accommodation_mode=GIVE_UP, excluding_frame_comparison_name="runaway",
     estimate_parameter=lower_stop_deflection_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

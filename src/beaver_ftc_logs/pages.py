@@ -160,33 +160,37 @@ def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
 
 def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
     """Columns of diagnosis.parquet, by the vehicle's surfaces."""
-    effectiveness_columns = (
+    effectiveness_column_names = (
         f"{surface}_{suffix}" for surface in surfaces for suffix in ("effectiveness", "low", "high")
     )
-    return ("t_s", "faulty", "named", *effectiveness_columns, "fault_probability", "credible")
+    return ("t_s", "faulty", "named", *effectiveness_column_names, "fault_probability", "credible")
 
 
 def write_diagnosis(
     out: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
 ) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
-    effectiveness_arrays = (
-        array
-        for arrays in zip(
+    effectiveness_columns = (
+        column
+        for columns_of_surface in zip(
             rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True
         )
-        for array in arrays
+        for column in columns_of_surface
     )
-    column_values = (
+    columns_in_order = (
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces.tolist(),
-        *effectiveness_arrays,
+        *effectiveness_columns,
         rows.fault_probability,
         rows.credible,
     )
-    columns = dict(zip(diagnosis_column_names(model.vehicle.surfaces), column_values, strict=True))
-    return write_results(out, samples.name, columns, verdict, render_diagnosis(samples, model, rows, verdict))
+    values_by_column_name = dict(
+        zip(diagnosis_column_names(model.vehicle.surfaces), columns_in_order, strict=True)
+    )
+    return write_results(
+        out, samples.name, values_by_column_name, verdict, render_diagnosis(samples, model, rows, verdict)
+    )
 
 
 def write_diagnosis_with_aircraft_model(
@@ -216,7 +220,7 @@ def write_diagnosis_with_aircraft_model(
 def write_results(
     out: Path,
     name: str,
-    columns: dict[str, Any],
+    values_by_column_name: dict[str, Any],
     verdict: dict[str, Any],
     page: str | None = None,
     write_extra_files: Callable[[Path], None] | None = None,
@@ -226,7 +230,7 @@ def write_results(
     from pyarrow import parquet
 
     with result_folder(out, name) as folder:
-        parquet.write_table(pa.table(columns), folder / "diagnosis.parquet")
+        parquet.write_table(pa.table(values_by_column_name), folder / "diagnosis.parquet")
         (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
         if page is not None:
             (folder / "report.html").write_text(page, encoding="utf-8")
@@ -283,15 +287,19 @@ def _encode_png(figure: Any) -> str:
 
 def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    folds = [
+    models_and_held_out = [
         (fitting.fit_with_same_order(fitted_flights, model), held_out, name)
         for fitted_flights, held_out, name in fitting.validation_folds(usable_flights)
     ]
-    folds = [fold for fold in folds if fold[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
-    n_subfigures = max(len(folds), 1)
+    models_and_held_out = [
+        model_and_held_out
+        for model_and_held_out in models_and_held_out
+        if model_and_held_out[1].is_usable.any()
+    ][:_MAX_SHOWN_FLIGHTS]
+    n_subfigures = max(len(models_and_held_out), 1)
     figure = _new_figure(11, 4.6 * n_subfigures)
     subfigures = figure.subfigures(n_subfigures, squeeze=False)[:, 0]
-    for subfigure, (fold_model, held_out, name) in zip(subfigures, folds, strict=False):
+    for subfigure, (fold_model, held_out, name) in zip(subfigures, models_and_held_out, strict=False):
         axes = subfigure.subplots(3, 1, sharex=True)
         t_s, measured_rates, residual = _rates_and_residual_in_liveliest_window(
             fold_model, held_out, round(_PREDICTION_FIGURE_SPAN_S * model.rate_hz)
@@ -340,11 +348,11 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
     residual = np.vstack(
         [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
     )
-    frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
+    frequency_hz, axis_densities = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
-        axis.loglog(frequency_hz[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
+        axis.loglog(frequency_hz[1:], axis_densities[1:, i], color=SERIES[i], linewidth=1.1, label=name)
         white_noise_density = residual[:, i].var() / (0.5 * model.rate_hz)
         axis.axhline(white_noise_density, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)

@@ -18,7 +18,7 @@ _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
 _MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_UNIT_RATIO = 20, 0.7, 1.3
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
-_LOW_CORRELATION, _LOW_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
+_MAX_EXCHANGED_CORRELATION, _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
 _GRAVITY_MPS2 = KIND_AND_SI_FACTOR_OF_UNIT["g"][1]
 _PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
 _MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
@@ -49,26 +49,39 @@ def fit_roll_angle_to_rates(
 
     rate_columns: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
-    t_s = rate_columns[0].t_s
-    p, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
-    roll_angle, full_circle = _interpolate_column(roll_column, t_s), _full_circle(roll_column.values)
-    roll_rad = roll_angle * 2.0 * np.pi / full_circle  # the circle is known whatever the unit
-    rate_terms, pitch_rad = [p], None
+    rate_times_s = rate_columns[0].t_s
+    p, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    roll_at_rate_times, full_circle = (
+        _interpolate_column(roll_column, rate_times_s),
+        _full_circle(roll_column.values),
+    )
+    # The circle is known whatever the unit.
+    roll_rad_at_rate_times = roll_at_rate_times * 2.0 * np.pi / full_circle
+    rate_terms, pitch_rad_at_rate_times = [p], None
     if pitch_column is not None:
-        pitch_rad = _pitch_rad_at(roll_column, pitch_column, t_s)
-        rate_terms += [np.tan(pitch_rad) * q * np.sin(roll_rad), np.tan(pitch_rad) * r * np.cos(roll_rad)]
-    return _fit_angle_to_rate(t_s, roll_angle, rate_terms, full_circle, pitch_rad)
+        pitch_rad_at_rate_times = _interpolated_pitch_rad(roll_column, pitch_column, rate_times_s)
+        rate_terms += [
+            np.tan(pitch_rad_at_rate_times) * q * np.sin(roll_rad_at_rate_times),
+            np.tan(pitch_rad_at_rate_times) * r * np.cos(roll_rad_at_rate_times),
+        ]
+    return _fit_angle_to_rate(
+        rate_times_s, roll_at_rate_times, rate_terms, full_circle, pitch_rad_at_rate_times
+    )
 
 
 def fit_pitch_angle_to_rates(
     rate_columns: list[Column], roll_column: Column, pitch_column: Column
 ) -> AngleRateFit | None:
     """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
-    t_s = rate_columns[0].t_s
-    _, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
-    roll_rad = _interpolate_column(roll_column, t_s) * 2.0 * np.pi / _full_circle(roll_column.values)
+    rate_times_s = rate_columns[0].t_s
+    _, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    roll_rad_at_rate_times = (
+        _interpolate_column(roll_column, rate_times_s) * 2.0 * np.pi / _full_circle(roll_column.values)
+    )
     return _fit_angle_to_rate(
-        t_s, _interpolate_column(pitch_column, t_s), [q * np.cos(roll_rad), -r * np.sin(roll_rad)]
+        rate_times_s,
+        _interpolate_column(pitch_column, rate_times_s),
+        [q * np.cos(roll_rad_at_rate_times), -r * np.sin(roll_rad_at_rate_times)],
     )
 
 
@@ -77,17 +90,29 @@ def fit_yaw_angle_to_rates(
 ) -> AngleRateFit | None:
     """How the yaw angle follows the rates, as `fit_roll_angle_to_rates`; r and q are in one unit, since a
     turn changes both alike."""
-    t_s = rate_columns[0].t_s
-    _, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
-    roll_rad = _interpolate_column(roll_column, t_s) * 2.0 * np.pi / _full_circle(roll_column.values)
-    pitch_rad = np.zeros(len(t_s)) if pitch_column is None else _pitch_rad_at(roll_column, pitch_column, t_s)
-    yaw_rate_term = (q * np.sin(roll_rad) + r * np.cos(roll_rad)) / np.cos(pitch_rad)
+    rate_times_s = rate_columns[0].t_s
+    _, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    roll_rad_at_rate_times = (
+        _interpolate_column(roll_column, rate_times_s) * 2.0 * np.pi / _full_circle(roll_column.values)
+    )
+    pitch_rad_at_rate_times = (
+        np.zeros(len(rate_times_s))
+        if pitch_column is None
+        else _interpolated_pitch_rad(roll_column, pitch_column, rate_times_s)
+    )
+    euler_yaw_rate = (q * np.sin(roll_rad_at_rate_times) + r * np.cos(roll_rad_at_rate_times)) / np.cos(
+        pitch_rad_at_rate_times
+    )
     return _fit_angle_to_rate(
-        t_s, _interpolate_column(yaw_column, t_s), [yaw_rate_term], _full_circle(yaw_column.values), pitch_rad
+        rate_times_s,
+        _interpolate_column(yaw_column, rate_times_s),
+        [euler_yaw_rate],
+        _full_circle(yaw_column.values),
+        pitch_rad_at_rate_times,
     )
 
 
-def _pitch_rad_at(roll_column: Column, pitch_column: Column, t_s: Floats) -> Floats:
+def _interpolated_pitch_rad(roll_column: Column, pitch_column: Column, t_s: Floats) -> Floats:
     """The pitch angle at given times, rad, of two angles in one unit."""
     return (
         _interpolate_column(pitch_column, t_s)
@@ -102,11 +127,11 @@ def _fit_angle_to_rate(
     angle: Floats,
     rate_terms: list[Floats],
     full_circle: float | None = None,
-    pitch_rad: Floats | None = None,
+    pitch_rad_at_samples: Floats | None = None,
 ) -> AngleRateFit | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
-    unit they are; full_circle: a circle, where it may go round; pitch_rad: the pitch angle, where windows in
-    which it is steep say nothing."""
+    unit they are; full_circle: a circle, where it may go round; pitch_rad_at_samples: the pitch angle, where
+    windows in which it is steep say nothing."""
     step_s = np.diff(t_s)
     step_without_gaps = np.where(step_s < _INTEGRATION_WINDOW_S, step_s, 0.0)
     rate_term_integrals = np.vstack(
@@ -120,13 +145,17 @@ def _fit_angle_to_rate(
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
     window_begin_rows = np.arange(0, len(t_s) - window_samples, window_samples)
     window_end_rows = np.arange(window_samples, len(t_s), window_samples)
-    is_window_usable = (t_s[window_end_rows] - t_s[window_begin_rows]) < 2.0 * _INTEGRATION_WINDOW_S
-    if pitch_rad is not None:
-        cumulated_steep_count = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
-        is_window_usable &= cumulated_steep_count[window_end_rows] == cumulated_steep_count[window_begin_rows]
-    angle_changes = (angle[window_end_rows] - angle[window_begin_rows])[is_window_usable]
+    is_window_continuous_and_not_steep = (
+        t_s[window_end_rows] - t_s[window_begin_rows]
+    ) < 2.0 * _INTEGRATION_WINDOW_S
+    if pitch_rad_at_samples is not None:
+        cumulated_steep_count = np.cumsum(np.abs(pitch_rad_at_samples) > _STEEP_PITCH_RAD)
+        is_window_continuous_and_not_steep &= (
+            cumulated_steep_count[window_end_rows] == cumulated_steep_count[window_begin_rows]
+        )
+    angle_changes = (angle[window_end_rows] - angle[window_begin_rows])[is_window_continuous_and_not_steep]
     rate_integrals = (rate_term_integrals[window_end_rows] - rate_term_integrals[window_begin_rows])[
-        is_window_usable
+        is_window_continuous_and_not_steep
     ]
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
@@ -207,7 +236,7 @@ def find_attitude_mistake(
                     (candidate_column_name, candidate_fit),
                     _RATE_TITLES[axis],
                 )
-        if remark := angle_rate_remark(fit, rate_column_name, named_angle[0]):
+        if remark := angle_rate_factor_remark(fit, rate_column_name, named_angle[0]):
             return remark
     return None
 
@@ -216,7 +245,9 @@ def _min_correlation_to_replace_rate(named_rate_fit: AngleRateFit, is_candidate_
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
     named_rate_correlation = abs(named_rate_fit.correlation)
     if is_candidate_a_rate and named_rate_correlation < (
-        _LOW_CORRELATION if named_rate_fit.has_many_windows else _LOW_CORRELATION_OF_FEW_WINDOWS
+        _MAX_EXCHANGED_CORRELATION
+        if named_rate_fit.has_many_windows
+        else _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS
     ):
         return _MIN_AGREEING_CORRELATION
     return (
@@ -259,7 +290,7 @@ def _exchanged_column_text(
     )
 
 
-def angle_rate_remark(fit: AngleRateFit, rate_column_name: str, angle_column_name: str) -> str | None:
+def angle_rate_factor_remark(fit: AngleRateFit, rate_column_name: str, angle_column_name: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
     nothing is. rate_column_name, angle_column_name: their columns.
 
@@ -270,28 +301,28 @@ def angle_rate_remark(fit: AngleRateFit, rate_column_name: str, angle_column_nam
     is_near_one = 1.0 / max_slope_factor < slope_magnitude < max_slope_factor
     if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (is_near_one and fit.slope > 0.0):
         return None
-    slope_text = (
+    angle_to_rate_integral_ratio_text = (
         f"the change of {angle_column_name} is {fit.slope:.4g} times the integral of {rate_column_name}"
     )
     if is_near_one:
-        return f"{slope_text}: one of them has the other sign, `scale: -1` fits"
+        return f"{angle_to_rate_integral_ratio_text}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
-        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _MAX_UNIT_RATIO)
+        fitting_unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _MAX_UNIT_RATIO)
     ):
         return (
-            f"{slope_text}: {angle_column_name} is in {unit}, a factor of "
-            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+            f"{angle_to_rate_integral_ratio_text}: {angle_column_name} is in {fitting_unit}, a factor of "
+            f"{KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
         )
     if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
-        unit := nearest_unit(RATE, slope_magnitude, _MAX_UNIT_RATIO)
+        fitting_unit := nearest_unit(RATE, slope_magnitude, _MAX_UNIT_RATIO)
     ):
         return (
-            f"{slope_text}: {rate_column_name} is in {unit}, a factor of "
-            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+            f"{angle_to_rate_integral_ratio_text}: {rate_column_name} is in {fitting_unit}, a factor of "
+            f"{KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
         )
     return (
-        f"{slope_text}: a factor of {slope_magnitude:.4g} on {rate_column_name} fits, or of "
-        f"{1.0 / slope_magnitude:.4g} on {angle_column_name}"
+        f"{angle_to_rate_integral_ratio_text}: a factor of {slope_magnitude:.4g} on {rate_column_name} fits, "
+        f"or of {1.0 / slope_magnitude:.4g} on {angle_column_name}"
     )
 
 
@@ -301,7 +332,7 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
     max_pitch = float(np.nanmax(np.abs(pitch_column.values), initial=0.0))
     if max_pitch <= _MAX_PITCH_RAD:
         return None
-    unit = next(
+    fitting_unit = next(
         (
             candidate_unit
             for candidate_unit in ("deg", "cdeg")
@@ -310,8 +341,8 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
         None,
     )
     fitting_unit_text = (
-        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
-        if unit
+        f"it is in {fitting_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
+        if fitting_unit
         else "no unit fits"
     )
     return (
@@ -324,22 +355,26 @@ def gravity_remark(z_acceleration_column: Column, column_name: str) -> str | Non
     """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
     is."""
     finite_accelerations = z_acceleration_column.values[np.isfinite(z_acceleration_column.values)]
-    median_magnitude_mps2 = (
+    median_of_magnitudes_mps2 = (
         float(np.median(np.abs(finite_accelerations))) if finite_accelerations.size else 0.0
     )
-    if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_magnitude_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
+    if (
+        _PLAUSIBLE_GRAVITY_RANGE_G[0]
+        < median_of_magnitudes_mps2 / _GRAVITY_MPS2
+        < _PLAUSIBLE_GRAVITY_RANGE_G[1]
+    ):
         return None
-    unit = (
-        nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_magnitude_mps2, 2.0)
-        if median_magnitude_mps2 > 0.0
+    fitting_unit = (
+        nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_of_magnitudes_mps2, 2.0)
+        if median_of_magnitudes_mps2 > 0.0
         else None
     )
     fitting_unit_text = (
-        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
-        if unit
+        f"it is in {fitting_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
+        if fitting_unit
         else "no unit fits: is 1 g in it?"
     )
     return (
-        f"{column_name}: is {median_magnitude_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
+        f"{column_name}: is {median_of_magnitudes_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
         f"{_GRAVITY_MPS2:.4g}: {fitting_unit_text}"
     )

@@ -64,15 +64,23 @@ def _simulate_rows(
 ) -> Iterator[list[float]]:
     """Row by row: time, rates in deg/s, commands, attitude."""
     dt_s = 1.0 / SAMPLE_RATE_HZ
-    rates, turbulence_rad_s2, attitude, demanded_attitude = np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2)
+    rates, turbulence_rad_s2, roll_and_pitch_rad, demanded_roll_and_pitch_rad = (
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(2),
+        np.zeros(2),
+    )
     for k in range(round(duration_s * SAMPLE_RATE_HZ)):
         t_s = k * dt_s
         if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:
-            demanded_attitude = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
-        roll_and_pitch_command = _control_law(attitude, rates, demanded_attitude)
+            demanded_roll_and_pitch_rad = rng.uniform(-1.0, 1.0, 2) * [
+                _ROLL_AMPLITUDE_RAD,
+                _PITCH_AMPLITUDE_RAD,
+            ]
+        roll_and_pitch_command = _control_law(roll_and_pitch_rad, rates, demanded_roll_and_pitch_rad)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
-        yield [1000.0 * t_s, *measured_rates_deg_s, *roll_and_pitch_command, *attitude]
-        effective_elevon_positions = (
+        yield [1000.0 * t_s, *measured_rates_deg_s, *roll_and_pitch_command, *roll_and_pitch_rad]
+        effective_right_and_left_positions = (
             np.array([roll_and_pitch_command.sum(), roll_and_pitch_command[0] - roll_and_pitch_command[1]])
             / 2.0
             * [1.0, left_effectiveness(t_s)]
@@ -82,21 +90,21 @@ def _simulate_rows(
         ) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
         rates = rates + dt_s * (
             _DAMPING_PER_S @ rates
-            + effective_elevon_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
+            + effective_right_and_left_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
             + turbulence_rad_s2
         )
-        attitude = attitude + dt_s * _euler_rates(rates, attitude)
+        roll_and_pitch_rad = roll_and_pitch_rad + dt_s * _euler_rates(rates, roll_and_pitch_rad)
 
 
-def _control_law(attitude: Floats, rates: Floats, demanded_attitude: Floats) -> Floats:
+def _control_law(roll_and_pitch_rad: Floats, rates: Floats, demanded_roll_and_pitch_rad: Floats) -> Floats:
     """Roll and pitch command."""
-    return np.clip(1.2 * (demanded_attitude - attitude) - 0.15 * rates[:2], -1.0, 1.0)
+    return np.clip(1.2 * (demanded_roll_and_pitch_rad - roll_and_pitch_rad) - 0.15 * rates[:2], -1.0, 1.0)
 
 
-def _euler_rates(rates: Floats, attitude: Floats) -> Floats:
+def _euler_rates(rates: Floats, roll_and_pitch_rad: Floats) -> Floats:
     """Rates of the roll and the pitch angle."""
     p, q, r = rates
-    phi, theta = attitude
+    phi, theta = roll_and_pitch_rad
     return np.array([
         p + np.tan(theta) * (q * np.sin(phi) + r * np.cos(phi)),
         q * np.cos(phi) - r * np.sin(phi),

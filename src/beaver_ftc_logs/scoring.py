@@ -87,7 +87,7 @@ def score_against_failures(
     delay delay_s."""
     first_failure_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
-    failed_surfaces = sorted(
+    first_failed_surfaces = sorted(
         {
             failure.surface
             for failure in failures
@@ -99,7 +99,7 @@ def score_against_failures(
     detected = bool(alarm_rows_after_failure.size)
     name_shares = _name_shares_after_failure(diagnosis_rows, alarm_rows_after_failure)
     return {
-        "failure": "+".join(failed_surfaces) or None,
+        "failure": "+".join(first_failed_surfaces) or None,
         "failure_s": onset.at_s,
         "healthy_s": float(diagnosis_rows.t_s[is_before_failure][-1] - diagnosis_rows.t_s[0])
         if is_before_failure.any()
@@ -110,7 +110,7 @@ def score_against_failures(
         if detected
         else None,
         "named": name_shares,
-        "right_group": _is_right_group(name_shares, failed_surfaces, groups),
+        "right_group": _is_right_group(name_shares, first_failed_surfaces, groups),
     }
 
 
@@ -132,12 +132,12 @@ def _is_right_group(
 ) -> bool | None:
     """Whether the most frequent name after the failure is a group that failed; None without a failure or
     name."""
-    name_endings = tuple(f"_{surface}" for surface in failed_surfaces)
+    failed_surface_suffixes = tuple(f"_{surface}" for surface in failed_surfaces)
     failed_group_indices = {
         group_index
         for group_index, group in enumerate(groups)
         for name in group
-        if name in failed_surfaces or name.endswith(name_endings)
+        if name in failed_surfaces or name.endswith(failed_surface_suffixes)
     }
     share_of_known_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
     if not failed_group_indices or not share_of_known_name:

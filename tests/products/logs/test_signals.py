@@ -107,7 +107,7 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     if pitch is not None:
         assert found.slope == pytest.approx(1.0 / rate, rel=2e-3)
         assert abs(found.correlation) > 0.9999
-    said = physics.angle_rate_remark(found, "p", "roll")
+    said = physics.angle_rate_factor_remark(found, "p", "roll")
     assert (said is None) if says is None else (says in said)
 
 
@@ -122,7 +122,7 @@ def test_of_a_short_log_more_is_needed(seconds, rate, says):
     t_s = T_S[kept]
     columns = [Column(t_s, rate * one[kept]) for one in rates]
     found = physics.fit_roll_angle_to_rates(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
-    assert (found is not None and physics.angle_rate_remark(found, "p", "roll") is not None) is says
+    assert (found is not None and physics.angle_rate_factor_remark(found, "p", "roll") is not None) is says
 
 
 def test_nothing_is_said_of_a_roll_that_does_not_move():

@@ -41,7 +41,7 @@ from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircr
 from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
 from beaver_ftc_logs.identification import identify, scale_by_dynamic_pressure_if_better
 from beaver_ftc_logs.model import Model, model_file_text
-from beaver_ftc_logs.samples import load_flights_for_fit, read_for_vehicle, resample
+from beaver_ftc_logs.samples import load_flights_for_fit, read_columns_of_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 Document = dict[str, Any]
@@ -168,7 +168,7 @@ def by_aircraft(log: Log, of: Campaign) -> Said:
     """As `diagnose --aircraft`."""
     vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
     told = load_aircraft_and_declared_errors(of.aircraft, str(log.folder / "scenario.yaml"))
-    _, rows, verdict = diagnose_with_aircraft_model(read_for_vehicle(log.path, vehicle), vehicle, told)
+    _, rows, verdict = diagnose_with_aircraft_model(read_columns_of_vehicle(log.path, vehicle), vehicle, told)
     return rows, verdict["isolated"]
 
 
@@ -223,7 +223,7 @@ def told(log: Log, noise: dict[bool, Whitener]) -> bool:
 
 def by_model(log: Log, model: Model) -> Said:
     """As `diagnose --model`."""
-    rows = diagnose(resample(read_for_vehicle(log.path, model.vehicle), model.vehicle), model)
+    rows = diagnose(resample(read_columns_of_vehicle(log.path, model.vehicle), model.vehicle), model)
     names, count = np.unique(rows.isolated_surfaces[rows.faulty == 1].astype(str), return_counts=True)
     return rows, str(names[count.argmax()]) if len(names) else None
 

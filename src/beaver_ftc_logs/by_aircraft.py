@@ -184,7 +184,9 @@ def _check_command_signs(
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
     for surface, gain_upper_bound in zip(
         aircraft.surfaces,
-        np.min([replayed.command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0),
+        np.min(
+            [replayed.relative_command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
+        ),
         strict=True,
     ):
         if gain_upper_bound < trust.MAX_REVERSED_GAIN:
@@ -338,8 +340,8 @@ def _join_stretch_verdicts(
     verdicts = [Verdict()] * n_samples
     effectiveness_low = np.zeros((n_samples, n_surfaces))
     effectiveness_high = np.ones((n_samples, n_surfaces))
-    command_gain_upper_bounds = np.min(
-        [replayed.command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
+    relative_command_gain_upper_bounds = np.min(
+        [replayed.relative_command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
     )
     for (begin, end), replayed in zip(gap_free_stretches, replayed_verdicts_by_stretch, strict=True):
         verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
@@ -347,7 +349,9 @@ def _join_stretch_verdicts(
             replayed.single_fault_effectiveness_low,
             replayed.single_fault_effectiveness_high,
         )
-    return ReplayedVerdicts(verdicts, effectiveness_low, effectiveness_high, command_gain_upper_bounds)
+    return ReplayedVerdicts(
+        verdicts, effectiveness_low, effectiveness_high, relative_command_gain_upper_bounds
+    )
 
 
 def _undiagnosable_rows_by_reason(

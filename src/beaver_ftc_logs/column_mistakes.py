@@ -61,7 +61,7 @@ def logs_with_one_mistake_corrected(
             {},
         )
         yield CorrectedLog(f"{first_rate_name} and {second_rate_name} exchanged", exchanged_samples)
-    for name in [*rate_column_names, *vehicle.signal_columns]:
+    for name in [*rate_column_names, *vehicle.signal_column_names]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
             log_jacobian = float(np.log(abs(factor))) if name in rate_column_names else 0.0

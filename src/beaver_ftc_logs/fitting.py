@@ -196,10 +196,10 @@ def _with_covariance_inflation(
 def _fold_models_and_held_out_flights(
     usable_flights: Sequence[FlightWithUsableRows],
     model: Model,
-    effect_share_explained_by_others: list[float],
+    effect_share_explained_by_other_regressors: list[float],
 ) -> Iterator[tuple[Model, Sequence[FlightWithUsableRows]]]:
     """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
-    held-out flights. effect_share_explained_by_others: of all flights, as in `FittedRanges`."""
+    held-out flights. effect_share_explained_by_other_regressors: of all flights, as in `FittedRanges`."""
     for fitted_flights, held_out_flights in _fitted_and_held_out_by_split(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         rate_regression = fit_least_squares_of_order(
@@ -207,7 +207,10 @@ def _fold_models_and_held_out_flights(
         )
         gain_standard_errors = group_gain_standard_error(rate_regression, model).tolist()
         fitted_ranges = FittedRanges(
-            commands=[], rates=[], gain_sd=gain_standard_errors, tied=effect_share_explained_by_others
+            commands=[],
+            rates=[],
+            gain_sd=gain_standard_errors,
+            tied=effect_share_explained_by_other_regressors,
         )
         yield fold_model.model_copy(update={"fitted_ranges": fitted_ranges}), held_out_flights
 
@@ -510,7 +513,7 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
         usable_flights,
         model,
-        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
+        trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
         group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
@@ -539,7 +542,7 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
         usable_flights,
         model,
-        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
+        trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
         group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         prior_gain_covariance: Floats = np.asarray(
@@ -751,7 +754,7 @@ def add_fitted_ranges_and_alarm_threshold(
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
         usable_flights,
         model,
-        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
+        trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
         for held_out in held_out_flights:
             held_out_max_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
@@ -858,7 +861,7 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
             unmodelled_variance_share,
             1.0 - float(np.exp(log_determinant_ratio / 3.0)) - variance_share_explained_by_chance,
         )
-    unexplained_effect_power = trust.effect_power_unexplained_by_others(
+    unexplained_effect_power = trust.effect_power_unexplained_by_other_regressors(
         [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights], model
     )
     return np.minimum(
@@ -1068,7 +1071,7 @@ def gain_standard_error_by_column(
     )
     noise_sd = np.sqrt(np.diag(rate_regression.residual_covariance))
     standard_error_by_rate_or_signal = {}
-    for name, (past_rows, coefficients) in trust.coefficients_by_column_without_own_axis(model).items():
+    for name, (past_rows, coefficients) in trust.rows_and_coefficients_without_own_axis(model).items():
         coefficient_rows = [1 + row for row in past_rows]
         coefficients_over_standard_errors = coefficients / np.maximum(
             rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd

@@ -18,9 +18,9 @@ from beaver_ftc_logs.regression import (
     variance_inflation_factors,
 )
 from beaver_ftc_logs.samples import (
-    ADDED_GYRO_NOISE_LEVELS_RAD_S,
-    ADDED_NOISE_MA_COEFFICIENTS,
     NOISE_MA_CANDIDATES,
+    UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S,
+    UNFITTED_NOISE_MA_CANDIDATES,
     Samples,
     whiten_samples,
     with_airspeed_effects,
@@ -79,7 +79,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
         (np.array(noise_model.residual_covariance) for noise_model in model.noise_models), key=np.linalg.det
     )
     noise_models = list(model.noise_models)
-    for ma_coefficients in ADDED_NOISE_MA_COEFFICIENTS:
+    for ma_coefficients in UNFITTED_NOISE_MA_CANDIDATES:
         if ma_coefficients not in known_ma_coefficients:
             usable_whitened_flights = fitting.flights_with_usable_rows(
                 [whiten_samples(flight, ma_coefficients) for flight in flights]
@@ -97,7 +97,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                     wider=max_covariance_inflation,
                 )
             )
-    for gyro_noise_rad_s in ADDED_GYRO_NOISE_LEVELS_RAD_S:
+    for gyro_noise_rad_s in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
         ar_coefficients, residual_covariance = gyro_noise.residual_predictor_by_yule_walker(
             model, quietest_covariance, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
         )

@@ -194,7 +194,7 @@ class FittedRanges(Section):
     group_command_correlation: CoefficientMatrix = Field(
         default=[], description="correlation of the groups' commands", alias="correlation"
     )
-    effect_share_explained_by_others: CoefficientRow = Field(
+    effect_share_explained_by_other_regressors: CoefficientRow = Field(
         default=[],
         description="share of each group's effect that past, signals and other groups make up",
         alias="tied",
@@ -363,7 +363,7 @@ class Model(Section):
                 ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
                 ("spread", fitted_ranges.rate_sd_rad_s, (3,)),
                 ("correlation", fitted_ranges.group_command_correlation, (n_groups, n_groups)),
-                ("tied", fitted_ranges.effect_share_explained_by_others, (n_groups,)),
+                ("tied", fitted_ranges.effect_share_explained_by_other_regressors, (n_groups,)),
                 ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
             ]  # fmt: skip
             arrays_and_expected_shapes += [

@@ -70,7 +70,7 @@ def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
 
 
 @contextmanager
-def refuse_log_unreadable_by_package(
+def package_errors_as_bad_input(
     path: Path, log_kind: str, package: str, allowed_file_text: str
 ) -> Iterator[None]:
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
@@ -93,7 +93,9 @@ def refuse_log_unreadable_by_package(
         ) from None
 
 
-def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tuple[dict[str, Column], float]:
+def columns_and_time_origin(
+    topics: dict[str, dict[str, Any]], stamp_field: str
+) -> tuple[dict[str, Column], float]:
     """The fields of all topics as columns `topic.field`, and the first stamp, from which time counts, s.
 
     topics: each topic's fields by name, one of them the stamps in us.

@@ -19,39 +19,39 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
-_GRAM_REGULARIZATION = 1e-10
+_GRAM_EIGENVALUE_FLOOR = 1e-10
 _RANK_TOLERANCE = 1e-12
-_N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_MARGIN_STANDARD_ERRORS = 4, 60, 4.0
+_N_PARTS_FOR_BOUNDS, _MIN_PART_ROWS_FOR_BOUNDS, BOUND_MARGIN_STANDARD_ERRORS = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
 
 
 def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
     """Surfaces by what excites them: those in one group get proportional commands."""
     mixer_rows = mixer_matrix(vehicle)
-    groups: list[list[int]] = []
+    groups_of_surface_indices: list[list[int]] = []
     for i, mixer_row in enumerate(mixer_rows):
-        for group in groups:
-            first_mixer_row_of_group = mixer_rows[group[0]]
+        for surface_indices in groups_of_surface_indices:
+            first_mixer_row_of_group = mixer_rows[surface_indices[0]]
             if (mixer_row @ first_mixer_row_of_group) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (
                 mixer_row @ mixer_row
             ) * (first_mixer_row_of_group @ first_mixer_row_of_group):
-                group.append(i)
+                surface_indices.append(i)
                 break
         else:
-            groups.append([i])
-    return groups
+            groups_of_surface_indices.append([i])
+    return groups_of_surface_indices
 
 
 def build_regressors(
     samples: Samples,
-    surface_groups: list[list[int]],
+    groups_of_surface_indices: list[list[int]],
     n_rate_lags: int,
     n_command_lags: int,
     scales_by_labels: bool,
     n_signal_lags: int = 1,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of surface_groups at
-    lags 1 to L, and whether all of it is known and no gap lies within, (n,).
+    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of
+    groups_of_surface_indices at lags 1 to L, and whether all of it is known and no gap lies within, (n,).
 
     scales_by_labels: multiply each surface's command by its labelled effectiveness (1 where there is no
     label). n_signal_lags: past samples f of the signals.
@@ -60,7 +60,7 @@ def build_regressors(
     if scales_by_labels:
         surface_commands = surface_commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     group_commands = np.column_stack(
-        [surface_commands[:, surface_indices].sum(axis=1) for surface_indices in surface_groups]
+        [surface_commands[:, surface_indices].sum(axis=1) for surface_indices in groups_of_surface_indices]
     )
     lagged_rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, n_rate_lags + 1)]
     past_regressors = np.column_stack(
@@ -192,22 +192,29 @@ def least_squares(
     gets 0.
     """
     regressor_rms = np.sqrt((regressors**2).mean(axis=0))
-    regressor_scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
-    scaled_regressors = regressors / regressor_scale
-    scaled_inverse_gram: Floats = np.asarray(
-        np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_GRAM_REGULARIZATION), dtype=np.float64
+    regressor_divisor_or_inf = np.where(
+        regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf
     )
-    scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ rates)
+    scaled_regressors = regressors / regressor_divisor_or_inf
+    scaled_gram_pseudoinverse: Floats = np.asarray(
+        np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_GRAM_EIGENVALUE_FLOOR),
+        dtype=np.float64,
+    )
+    scaled_coefficients = scaled_gram_pseudoinverse @ (scaled_regressors.T @ rates)
     residuals = rates - scaled_regressors @ scaled_coefficients
     degrees_of_freedom = max(len(rates) - regressors.shape[1], 1)
     residual_covariance = residuals.T @ residuals / degrees_of_freedom
     scaled_standard_errors_if_white = np.sqrt(
-        np.maximum(np.outer(np.diag(scaled_inverse_gram), np.diag(residual_covariance)), 0.0)
+        np.maximum(np.outer(np.diag(scaled_gram_pseudoinverse), np.diag(residual_covariance)), 0.0)
     )
     scaled_newey_west_standard_errors = np.column_stack(
         [
             _newey_west_standard_errors(
-                scaled_regressors, residuals[:, axis], scaled_inverse_gram, stretch_number, newey_west_max_lag
+                scaled_regressors,
+                residuals[:, axis],
+                scaled_gram_pseudoinverse,
+                stretch_number,
+                newey_west_max_lag,
             )
             for axis in range(rates.shape[1])
         ]
@@ -218,18 +225,18 @@ def least_squares(
         out=np.ones_like(scaled_newey_west_standard_errors),
         where=scaled_standard_errors_if_white > 0,
     )
-    root_of_inverse_gram_diagonal = np.sqrt(np.maximum(np.diag(scaled_inverse_gram), MIN_DIVISOR))
+    root_of_pseudoinverse_diagonal = np.sqrt(np.maximum(np.diag(scaled_gram_pseudoinverse), MIN_DIVISOR))
     return RateRegression(
-        scaled_coefficients / regressor_scale[:, None], residual_covariance,
-        scaled_newey_west_standard_errors / regressor_scale[:, None], standard_error_inflation,
-        scaled_inverse_gram / np.outer(root_of_inverse_gram_diagonal, root_of_inverse_gram_diagonal),
+        scaled_coefficients / regressor_divisor_or_inf[:, None], residual_covariance,
+        scaled_newey_west_standard_errors / regressor_divisor_or_inf[:, None], standard_error_inflation,
+        scaled_gram_pseudoinverse / np.outer(root_of_pseudoinverse_diagonal, root_of_pseudoinverse_diagonal),
     )  # fmt: skip
 
 
 def _newey_west_standard_errors(
     scaled_regressors: Floats,
     residual: Floats,
-    scaled_inverse_gram: Floats,
+    scaled_gram_pseudoinverse: Floats,
     stretch_number: NDArray[np.int64],
     max_lag: int,
 ) -> Floats:
@@ -243,10 +250,12 @@ def _newey_west_standard_errors(
         )
         window_sums = cumulated_scores[bartlett_width:] - cumulated_scores[:-bartlett_width]
         score_covariance += window_sums.T @ window_sums / bartlett_width
-    return np.sqrt(np.maximum(np.diag(scaled_inverse_gram @ score_covariance @ scaled_inverse_gram), 0.0))
+    return np.sqrt(
+        np.maximum(np.diag(scaled_gram_pseudoinverse @ score_covariance @ scaled_gram_pseudoinverse), 0.0)
+    )
 
 
-def coefficient_upper_bounds(
+def coefficient_upper_bounds_and_squared_residuals(
     regressors: Floats, outputs: Floats, effective_sample_share: float
 ) -> tuple[Floats, Floats]:
     """Least squares of outputs (n,) on regressors (n, m): what each coefficient surely does not exceed, (m,),
@@ -256,22 +265,24 @@ def coefficient_upper_bounds(
     scaled_regressors = regressors / regressor_rms
     scaled_inverse_gram = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
-        + _GRAM_REGULARIZATION * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
+        + _GRAM_EIGENVALUE_FLOOR * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
     scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ outputs)
-    squared_residuals = (outputs - scaled_regressors @ scaled_coefficients) ** 2
+    squared_residual_by_row = (outputs - scaled_regressors @ scaled_coefficients) ** 2
     scaled_standard_errors = np.sqrt(
-        np.maximum(np.diag(scaled_inverse_gram), 0.0) * squared_residuals.mean() / effective_sample_share
+        np.maximum(np.diag(scaled_inverse_gram), 0.0)
+        * squared_residual_by_row.mean()
+        / effective_sample_share
     )
     return (
         scaled_coefficients + BOUND_MARGIN_STANDARD_ERRORS * scaled_standard_errors
-    ) / regressor_rms, squared_residuals
+    ) / regressor_rms, squared_residual_by_row
 
 
-def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
+def split_into_parts_for_bounds(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
     """The rows of a flight in its parts; None where one is too short."""
-    parts = np.array_split(rows, _N_FLIGHT_PARTS)
-    return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
+    parts = np.array_split(rows, _N_PARTS_FOR_BOUNDS)
+    return parts if min(map(len, parts)) >= _MIN_PART_ROWS_FOR_BOUNDS else None
 
 
 def variance_inflation_factors(regressors: Floats) -> Floats:

@@ -34,16 +34,18 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    input_column_names = [*stepped.log_input_column_names(aircraft), ["altitude_m"]]
-    log_columns = _read_columns(path, ["t_s", *chain.from_iterable(input_column_names)])
+    column_names_of_each_input = [*stepped.log_input_column_names(aircraft), ["altitude_m"]]
+    log_columns = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
-    input_arrays = [np.column_stack([log_columns[name] for name in names]) for names in input_column_names]
-    replayed = stepped.replay_samples(diagnosis, input_arrays, scenario.rate_hz)
+    ordered_input_arrays = [
+        np.column_stack([log_columns[name] for name in names]) for names in column_names_of_each_input
+    ]
+    replayed_verdicts = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
     diagnosis_rows = stepped.diagnosis_rows_from_replay(
-        log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi
+        log_columns["t_s"], replayed_verdicts, aircraft.surfaces, scenario.fdi
     )
     return diagnosis_columns(diagnosis_rows, aircraft.surfaces), _replay_verdict(
-        path, scenario, log_columns, replayed.verdicts
+        path, scenario, log_columns, replayed_verdicts.verdicts
     )
 
 

@@ -35,8 +35,8 @@ NOISE_MA_CANDIDATES = (
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
-ADDED_NOISE_MA_COEFFICIENTS = NOISE_MA_CANDIDATES[:2]
-ADDED_GYRO_NOISE_LEVELS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
+UNFITTED_NOISE_MA_CANDIDATES = NOISE_MA_CANDIDATES[:2]
+UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
 """Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a
 laboratory's to a toy's, so close together that none is 1.8 times off."""
 _MIN_GAP_STEPS = 3.5
@@ -52,12 +52,12 @@ class Samples:
     makes it, in shares of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown.
     stretch_number (n,): number of the gap-free stretch. mean_age_s_by_held_column: mean age of the values of
     each column that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading.
-    airspeed (n,) m/s, nan where unknown. time_since_change_s: for how long each column of rates, commands and
-    signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy
-    height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the
-    noise by which rates, commands and signals are whitened, empty if they are not. fit_weight of each sample
-    in a fit. n_log_parts: number of parts in which the log was read; if several, the samples are chosen
-    stretches.
+    airspeed (n,) m/s, nan where unknown. time_since_change_s_by_column: for how long each column of rates,
+    commands and signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of
+    the energy height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving
+    average of the noise by which rates, commands and signals are whitened, empty if they are not. fit_weight
+    of each sample in a fit. n_log_parts: number of parts in which the log was read; if several, the samples
+    are chosen stretches.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Samples:
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
-    time_since_change_s: Mapping[str, Floats] = field(default_factory=dict)
+    time_since_change_s_by_column: Mapping[str, Floats] = field(default_factory=dict)
     is_rate_clipped: NDArray[np.bool_] | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
@@ -91,13 +91,15 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
     rate_column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
     used_column_names = list(
-        dict.fromkeys([*rate_column_names, *vehicle.command_columns, *vehicle.signal_columns])
+        dict.fromkeys([*rate_column_names, *vehicle.command_column_names, *vehicle.signal_column_names])
     )
     recording = convert_to_si(recording, vehicle)
-    _check_columns(recording, used_column_names, rate_column_names=rate_column_names)
+    _refuse_missing_or_implausible_columns(recording, used_column_names, rate_column_names=rate_column_names)
     _check_rates_attitude_and_gravity(recording, vehicle)
     log_stamps_s = recording.columns[rate_column_names[0]].t_s
-    t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
+    t_s, stretch_number, step_s = _check_stamps_and_make_time_base(
+        recording.name, log_stamps_s, vehicle.max_sample_rate_hz
+    )
     values_and_mean_age_by_column = {
         name: values_and_mean_age_at(recording.columns[name], t_s, step_s) for name in used_column_names
     }
@@ -119,8 +121,8 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         name=recording.name,
         t_s=t_s,
         rates=stacked_columns(rate_column_names),
-        commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_columns), mixer_matrix(vehicle)),
-        signals=stacked_columns(vehicle.signal_columns),
+        commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_column_names), mixer_matrix(vehicle)),
+        signals=stacked_columns(vehicle.signal_column_names),
         labels=_labelled_effectiveness_by_surface(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
@@ -136,8 +138,8 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
             *dict.fromkeys(_used_column_defect_texts(recording, used_column_names, rate_column_names)),
         ),
         airspeed=_sampled_airspeed(recording, vehicle, t_s, step_s),
-        time_since_change_s={
-            name: _time_since_change_s(recording.columns[name], t_s) for name in used_column_names
+        time_since_change_s_by_column={
+            name: _time_since_column_change_s(recording.columns[name], t_s) for name in used_column_names
         },
         is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_column_names], t_s),
         energy_height_rate_mps=_sampled_energy_height_rate_mps(
@@ -162,10 +164,10 @@ def with_airspeed_effects(
     dynamic_pressure_ratio = np.clip(
         np.nan_to_num(airspeed / reference_airspeed_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
     )[:, None]
-    products_with_airspeed_deviation = np.column_stack([samples.rates, samples.signals]) * (
+    rate_and_signal_airspeed_products = np.column_stack([samples.rates, samples.signals]) * (
         np.sqrt(dynamic_pressure_ratio) - 1.0
     )
-    signals_and_products = np.column_stack([samples.signals, products_with_airspeed_deviation])
+    signals_and_products = np.column_stack([samples.signals, rate_and_signal_airspeed_products])
     return replace(
         samples,
         commands=samples.commands * dynamic_pressure_ratio ** (0.5 * np.array(airspeed_powers)),
@@ -194,13 +196,13 @@ def whiten_samples(
             joined_values[run_begin:run_end] - first_values,
             axis=0,
         )
-    whitened_rates, whitened_commands, whitened_signals = np.split(
+    whitened_rates, whitened_surface_commands, whitened_signals = np.split(
         joined_values, np.cumsum([array.shape[1] for array in arrays])[:2], axis=1
     )
     return replace(
         samples,
         rates=whitened_rates,
-        commands=whitened_commands,
+        commands=whitened_surface_commands,
         signals=whitened_signals,
         noise_ma_coefficients=tuple(noise_ma_coefficients),
         fit_weight=fit_weight,
@@ -226,7 +228,7 @@ def _used_column_defect_texts(
             )
 
 
-def _time_since_change_s(column: Column, t_s: Floats) -> Floats:
+def _time_since_column_change_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
     column = _column_of_finite_rows(column)
@@ -266,15 +268,15 @@ def _sampled_energy_height_rate_mps(
 ) -> Floats | None:
     """As in Samples; times_stretches_and_step: of the samples."""
     energy_quantities = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    energy_columns = [
+    logged_energy_columns = [
         recording.columns[quantity.column]
         for quantity in energy_quantities
         if quantity.column in recording.columns
     ]
-    if len(energy_columns) < 2 or not all(len(column.t_s) > 1 for column in energy_columns):
+    if len(logged_energy_columns) < 2 or not all(len(column.t_s) > 1 for column in logged_energy_columns):
         return None
     t_s, stretch_number, step_s = times_stretches_and_step
-    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in energy_columns)
+    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in logged_energy_columns)
     return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
@@ -289,9 +291,9 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
             for quantity in angle_quantities
         ]
         possible_rate_column_names = [
-            *vehicle.signal_columns,
+            *vehicle.signal_column_names,
             *(quantity.column for quantity in vehicle.flow.values()),
-            *vehicle.command_columns,
+            *vehicle.command_column_names,
         ]
         possible_rate_columns = {
             name: columns[name] for name in dict.fromkeys(possible_rate_column_names) if name in columns
@@ -322,13 +324,13 @@ def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight
 def mixer_matrix(vehicle: Vehicle) -> Floats:
     """Return the share of each command in each surface, (surfaces, commands)."""
     mixer_rows = [
-        [shares_by_command.get(name, 0.0) for name in vehicle.command_columns]
+        [shares_by_command.get(name, 0.0) for name in vehicle.command_column_names]
         for shares_by_command in vehicle.surfaces.values()
     ]
     return np.array(mixer_rows, dtype=float)
 
 
-def _check_columns(
+def _refuse_missing_or_implausible_columns(
     recording: RecordedFlight, used_column_names: list[str], rate_column_names: list[str]
 ) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
@@ -363,7 +365,7 @@ def _check_columns(
             )
 
 
-def _time_base(
+def _check_stamps_and_make_time_base(
     flight_name: str, stamps: Floats, max_rate_hz: float
 ) -> tuple[Floats, NDArray[np.int64], float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
@@ -412,7 +414,8 @@ def _other_time_unit_hint(rate_hz: float) -> str:
 
 
 def _regular_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
-    """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
+    """Samples a step apart over each stretch of the log, from its first stamp on: as
+    `_check_stamps_and_make_time_base`."""
     stretch_begin_rows = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     stretch_last_rows = np.append(stretch_begin_rows[1:], len(stamps)) - 1
     n_samples_of_stretch = np.ceil(
@@ -435,13 +438,13 @@ def values_and_mean_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None
     return (
-        _averaged_values(column, t_s, step_s)
+        _interval_means_and_mean_age(column, t_s, step_s)
         if _median_step_s(column.t_s) < 0.6 * step_s
-        else _held_values(column, t_s)
+        else _latest_values_and_mean_age(column, t_s)
     )
 
 
-def _held_values(column: Column, t_s: Floats) -> tuple[Floats, float]:
+def _latest_values_and_mean_age(column: Column, t_s: Floats) -> tuple[Floats, float]:
     """The last value up to each time, nan before the first; and its mean age, s."""
     column = _column_of_finite_rows(column)
     age_s = _held_age_s(column, t_s)
@@ -466,7 +469,7 @@ def _latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
     return np.where(last_rows >= 0, values[np.maximum(last_rows, 0)], np.nan)
 
 
-def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
+def _interval_means_and_mean_age(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
     column = _column_of_finite_rows(column)
     stamps, cumulated_values = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
@@ -474,7 +477,7 @@ def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats
     interval_end_rows = np.searchsorted(stamps, t_s + stamp_tolerance_s, side="right")
     interval_begin_rows = np.searchsorted(stamps, t_s - step_s + stamp_tolerance_s, side="right")
     n_rows_in_interval = interval_end_rows - interval_begin_rows
-    held_values, _ = _held_values(column, t_s)
+    held_values, _ = _latest_values_and_mean_age(column, t_s)
     interval_mean = (
         cumulated_values[interval_end_rows] - cumulated_values[interval_begin_rows]
     ) / np.maximum(n_rows_in_interval, 1)
@@ -499,7 +502,7 @@ def constant_stretches(values: Floats) -> list[tuple[int, int]]:
     return list(pairwise([0, *change_rows.tolist(), len(values)]))
 
 
-def read_for_vehicle(path: Path, vehicle: Vehicle, reader_name: str | None = None) -> RecordedFlight:
+def read_columns_of_vehicle(path: Path, vehicle: Vehicle, reader_name: str | None = None) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
     return read_flight(path, *_reader_arguments(vehicle, reader_name))
@@ -568,11 +571,13 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
         for name in _PER_SAMPLE_FIELDS
         if (values := getattr(samples, name)) is not None
     }
-    time_since_change_s = {name: values[rows].copy() for name, values in samples.time_since_change_s.items()}
+    time_since_change_s_by_column = {
+        name: values[rows].copy() for name, values in samples.time_since_change_s_by_column.items()
+    }
     return replace(
         samples,
         log_stamps_s=selected_fields["t_s"],
-        time_since_change_s=time_since_change_s,
+        time_since_change_s_by_column=time_since_change_s_by_column,
         **selected_fields,
     )
 
@@ -588,9 +593,9 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_log_parts: int) 
     )
     is_stretch_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
     joined_fields["stretch_number"] = np.cumsum(is_stretch_begin)
-    time_since_change_s = {
-        name: np.concatenate([stretch.time_since_change_s[name] for stretch in stretches])
-        for name in stretches[0].time_since_change_s
+    time_since_change_s_by_column = {
+        name: np.concatenate([stretch.time_since_change_s_by_column[name] for stretch in stretches])
+        for name in stretches[0].time_since_change_s_by_column
     }
     long_log_note = (
         f"a long log, read in {n_log_parts} parts: {len(is_stretch_begin)} samples of it, spread evenly, are "
@@ -603,7 +608,7 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_log_parts: int) 
         notes=notes,
         n_log_parts=n_log_parts,
         log_stamps_s=joined_fields["t_s"],
-        time_since_change_s=time_since_change_s,
+        time_since_change_s_by_column=time_since_change_s_by_column,
         **joined_fields,
     )
 
@@ -620,8 +625,8 @@ def load_flights_for_fit(
             flights.append(_read_flight_for_fit(path, vehicle, reader_name))
         except BadInput as error:
             mistakes.append(str(error))
-    for name, n_flights_of_name in Counter(samples.name for samples in flights).items():
-        if n_flights_of_name > 1:
+    for name, n_flights_with_name in Counter(samples.name for samples in flights).items():
+        if n_flights_with_name > 1:
             mistakes.append(f"two flights are named {name}: one result would replace the other")
     if mistakes:
         raise BadInput("\n".join(mistakes))

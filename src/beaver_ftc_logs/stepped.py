@@ -16,7 +16,10 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import coefficient_upper_bounds, split_into_flight_parts
+from beaver_ftc_logs.regression import (
+    coefficient_upper_bounds_and_squared_residuals,
+    split_into_parts_for_bounds,
+)
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 EFFECTIVENESS_BOUND_WINDOW_S = 1.0
@@ -30,13 +33,14 @@ class ReplayedVerdicts:
     """The verdicts of a stretch, one for each sample.
 
     single_fault_effectiveness_low and single_fault_effectiveness_high (n, S): bounds on the effectiveness of
-    each surface if it alone is at fault. command_gain_upper_bounds (S,): upper bound of the measured effect
-    of each command over the expected one, the largest of all parts of the stretch; 1 if it is too short."""
+    each surface if it alone is at fault. relative_command_gain_upper_bounds (S,): upper bound of the
+    measured effect of each command over the expected one, the largest of all parts of the stretch; 1 if it is
+    too short."""
 
     verdicts: list[Verdict]
     single_fault_effectiveness_low: Floats
     single_fault_effectiveness_high: Floats
-    command_gain_upper_bounds: Floats
+    relative_command_gain_upper_bounds: Floats
 
 
 def declared_errors(scenario: Any) -> dict[str, Any]:
@@ -56,62 +60,73 @@ def log_input_column_names(aircraft: Any) -> tuple[list[str], ...]:
     )
 
 
-def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float) -> ReplayedVerdicts:
-    """The verdicts of evenly spaced samples; inputs: as `log_input_column_names`, (n, ...) each."""
+def replay_samples(
+    diagnosis: Diagnosis, ordered_input_arrays: Sequence[Floats], rate_hz: float
+) -> ReplayedVerdicts:
+    """The verdicts of evenly spaced samples; ordered_input_arrays: as
+    `log_input_column_names`, (n, ...) each."""
     verdicts: list[Verdict] = []
-    innovation, innovation_bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
-    expected_effect = np.empty((*innovation.shape, inputs[2].shape[1]))
-    for k, sample_inputs in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
+    innovation, innovation_bound = (
+        np.empty_like(ordered_input_arrays[0]),
+        np.empty_like(ordered_input_arrays[0]),
+    )
+    healthy_surface_effect = np.empty((*innovation.shape, ordered_input_arrays[2].shape[1]))
+    for k, sample_inputs in enumerate(zip(*map(np.ascontiguousarray, ordered_input_arrays), strict=True)):
         verdicts.append(diagnosis.step(*sample_inputs))
-        innovation[k], innovation_bound[k], expected_effect[k] = diagnosis.innovation()
+        innovation[k], innovation_bound[k], healthy_surface_effect[k] = diagnosis.innovation()
     theta_bounds = _bounds_of_explaining_losses(
-        innovation[:, :, None], innovation_bound[:, :, None], expected_effect
+        innovation[:, :, None], innovation_bound[:, :, None], healthy_surface_effect
     )
     theta_bounds[0][0], theta_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
     window_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
     effectiveness_low = 1.0 + _sliding_maximum(theta_bounds[0], window_samples)
     effectiveness_high = 1.0 - _sliding_maximum(-theta_bounds[1], window_samples)
     is_unexplained = effectiveness_low > effectiveness_high
-    command_gain_upper_bounds = _command_gain_upper_bounds(innovation, expected_effect)
+    relative_command_gain_upper_bounds = _relative_command_gain_upper_bounds(
+        innovation, healthy_surface_effect
+    )
     return ReplayedVerdicts(
         verdicts,
         np.where(is_unexplained, 0.0, effectiveness_low),
         np.where(is_unexplained, 1.0, effectiveness_high),
-        command_gain_upper_bounds,
+        relative_command_gain_upper_bounds,
     )
 
 
-def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> Floats:
+def _relative_command_gain_upper_bounds(innovation: Floats, healthy_surface_effect: Floats) -> Floats:
     """The upper bounds (S,) of `ReplayedVerdicts`, from the innovation of the rates (n, 3) and the expected
     effect of each surface (n, 3, S)."""
     finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
-    if (rows_by_part := split_into_flight_parts(finite_rows)) is None:
-        return np.ones(expected_effect.shape[2])
+    if (rows_by_part := split_into_parts_for_bounds(finite_rows)) is None:
+        return np.ones(healthy_surface_effect.shape[2])
     innovation_sd = np.maximum(innovation[finite_rows].std(axis=0), MIN_DIVISOR)
     regressors = np.concatenate(
-        [np.broadcast_to(np.eye(3), (len(expected_effect), 3, 3)), expected_effect / innovation_sd[:, None]],
+        [
+            np.broadcast_to(np.eye(3), (len(healthy_surface_effect), 3, 3)),
+            healthy_surface_effect / innovation_sd[:, None],
+        ],
         axis=2,
     )
     scaled_innovation = innovation / innovation_sd
-    gain_upper_bounds = np.full(expected_effect.shape[2], -np.inf)
+    gain_upper_bounds = np.full(healthy_surface_effect.shape[2], -np.inf)
     for part_rows in rows_by_part:
-        part_upper_bounds, _ = coefficient_upper_bounds(
+        part_coefficient_upper_bounds, _ = coefficient_upper_bounds_and_squared_residuals(
             regressors[part_rows].reshape(3 * len(part_rows), -1),
             scaled_innovation[part_rows].ravel(),
             _EFFECTIVE_SAMPLE_SHARE,
         )
-        gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + part_upper_bounds[3:])
+        gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + part_coefficient_upper_bounds[3:])
     return gain_upper_bounds
 
 
 def _bounds_of_explaining_losses(
-    innovation: Floats, innovation_bound: Floats, expected_effect: Floats
+    innovation: Floats, innovation_bound: Floats, healthy_surface_effect: Floats
 ) -> tuple[Floats, Floats]:
     """Least and greatest theta (n, S) of a loss that explains each frame on every axis; least above greatest
     where none does."""
     innovation_bound = innovation_bound + _BOUND_ROUNDING_RAD_S2
-    has_effect = np.abs(expected_effect) > MIN_DIVISOR
-    nonzero_effect = np.where(has_effect, expected_effect, 1.0)
+    has_effect = np.abs(healthy_surface_effect) > MIN_DIVISOR
+    nonzero_effect = np.where(has_effect, healthy_surface_effect, 1.0)
     interval_ends = np.sort(
         np.stack(
             [
@@ -139,20 +154,23 @@ def _sliding_maximum(values: Floats, window_samples: int) -> Floats:
 
 
 def diagnosis_rows_from_replay(
-    t_s: Floats, replayed: ReplayedVerdicts, surfaces: Sequence[str], fdi_config: Any
+    t_s: Floats, replayed_verdicts: ReplayedVerdicts, surfaces: Sequence[str], fdi_config: Any
 ) -> DiagnosisRows:
     """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""
-    faulty = np.array([verdict.detected for verdict in replayed.verdicts])
-    effectiveness = np.ones_like(replayed.single_fault_effectiveness_low)
-    effectiveness_low = np.zeros_like(replayed.single_fault_effectiveness_low)
-    effectiveness_high = np.ones_like(replayed.single_fault_effectiveness_low)
-    may_bound_effectiveness = fdi_config.is_ours and not fdi_config.pairs
-    for k, verdict in enumerate(replayed.verdicts):
-        if may_bound_effectiveness:
-            _fill_effectiveness_bounds(
+    faulty = np.array([verdict.detected for verdict in replayed_verdicts.verdicts])
+    effectiveness = np.ones_like(replayed_verdicts.single_fault_effectiveness_low)
+    effectiveness_low = np.zeros_like(replayed_verdicts.single_fault_effectiveness_low)
+    effectiveness_high = np.ones_like(replayed_verdicts.single_fault_effectiveness_low)
+    gives_single_fault_verdicts = fdi_config.is_ours and not fdi_config.pairs
+    for k, verdict in enumerate(replayed_verdicts.verdicts):
+        if gives_single_fault_verdicts:
+            _fill_row_effectiveness_bounds(
                 verdict,
                 surfaces,
-                (replayed.single_fault_effectiveness_low[k], replayed.single_fault_effectiveness_high[k]),
+                (
+                    replayed_verdicts.single_fault_effectiveness_low[k],
+                    replayed_verdicts.single_fault_effectiveness_high[k],
+                ),
                 effectiveness_low[k],
                 effectiveness_high[k],
             )
@@ -162,7 +180,7 @@ def diagnosis_rows_from_replay(
                 max(1.0 + float(verdict.estimate), effectiveness_low[k, surface_index]),
                 effectiveness_high[k, surface_index],
             )
-    names = [_isolated_name(verdict, surfaces) for verdict in replayed.verdicts]
+    names = [_isolated_surface_or_unknown(verdict, surfaces) for verdict in replayed_verdicts.verdicts]
     return DiagnosisRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
@@ -174,35 +192,35 @@ def diagnosis_rows_from_replay(
     )
 
 
-def _fill_effectiveness_bounds(
+def _fill_row_effectiveness_bounds(
     verdict: Verdict,
     surfaces: Sequence[str],
-    single_fault_bounds: tuple[Floats, Floats],
+    sample_single_fault_bounds: tuple[Floats, Floats],
     effectiveness_low: Floats,
     effectiveness_high: Floats,
 ) -> None:
     """Fill the bounds effectiveness_low and effectiveness_high (S,) of one row, which are given as 0 and 1.
-    single_fault_bounds: low and high (S,) of `ReplayedVerdicts`."""
+    sample_single_fault_bounds: low and high (S,) of `ReplayedVerdicts`."""
     if not verdict.detected:
-        effectiveness_low[:] = single_fault_bounds[0]
+        effectiveness_low[:] = sample_single_fault_bounds[0]
     elif verdict.isolated in surfaces:
         effectiveness_low[:], surface_index = 1.0, surfaces.index(str(verdict.isolated))
         effectiveness_low[surface_index], effectiveness_high[surface_index] = (
-            (single_fault_bounds[0][surface_index], single_fault_bounds[1][surface_index])
+            (sample_single_fault_bounds[0][surface_index], sample_single_fault_bounds[1][surface_index])
             if verdict.type == LOSS_FAULT_TYPE
             else (0.0, 1.0)
         )
     elif verdict.isolated is None and verdict.candidates and set(verdict.candidates) <= set(surfaces):
         effectiveness_low[:] = 1.0
         for name in verdict.candidates:
-            effectiveness_low[surfaces.index(name)] = single_fault_bounds[0][surfaces.index(name)]
+            effectiveness_low[surfaces.index(name)] = sample_single_fault_bounds[0][surfaces.index(name)]
 
 
 def _is_loss_or_untyped(verdict: Verdict) -> bool:
     return verdict.type in (None, LOSS_FAULT_TYPE)
 
 
-def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:
+def _isolated_surface_or_unknown(verdict: Verdict, surfaces: Sequence[str]) -> str:
     if not verdict.detected:
         return ""
     return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN_SURFACE

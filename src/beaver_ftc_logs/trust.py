@@ -34,7 +34,7 @@ _MAX_UNCHANGED_TIME_FACTOR = 3.0
 _MAX_FALSE_MISTAKE_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _DISTRUST_AFTER_CLIPPING_S = 30.0
-_MIN_EFFECT_NOISE_POWER_RATIO = 1e-6
+_MIN_MOVED_EFFECT_POWER_RATIO = 1e-6
 _MAX_EXPLAINED_SHARE, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR = 10.0, 1.6
@@ -52,11 +52,11 @@ correct logs with faults of any kind none was below 0.98 and 0.87, in light turb
 def compute_fitted_ranges(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]],
     model: Model,
-    gain_standard_error: Floats,
-    max_noise_variance_scale: float,
+    held_out_gain_standard_errors: Floats,
+    held_out_max_noise_variance_scale: float,
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
-    used; gain_standard_error (G,) and max_noise_variance_scale: of parts not fitted."""
+    used; held_out_gain_standard_errors (G,) and held_out_max_noise_variance_scale: of parts not fitted."""
     surface_groups = regression.surface_indices_by_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
@@ -74,10 +74,10 @@ def compute_fitted_ranges(
         airspeed=central_ranges(np.concatenate(used_airspeeds)[:, None])[0] if used_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_correlation_matrix(group_commands).tolist(),
-        tied=effect_share_explained_by_others(flights_with_used_rows, model).tolist(),
-        gain_sd=gain_standard_error.tolist(),
+        tied=effect_share_explained_by_other_regressors(flights_with_used_rows, model).tolist(),
+        gain_sd=held_out_gain_standard_errors.tolist(),
         still_s=_longest_unchanged_time_s_by_column(flights_with_used_rows),
-        scale=max_noise_variance_scale,
+        scale=held_out_max_noise_variance_scale,
         energy_climb=_estimate_unpowered_energy_height_rate_mps(flights_with_used_rows),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights_with_used_rows) / 60.0,
     )
@@ -121,35 +121,37 @@ def _longest_unchanged_time_s_by_column(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]],
 ) -> dict[str, float]:
     column_names = dict.fromkeys(
-        column_name for samples, _ in flights_with_used_rows for column_name in samples.time_since_change_s
+        column_name
+        for samples, _ in flights_with_used_rows
+        for column_name in samples.time_since_change_s_by_column
     )
     return {
         column_name: max(
             (
-                float(flight.time_since_change_s[column_name].max(initial=0.0))
+                float(flight.time_since_change_s_by_column[column_name].max(initial=0.0))
                 for flight, _ in flights_with_used_rows
-                if column_name in flight.time_since_change_s
+                if column_name in flight.time_since_change_s_by_column
             )
         )
         for column_name in column_names
     }
 
 
-def effect_share_explained_by_others(
+def effect_share_explained_by_other_regressors(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
 ) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    effect_power, unexplained_power = _effect_powers(flights_with_used_rows, model)
-    has_moved = effect_power > _MIN_EFFECT_NOISE_POWER_RATIO
-    explained_share = 1.0 - unexplained_power / np.minimum(
+    effect_power, power_unexplained_by_other_regressors = _effect_powers(flights_with_used_rows, model)
+    has_moved = effect_power > _MIN_MOVED_EFFECT_POWER_RATIO
+    share_explained_by_other_regressors = 1.0 - power_unexplained_by_other_regressors / np.minimum(
         np.where(has_moved, effect_power, 1.0), _EFFECT_NOISE_POWER_RATIO_CAP
     )
-    return np.where(has_moved, np.maximum(explained_share, 0.0), 1.0)
+    return np.where(has_moved, np.maximum(share_explained_by_other_regressors, 0.0), 1.0)
 
 
-def effect_power_unexplained_by_others(
+def effect_power_unexplained_by_other_regressors(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
 ) -> Floats:
     """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
@@ -163,41 +165,48 @@ def _effect_powers(
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
     surface_groups = regression.surface_indices_by_group(model)
-    regressor_arguments = (
+    lag_counts_and_label_scaling = (
         model.n_rate_lags,
         model.n_command_lags,
         True,
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
-    regressors_by_flight = [
-        regression.build_regressors(flight, surface_groups, *regressor_arguments)
+    regressors_and_predictability_by_flight = [
+        regression.build_regressors(flight, surface_groups, *lag_counts_and_label_scaling)
         for flight, _ in flights_with_used_rows
     ]
     is_row_used_by_flight = [
         is_used & is_predictable
         for (_, is_used), (_, _, is_predictable) in zip(
-            flights_with_used_rows, regressors_by_flight, strict=True
+            flights_with_used_rows, regressors_and_predictability_by_flight, strict=True
         )
     ]
     past_regressors = np.vstack(
         [
             regressors[0][is_row_used]
-            for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
+            for regressors, is_row_used in zip(
+                regressors_and_predictability_by_flight, is_row_used_by_flight, strict=True
+            )
         ]
     )
-    lagged_commands = np.vstack(
+    lagged_group_commands = np.vstack(
         [
             regressors[1][is_row_used]
-            for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
+            for regressors, is_row_used in zip(
+                regressors_and_predictability_by_flight, is_row_used_by_flight, strict=True
+            )
         ]
     )
     response_coefficients = np.array(model.command_response)
     residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
-    effect_power, unexplained_power = np.zeros(len(surface_groups)), np.zeros(len(surface_groups))
+    effect_power, power_unexplained_by_other_regressors = (
+        np.zeros(len(surface_groups)),
+        np.zeros(len(surface_groups)),
+    )
     for group_index in range(len(surface_groups)):
         other_lagged_commands = [
-            lagged_commands[:, other_group_index]
+            lagged_group_commands[:, other_group_index]
             for other_group_index in range(len(surface_groups))
             if other_group_index != group_index
         ]
@@ -205,26 +214,28 @@ def _effect_powers(
             [np.ones(len(past_regressors)), past_regressors, *other_lagged_commands]
         )
         whitened_effect = (
-            lagged_commands[:, group_index] @ response_coefficients[group_index] @ whitening_matrix
+            lagged_group_commands[:, group_index] @ response_coefficients[group_index] @ whitening_matrix
         )
         whitened_effect = whitened_effect - whitened_effect.mean(axis=0)
         effect_power[group_index] = float((whitened_effect**2).sum()) / len(whitened_effect)
-        if effect_power[group_index] > _MIN_EFFECT_NOISE_POWER_RATIO:
-            unexplained_effect = (
+        if effect_power[group_index] > _MIN_MOVED_EFFECT_POWER_RATIO:
+            effect_unexplained_by_other_regressors = (
                 whitened_effect
                 - other_regressors @ np.linalg.lstsq(other_regressors, whitened_effect, rcond=None)[0]
             )
-            unexplained_power[group_index] = float((unexplained_effect**2).sum()) / len(whitened_effect)
-    return effect_power, unexplained_power
+            power_unexplained_by_other_regressors[group_index] = float(
+                (effect_unexplained_by_other_regressors**2).sum()
+            ) / len(whitened_effect)
+    return effect_power, power_unexplained_by_other_regressors
 
 
 def is_group_effect_known(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
-    if model.fitted_ranges is None or not model.fitted_ranges.effect_share_explained_by_others:
+    if model.fitted_ranges is None or not model.fitted_ranges.effect_share_explained_by_other_regressors:
         return [True] * len(model.groups)
     return [
-        explained_share < _MAX_EXPLAINED_SHARE
-        for explained_share in model.fitted_ranges.effect_share_explained_by_others
+        explained_share_of_group < _MAX_EXPLAINED_SHARE
+        for explained_share_of_group in model.fitted_ranges.effect_share_explained_by_other_regressors
     ]
 
 
@@ -260,15 +271,15 @@ def unknown_effect_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
     if model.fitted_ranges is None:
         return []
-    sentence_start = (
+    sentence_start_template = (
         "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
     )
     return [
-        f"{sentence_start.format('+'.join(group), explained_share)}: its effect cannot be told, "
-        "nothing is said of it"
-        for group, explained_share, group_has_known_effect in zip(
+        f"{sentence_start_template.format('+'.join(group), explained_share_of_group)}: its effect cannot "
+        "be told, nothing is said of it"
+        for group, explained_share_of_group, group_has_known_effect in zip(
             model.groups,
-            model.fitted_ranges.effect_share_explained_by_others,
+            model.fitted_ranges.effect_share_explained_by_other_regressors,
             is_group_effect_known(model),
             strict=False,
         )
@@ -351,9 +362,9 @@ class _GainBoundsOverFlight(NamedTuple):
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
     log likelihood of a sample of each part, (4,), but for what all colours have alike."""
 
-    group_gain_upper_bounds: list[float]
-    group_gain_lower_bounds: list[float]
-    column_gain_upper_bounds: dict[str, float]
+    largest_group_gain_upper_bounds: list[float]
+    smallest_group_gain_lower_bounds: list[float]
+    largest_gain_upper_bound_by_column: dict[str, float]
     min_noise_variance_scale: float
     sample_log_likelihood_by_part: Floats
 
@@ -422,8 +433,8 @@ def _column_mistake_texts(
     for group, has_known_gain, gain_upper_bound, gain_lower_bound in zip(
         model.groups,
         gain_is_known_by_group,
-        gain_bounds.group_gain_upper_bounds,
-        gain_bounds.group_gain_lower_bounds,
+        gain_bounds.largest_group_gain_upper_bounds,
+        gain_bounds.smallest_group_gain_lower_bounds,
         strict=True,
     ):
         group_name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
@@ -439,22 +450,22 @@ def _column_mistake_texts(
             and gain_upper_bound < _MIN_COMMAND_GAIN
             and relative_motion > _MAX_ALIKE_MOTION_FACTOR
         ):
-            effect_text = f"does at most {gain_upper_bound:.2g} of what it did"
+            effect_size_text = f"does at most {gain_upper_bound:.2g} of what it did"
             mistakes[f"unit {group_name}"] = (
-                f"{command_text} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
+                f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
             )
         elif (
             has_known_gain
             and gain_lower_bound > 1.0 / _MIN_COMMAND_GAIN
             and 0.0 < relative_motion < 1.0 / _MAX_ALIKE_MOTION_FACTOR
         ):
-            effect_text = f"does at least {gain_lower_bound:.3g} times what it did"
+            effect_size_text = f"does at least {gain_lower_bound:.3g} times what it did"
             mistakes[f"unit {group_name}"] = (
-                f"{command_text} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
+                f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
             )
     if mistaken_columns := [
         column_name
-        for column_name, column_gain_upper_bound in gain_bounds.column_gain_upper_bounds.items()
+        for column_name, column_gain_upper_bound in gain_bounds.largest_gain_upper_bound_by_column.items()
         if column_gain_upper_bound < _min_plausible_column_gain(model, column_name)
     ]:
         mistakes["columns"] = (
@@ -485,13 +496,13 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     more as flights were that the model was not fitted on, whose columns are right, and by as much again for
     another law (`FittedRanges.misread`).
     """
-    sample_log_likelihood_gain_by_correction, n_effective_part_samples = log_likelihood_gain_of_corrections(
-        samples, model
+    min_sample_log_likelihood_gain_by_correction, n_effective_part_samples = (
+        log_likelihood_gain_of_corrections(samples, model)
     )
-    if not sample_log_likelihood_gain_by_correction:
+    if not min_sample_log_likelihood_gain_by_correction:
         return None
     correction_text, max_log_likelihood_gain_per_sample = max(
-        sample_log_likelihood_gain_by_correction.items(), key=lambda one: one[1]
+        min_sample_log_likelihood_gain_by_correction.items(), key=lambda one: one[1]
     )
     allowed_log_likelihood_gain_per_sample = (
         2.0 * model.fitted_ranges.max_column_mistake_log_likelihood_gain
@@ -500,7 +511,7 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     )
     if (
         max_log_likelihood_gain_per_sample * n_effective_part_samples
-        <= np.log(len(sample_log_likelihood_gain_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
+        <= np.log(len(min_sample_log_likelihood_gain_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
         + allowed_log_likelihood_gain_per_sample * n_effective_part_samples
     ):
         return None
@@ -521,12 +532,12 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
     if log_likelihoods_and_sample_count is None:
         return {}, 0.0
     sample_log_likelihood_by_part, n_effective_part_samples = log_likelihoods_and_sample_count
-    sample_log_likelihood_gain_by_correction = {}
+    min_sample_log_likelihood_gain_by_correction = {}
     for log_with_one_mistake_corrected in corrected_logs:
         corrected_log_likelihoods_and_count = _sample_log_likelihood_by_flight_part(
             log_with_one_mistake_corrected.samples, model
         )
-        sample_log_likelihood_gain_by_correction[log_with_one_mistake_corrected.correction_text] = (
+        min_sample_log_likelihood_gain_by_correction[log_with_one_mistake_corrected.correction_text] = (
             -np.inf
             if corrected_log_likelihoods_and_count is None
             else float(
@@ -537,20 +548,22 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
                 ).min()
             )
         )
-    return sample_log_likelihood_gain_by_correction, n_effective_part_samples
+    return min_sample_log_likelihood_gain_by_correction, n_effective_part_samples
 
 
 def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:
     """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
-    whitening_matrix, effective_sample_share, log_noise_sd_product = _flight_noise_whitening(samples, model)
+    whitening_matrix, effective_sample_share, log_noise_sd_product = _whitening_sample_share_and_log_noise(
+        samples, model
+    )
     is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         samples, model
     )
     predictable_rows = np.flatnonzero(is_predictable)
     if (
-        rows_by_part := regression.split_into_flight_parts(
+        rows_by_part := regression.split_into_parts_for_bounds(
             predictable_rows[:: max(len(predictable_rows) // _MAX_COMPARED_SAMPLES, 1)]
         )
     ) is None:
@@ -563,7 +576,9 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
     ]
     noise_variance_scales = [
         _noise_variance_scale(
-            regression.coefficient_upper_bounds(regressors, targets, effective_sample_share)[1]
+            regression.coefficient_upper_bounds_and_squared_residuals(
+                regressors, targets, effective_sample_share
+            )[1]
         )
         for regressors, targets in regressors_and_targets
     ]
@@ -572,13 +587,15 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
     )
 
 
-def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
+def _whitening_sample_share_and_log_noise(samples: Samples, model: Model) -> tuple[Floats, float, float]:
     """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    noise_covariance_inflation = model.covariance_inflation_of_noise_model(samples.noise_ma_coefficients)
+    covariance_inflation_of_fitted_noise = model.covariance_inflation_of_noise_model(
+        samples.noise_ma_coefficients
+    )
     noise_covariance_root = np.linalg.cholesky(
         model.with_covariance_of_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
-        / noise_covariance_inflation
+        / covariance_inflation_of_fitted_noise
     )
     log_noise_sd_product = float(
         np.log(np.diag(noise_covariance_root)).sum()
@@ -586,7 +603,7 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
     )
     return (
         np.linalg.inv(noise_covariance_root).T,
-        model.settings.effective_sample_share / noise_covariance_inflation,
+        model.settings.effective_sample_share / covariance_inflation_of_fitted_noise,
         log_noise_sd_product,
     )
 
@@ -615,44 +632,46 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         samples, model
     )
-    if (rows_by_part := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
+    if (rows_by_part := regression.split_into_parts_for_bounds(np.flatnonzero(is_predictable))) is None:
         return None
     column_contributions, column_names = _column_contributions_to_rates(samples, model)
     column_contributions = regression.subtract_noise_prediction(
         column_contributions, model.residual_ar_coefficients(samples.noise_ma_coefficients)
     )
     (whitening_matrix, effective_sample_share, log_noise_sd_product), n_groups = (
-        _flight_noise_whitening(samples, model),
+        _whitening_sample_share_and_log_noise(samples, model),
         len(model.groups),
     )
     gain_upper_bounds = np.full(n_groups, -np.inf)
     gain_lower_bounds = np.full(n_groups, np.inf)
-    column_gain_upper_bounds = np.full(len(column_names), -np.inf)
+    largest_column_gain_upper_bounds = np.full(len(column_names), -np.inf)
     noise_variance_scales = []
     responses_and_contributions = np.concatenate([group_responses, column_contributions], axis=1)
     for part_rows in rows_by_part:
         regressors, whitened_targets = _trim_and_gain_regression_data(
             part_rows, rates_unexplained_by_past, responses_and_contributions, whitening_matrix
         )
-        part_coefficient_upper_bounds, squared_residuals = regression.coefficient_upper_bounds(
-            regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
+        part_coefficient_upper_bounds, squared_residuals = (
+            regression.coefficient_upper_bounds_and_squared_residuals(
+                regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
+            )
         )
-        negated_part_coefficient_lower_bounds, _ = regression.coefficient_upper_bounds(
+        negated_part_coefficient_lower_bounds, _ = regression.coefficient_upper_bounds_and_squared_residuals(
             -regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
         )
-        part_upper_bounds_with_columns, _ = regression.coefficient_upper_bounds(
+        part_upper_bounds_with_columns, _ = regression.coefficient_upper_bounds_and_squared_residuals(
             regressors, whitened_targets, effective_sample_share
         )
         gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
         gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
-        column_gain_upper_bounds = np.maximum(
-            column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
+        largest_column_gain_upper_bounds = np.maximum(
+            largest_column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
         )  # what the past does is taken off already
         noise_variance_scales.append(_noise_variance_scale(squared_residuals))
     return _GainBoundsOverFlight(
         gain_upper_bounds.tolist(),
         gain_lower_bounds.tolist(),
-        dict(zip(column_names, column_gain_upper_bounds.tolist(), strict=True)),
+        dict(zip(column_names, largest_column_gain_upper_bounds.tolist(), strict=True)),
         min(noise_variance_scales),
         -log_noise_sd_product - 1.5 * np.log(noise_variance_scales),
     )
@@ -676,7 +695,7 @@ def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floa
     past_regressors, _, _ = regression.build_regressors(
         samples, [[0]], model.n_rate_lags, 1, False, n_signal_lags
     )
-    rows_and_coefficients_by_column = coefficients_by_column_without_own_axis(model)
+    rows_and_coefficients_by_column = rows_and_coefficients_without_own_axis(model)
     return np.stack(
         [
             past_regressors[:, rows] @ coefficients
@@ -686,20 +705,23 @@ def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floa
     ), list(rows_and_coefficients_by_column)
 
 
-def coefficients_by_column_without_own_axis(model: Model) -> dict[str, tuple[list[int], Floats]]:
+def rows_and_coefficients_without_own_axis(model: Model) -> dict[str, tuple[list[int], Floats]]:
     """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
     rate on its own axis."""
     rate_column_names = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-    column_of_row = (
+    column_name_of_row = (
         rate_column_names * model.n_rate_lags
         + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(model.n_rate_lags)
     )
-    coefficients, rows_of_column = np.array(model.lagged_rate_and_signal_coefficients), dict[str, list[int]]()
-    for row, name in enumerate(column_of_row):
-        rows_of_column.setdefault(name.removesuffix(" by airspeed"), []).append(row)
+    coefficients, rows_by_column_name = (
+        np.array(model.lagged_rate_and_signal_coefficients),
+        dict[str, list[int]](),
+    )
+    for row, name in enumerate(column_name_of_row):
+        rows_by_column_name.setdefault(name.removesuffix(" by airspeed"), []).append(row)
         if row < 3 * model.n_rate_lags:
             coefficients[row, row % 3] = 0.0
-    return {name: (rows, coefficients[rows]) for name, rows in rows_of_column.items()}
+    return {name: (rows, coefficients[rows]) for name, rows in rows_by_column_name.items()}
 
 
 def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:
@@ -711,7 +733,7 @@ def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mas
     rows_by_reason: dict[str, Mask] = {}
     for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
         rows_by_reason[f"{column_name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
-            samples.time_since_change_s[column_name] > max_unchanged_time_s
+            samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
         )
     if samples.is_rate_clipped is not None:
         rows_by_reason[f"a rate was clipped in the last {_DISTRUST_AFTER_CLIPPING_S:g} s"] = (
@@ -792,43 +814,45 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
     fitted_unchanged_time_s_by_column = (
         model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
     )
-    expected_longest_unchanged_time_s_by_column = {
+    fitted_or_default_unchanged_time_s_by_column = {
         column_name: 0.0 if column_name in _rate_column_names(model) else np.inf
-        for column_name in samples.time_since_change_s
+        for column_name in samples.time_since_change_s_by_column
     } | fitted_unchanged_time_s_by_column
     min_unchanged_time_limit_s_by_column = {
         column_name: MIN_STILL_S / 3.0
         if column_name in fitted_unchanged_time_s_by_column and column_name in _rate_column_names(model)
         else MIN_STILL_S
-        for column_name in expected_longest_unchanged_time_s_by_column
+        for column_name in fitted_or_default_unchanged_time_s_by_column
     }
     return {
         column_name: max(
             min_unchanged_time_limit_s_by_column[column_name],
-            _MAX_UNCHANGED_TIME_FACTOR * expected_longest_unchanged_time_s_by_column[column_name],
+            _MAX_UNCHANGED_TIME_FACTOR * fitted_or_default_unchanged_time_s_by_column[column_name],
         )
-        for column_name in samples.time_since_change_s
+        for column_name in samples.time_since_change_s_by_column
     }
 
 
-def is_frozen_or_clipped_sample(samples: Samples, model: Model) -> Mask:
+def has_frozen_column_or_clipped_rate(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
-    is_frozen_or_clipped = np.zeros(len(samples.t_s), dtype=bool)
+    is_column_frozen_or_rate_clipped = np.zeros(len(samples.t_s), dtype=bool)
     for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
-        is_frozen_or_clipped |= samples.time_since_change_s[column_name] > max_unchanged_time_s
+        is_column_frozen_or_rate_clipped |= (
+            samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
+        )
     return (
-        is_frozen_or_clipped
+        is_column_frozen_or_rate_clipped
         if samples.is_rate_clipped is None
-        else is_frozen_or_clipped | samples.is_rate_clipped
+        else is_column_frozen_or_rate_clipped | samples.is_rate_clipped
     )
 
 
 def with_rates_unknown_where_frozen_or_clipped(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live."""
-    is_frozen_or_clipped = is_frozen_or_clipped_sample(samples, model)
-    if not is_frozen_or_clipped.any():
+    is_column_frozen_or_rate_clipped = has_frozen_column_or_clipped_rate(samples, model)
+    if not is_column_frozen_or_rate_clipped.any():
         return samples
-    return replace(samples, rates=np.where(is_frozen_or_clipped[:, None], np.nan, samples.rates))
+    return replace(samples, rates=np.where(is_column_frozen_or_rate_clipped[:, None], np.nan, samples.rates))
 
 
 def credibility_entry(rows_by_reason: Mapping[str, Mask], is_credible: NDArray[np.int64]) -> Document:

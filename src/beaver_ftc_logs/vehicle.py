@@ -285,7 +285,7 @@ class Vehicle(Section):
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
         for surface, weight_by_command in self.surfaces.items():
             mistakes += _unknown_name_mistakes(
-                ("surfaces", surface), weight_by_command, "command", self.command_columns
+                ("surfaces", surface), weight_by_command, "command", self.command_column_names
             )
         surface_tables_by_key: dict[str, Collection[str]] = {
             "labels": self.labels,
@@ -299,7 +299,7 @@ class Vehicle(Section):
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._doubly_read_column_mistakes()
+        mistakes += self._conflicting_column_reading_mistakes()
         refuse(mistakes)
         return self
 
@@ -325,7 +325,7 @@ class Vehicle(Section):
                 quantities.append((("flow", name), ANGLE, self.flow[name]))
         return quantities
 
-    def _doubly_read_column_mistakes(self) -> list[Conflict]:
+    def _conflicting_column_reading_mistakes(self) -> list[Conflict]:
         """One column read in two ways."""
         first_quantity_of_column: dict[str, QuantityColumn] = {}
         for location, quantity in [
@@ -350,12 +350,12 @@ class Vehicle(Section):
         return quantities + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
 
     @property
-    def command_columns(self) -> list[str]:
+    def command_column_names(self) -> list[str]:
         """The commands' columns."""
         return [command.column for command in self.commands]
 
     @property
-    def signal_columns(self) -> list[str]:
+    def signal_column_names(self) -> list[str]:
         """The further signals' columns."""
         return [signal.column for signal in self.signals]
 
@@ -382,10 +382,12 @@ class Vehicle(Section):
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.with_airspeed_effects`)."""
         rate_column_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        names_multiplied_by_airspeed = (
-            rate_column_names + self.signal_columns if self.reference_airspeed_mps is not None else []
+        rate_and_signal_names_with_airspeed = (
+            rate_column_names + self.signal_column_names if self.reference_airspeed_mps is not None else []
         )
-        return self.signal_columns + [f"{name} by airspeed" for name in names_multiplied_by_airspeed]
+        return self.signal_column_names + [
+            f"{name} by airspeed" for name in rate_and_signal_names_with_airspeed
+        ]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""

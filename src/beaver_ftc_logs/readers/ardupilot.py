@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, refuse_log_unreadable_by_package
+from beaver_ftc_logs.recording import RecordedFlight, columns_and_time_origin, package_errors_as_bad_input
 
 _TIME_FIELD, _INSTANCE_FIELDS = "TimeUS", ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
@@ -31,14 +31,14 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     values_by_message_and_field = _read_messages(path, wanted_columns)
     if not values_by_message_and_field:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
-    return RecordedFlight(path.stem, columns_of_topics(values_by_message_and_field, _TIME_FIELD)[0])
+    return RecordedFlight(path.stem, columns_and_time_origin(values_by_message_and_field, _TIME_FIELD)[0])
 
 
 def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, ValuesByField]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
     values_by_message_and_field: dict[str, ValuesByField] = {}
     with (
-        refuse_log_unreadable_by_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
+        package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
     ):
         from pymavlink import DFReader

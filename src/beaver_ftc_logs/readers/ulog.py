@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, refuse_log_unreadable_by_package
+from beaver_ftc_logs.recording import RecordedFlight, columns_and_time_origin, package_errors_as_bad_input
 
 _TIME_FIELD = "timestamp"
 _MAX_MESSAGE_BYTES = 65535
@@ -30,7 +30,7 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
         topics = {name: _select_wanted_fields(name, data, wanted_columns) for name, data in topics.items()}
     if not topics:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    columns, origin_s = columns_of_topics(topics, _TIME_FIELD)
+    columns, origin_s = columns_and_time_origin(topics, _TIME_FIELD)
     notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
     return RecordedFlight(path.stem, columns, notes=notes)
 
@@ -49,7 +49,7 @@ def _select_wanted_fields(name: str, data: dict[str, Any], wanted_columns: Colle
 
 def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any]:
     """Read the topics of the wanted columns, of any instance; all where none of these is in the log."""
-    with refuse_log_unreadable_by_package(path, "ULog", "pyulog", "a .ulg file of PX4"):
+    with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
         from pyulog import ULog
 
         formats = ULog(str(path), parse_header_only=True).message_formats

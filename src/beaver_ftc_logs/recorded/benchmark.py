@@ -32,7 +32,7 @@ from beaver_ftc_logs.fitting import (
 )
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
-from beaver_ftc_logs.samples import Samples, read_for_vehicle, resample
+from beaver_ftc_logs.samples import Samples, read_columns_of_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
@@ -85,8 +85,10 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
-        tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
-        return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), tables) if tables else None
+        table_paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
+        return (
+            _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), table_paths) if table_paths else None
+        )
     alfa_flight_folders = sorted(
         flight_folder
         for flight_folder in path.iterdir()
@@ -98,7 +100,7 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
 
 
 def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
-    recordings = tuple(read_for_vehicle(path, vehicle) for path in paths)
+    recordings = tuple(read_columns_of_vehicle(path, vehicle) for path in paths)
     return FlightDataSet(
         name, vehicle, recordings, tuple(resample(recording, vehicle) for recording in recordings)
     )
@@ -132,21 +134,25 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
             recording for recording in data_set.recordings if recording.name == held_out.samples.name
         )
         flight_entries += [
-            {"left_out": held_out_name, "method": method, **_score_against_log(held_out, rows, model)}
-            for method, rows in _diagnosis_rows_of_methods(recording, held_out, model)
+            {"left_out": held_out_name, "method": method_title, **_score_against_log(held_out, rows, model)}
+            for method_title, rows in _diagnosis_rows_of_methods(recording, held_out, model)
         ]
     has_labels = "classes" in flight_entries[0]
     summarize = summarize_label_scores if has_labels else summarize_failure_scores
-    methods = dict.fromkeys(entry["method"] for entry in flight_entries)
-    entries_of_method = {
-        name: [entry for entry in flight_entries if entry["method"] == name] for name in methods
+    method_titles = dict.fromkeys(entry["method"] for entry in flight_entries)
+    flight_entries_by_method = {
+        method_title: [entry for entry in flight_entries if entry["method"] == method_title]
+        for method_title in method_titles
     }
     return {
         "set": data_set.name,
         "vehicle": data_set.vehicle.name,
         "scored_by": "labels" if has_labels else "events",
         "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
-        "rows": [{"method": method, **summarize(scores)} for method, scores in entries_of_method.items()],
+        "rows": [
+            {"method": method_title, **summarize(scores)}
+            for method_title, scores in flight_entries_by_method.items()
+        ],
         "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data_set.name, []),
         "flights": flight_entries,
     }
@@ -203,19 +209,19 @@ def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
     detected_surface_failures = [score for score in surface_failures if score["detected"]]
     false_alarm_flights = [score for score in flight_scores if score["false_alarms"]]
     healthy_flights = [score for score in flight_scores if score["failure"] is None]
-    quiet_flights = [score for score in healthy_flights if not score["false_alarms"]]
+    quiet_healthy_flights = [score for score in healthy_flights if not score["false_alarms"]]
     healthy_hours = sum(score["healthy_s"] for score in flight_scores) / 3600.0
     false_alarm_rate = poisson(sum(score["false_alarms"] for score in flight_scores), healthy_hours)
-    n_correct_flights = len(detected_surface_failures) + len(quiet_flights)
+    n_detected_or_quiet_flights = len(detected_surface_failures) + len(quiet_healthy_flights)
     return {
         "surface_failures": len(surface_failures),
         "found": len(detected_surface_failures),
         "precision": len(detected_surface_failures)
         / max(len(detected_surface_failures) + len(false_alarm_flights), 1),
         "recall": len(detected_surface_failures) / max(len(surface_failures), 1),
-        "accuracy": n_correct_flights / max(len(surface_failures) + len(healthy_flights), 1),
+        "accuracy": n_detected_or_quiet_flights / max(len(surface_failures) + len(healthy_flights), 1),
         "healthy_flights": len(healthy_flights),
-        "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_flights),
+        "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_healthy_flights),
         "false_alarms_per_hour": {
             "value": false_alarm_rate.value,
             "low": false_alarm_rate.low,
@@ -268,39 +274,41 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set."""
     if "other_days" in document:
         return _tables_of_other_days(document["other_days"])
-    titled_tables = []
+    titles_and_tables = []
     for data_set in document["sets"]:
         header, format_row = (
             (LABEL_TABLE_HEADER, _label_score_cells)
             if data_set["scored_by"] == "labels"
             else (FAILURE_TABLE_HEADER, _failure_score_cells)
         )
-        rows = [format_row(row) for row in (*data_set["rows"], *data_set["published"])]
-        titled_tables.append((f"{data_set['set']}: left out, {data_set['left_out']}", (header, rows)))
-    return titled_tables
+        rows = [format_row(method_scores) for method_scores in (*data_set["rows"], *data_set["published"])]
+        titles_and_tables.append((f"{data_set['set']}: left out, {data_set['left_out']}", (header, rows)))
+    return titles_and_tables
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
     header = ["day", *LABEL_SCORE_TITLES.values(), "classes by sliding least squares"]
-    titled_tables = []
+    titles_and_tables = []
     for data_set in document["sets"]:
         table_rows = [
-            [row["day"], *_score_texts(row)] for row in data_set["rows"] if row["kind"] == "one change"
+            [day_scores["day"], *_score_texts(day_scores)]
+            for day_scores in data_set["rows"]
+            if day_scores["kind"] == "one change"
         ]
         for day_kind_summary in data_set["summary"]:
             table_rows += [
                 [f"{day_kind_summary['kind']}: {statistic}", *_score_texts(day_kind_summary[statistic])]
                 for statistic in ("mean", "worst")
             ]
-        titled_tables.append(
+        titles_and_tables.append(
             (f"{data_set['set']}: other days made of it, halves left out in turn", (header, table_rows))
         )
-    return titled_tables
+    return titles_and_tables
 
 
-def _score_texts(row: Document) -> list[str]:
-    return [f"{row[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
+def _score_texts(day_scores: Document) -> list[str]:
+    return [f"{day_scores[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
 
 
 LABEL_TABLE_HEADER = ["method", *LABEL_SCORE_TITLES.values()]
@@ -311,35 +319,35 @@ FAILURE_TABLE_HEADER = [
 ]  # fmt: skip
 
 
-def _label_score_cells(row: Document) -> list[str]:
-    return [row["method"], *_score_texts_or_empty(row, LABEL_SCORE_TITLES)]
+def _label_score_cells(method_scores: Document) -> list[str]:
+    return [method_scores["method"], *_score_texts_or_empty(method_scores, LABEL_SCORE_TITLES)]
 
 
-def _failure_score_cells(row: Document) -> list[str]:
+def _failure_score_cells(method_scores: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
-    delay_summaries = [row["delay_s"].get(surface_kind, {}) for surface_kind in SURFACE_KINDS]
+    delay_summaries = [method_scores["delay_s"].get(surface_kind, {}) for surface_kind in SURFACE_KINDS]
     cells = [
-        row["method"],
-        *_score_texts_or_empty(row, FAILURE_TABLE_HEADER[1:4]),
+        method_scores["method"],
+        *_score_texts_or_empty(method_scores, FAILURE_TABLE_HEADER[1:4]),
         *map(_mean_delay_text, delay_summaries),
     ]
-    if "false_alarms_per_hour" not in row:
+    if "false_alarms_per_hour" not in method_scores:
         return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
     n_ailerons_and_rudders_within_5_s, n_aileron_and_rudder_failures = (
         sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
     )
-    false_alarm_rate = row["false_alarms_per_hour"]
+    false_alarm_rate = method_scores["false_alarms_per_hour"]
     return [
         *cells,
         f"{n_ailerons_and_rudders_within_5_s} of {n_aileron_and_rudder_failures}",
         f"{false_alarm_rate['value']:.1f} ({false_alarm_rate['low']:.1f} to {false_alarm_rate['high']:.1f})",
-        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
-        str(row["wrong_group"]),
+        f"{method_scores['healthy_flights_with_an_alarm']} of {method_scores['healthy_flights']}",
+        str(method_scores["wrong_group"]),
     ]
 
 
-def _score_texts_or_empty(row: Document, keys: Iterable[str]) -> list[str]:
-    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
+def _score_texts_or_empty(method_scores: Document, keys: Iterable[str]) -> list[str]:
+    return ["" if method_scores.get(key) is None else f"{method_scores[key]:.3f}" for key in keys]
 
 
 def _mean_delay_text(delay_summary: Document) -> str:
@@ -358,9 +366,9 @@ def as_text(document: Document) -> str:
 
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
-    titled_tables = score_tables(document)
+    titles_and_tables = score_tables(document)
     return "\n".join(
-        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in titled_tables
+        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in titles_and_tables
     )
 
 
@@ -395,12 +403,12 @@ def draw_comparison_figure(document: Document) -> Any:
 
 
 def _method_titles(data_set: Document) -> list[str]:
-    return [row["method"] for row in (*data_set["rows"], *data_set.get("published", ()))]
+    return [method_scores["method"] for method_scores in (*data_set["rows"], *data_set.get("published", ()))]
 
 
 def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
-    methods = _method_titles(data_set)
+    method_titles = _method_titles(data_set)
     failure_of_flight = {entry["left_out"]: entry["failure"] for entry in data_set["flights"]}
     distinct_surface_failures = [
         failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
@@ -409,20 +417,20 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
         entries_of_failure = [
             entry
             for entry in data_set["flights"]
-            if entry["failure"] == surface_failure and entry["method"] in methods
+            if entry["failure"] == surface_failure and entry["method"] in method_titles
         ]
         delays_s = [
             _MAX_SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"]
             for entry in entries_of_failure
         ]
-        mark_heights = [
-            methods.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
+        heights_in_method_rows = [
+            method_titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
             for entry in entries_of_failure
         ]
         label = surface_failure.replace("_", " ").replace("+", " + ")
         axis.plot(
             [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
-            mark_heights,
+            heights_in_method_rows,
             marker(i),
             color=SERIES[i],
             label=label,
@@ -444,10 +452,10 @@ def _draw_shares_of_right_rows(axis: Any, data_set: Document) -> None:
         indices_of_rows_with_score = [
             row_index for row_index, row in enumerate(rows) if row.get(key) is not None
         ]
-        mark_heights = [row_index + 0.22 * (i - 1) for row_index in indices_of_rows_with_score]
+        heights_in_method_rows = [row_index + 0.22 * (i - 1) for row_index in indices_of_rows_with_score]
         axis.plot(
             [rows[row_index][key] for row_index in indices_of_rows_with_score],
-            mark_heights,
+            heights_in_method_rows,
             marker(i),
             color=SERIES[i],
             label=label,

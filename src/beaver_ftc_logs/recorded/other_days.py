@@ -37,13 +37,13 @@ _TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
 class DayChanges:
     """Changes from the recorded day to another one.
 
-    trim_shift_commands (S,): moment of another loading or rigging, as a command of each surface; a surface
-    with a loss of effectiveness needs more command for it. neutral_shift_commands (S,): the same, not
+    trim_shift_commands (S,): moment of another loading or rigging, as a command of each surface; a
+    surface with a loss of effectiveness needs more command for it. neutral_shift_commands (S,): the same, not
     affected by a loss. common_gain: factor on the effect of all surfaces on the motion about trim (airspeed).
     surface_gains (S,): factor of each surface. command_delay_s: additional delay of the commands.
-    motion_scale: factor on all motion, at the same noise. noise_ratio: standard deviation of the noise in the
-    rates, over that of the recorded day. trim_drift_sd_commands: standard deviation of the drift of the trim,
-    in commands.
+    motion_scale: factor on all motion, at the same noise. noise_ratio: standard deviation of the noise in
+    the rates, over that of the recorded day. trim_drift_sd_commands: standard deviation of the drift of
+    the trim, in commands.
     """
 
     name: str
@@ -66,19 +66,19 @@ def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayC
     """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
     unchanged = unchanged_day(len(mixer_shares))
     days = [unchanged]
-    for command, surface_shares in zip(command_names, mixer_shares.T, strict=True):
+    for command_name, surface_shares in zip(command_names, mixer_shares.T, strict=True):
         for shift in (-0.04, 0.04):
             days.append(
                 replace(
                     unchanged,
-                    name=f"trim of {command} {shift:+.2f}",
+                    name=f"trim of {command_name} {shift:+.2f}",
                     trim_shift_commands=shift * surface_shares,
                 )
             )
             days.append(
                 replace(
                     unchanged,
-                    name=f"neutral of {command} {shift:+.2f}",
+                    name=f"neutral of {command_name} {shift:+.2f}",
                     neutral_shift_commands=shift * surface_shares,
                 )
             )
@@ -92,9 +92,9 @@ def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayC
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
-    for i, unit_row in enumerate(np.eye(len(mixer_shares))):
+    for i, surface_unit_vector in enumerate(np.eye(len(mixer_shares))):
         for gain in (0.94, 1.06):
-            surface_gains = np.where(unit_row, gain, 1.0)
+            surface_gains = np.where(surface_unit_vector, gain, 1.0)
             days.append(
                 replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
             )
@@ -146,8 +146,10 @@ def apply_day_changes(
 
 def _shift_values_earlier(values: Floats, n_samples: float) -> Floats:
     """Values that act `n_samples` samples later than these: logged earlier by as much, (n, S)."""
-    shifted_index = np.arange(len(values)) + n_samples
-    return np.column_stack([np.interp(shifted_index, np.arange(len(values)), column) for column in values.T])
+    fractional_source_rows = np.arange(len(values)) + n_samples
+    return np.column_stack(
+        [np.interp(fractional_source_rows, np.arange(len(values)), column) for column in values.T]
+    )
 
 
 def _running_mean(values: Floats, window_samples: int) -> Floats:
@@ -202,20 +204,20 @@ def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
     whole_flight_model = fit_model(usable_flights, data_set.vehicle, settings)
     n_surfaces = len(data_set.vehicle.surfaces)
     days_by_kind = {
-        "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_columns),
+        "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_column_names),
         "drawn, settings chosen on these": random_days(n_surfaces, TUNING_SEEDS),
         "drawn, not looked at": random_days(n_surfaces, TEST_SEEDS),
     }
-    day_rows = [
-        day_row
+    scores_of_days = [
+        day_scores
         for kind, days in days_by_kind.items()
-        for day_row in _score_days(kind, days, models_and_held_out, whole_flight_model)
+        for day_scores in _score_days(kind, days, models_and_held_out, whole_flight_model)
     ]
     summaries = [
-        _summarize_days(kind, [day_row for day_row in day_rows if day_row["kind"] == kind])
+        _summarize_days(kind, [day_scores for day_scores in scores_of_days if day_scores["kind"] == kind])
         for kind in days_by_kind
     ]
-    return {"set": data_set.name, "rows": day_rows, "summary": summaries}
+    return {"set": data_set.name, "rows": scores_of_days, "summary": summaries}
 
 
 def _score_days(
@@ -247,9 +249,12 @@ def _score_days(
         }
 
 
-def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
+def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values_of_score = {key: [row[key] for row in rows] for key in (*benchmark.LABEL_SCORE_TITLES, "beside")}
+    values_of_score = {
+        key: [day_scores[key] for day_scores in scores_of_days]
+        for key in (*benchmark.LABEL_SCORE_TITLES, "beside")
+    }
     mean = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
     return {
         "kind": kind,

@@ -18,7 +18,7 @@ from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import by_aircraft, stepped
 from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.recording import Column, RecordedFlight
-from beaver_ftc_logs.samples import read_for_vehicle
+from beaver_ftc_logs.samples import read_columns_of_vehicle
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
@@ -45,7 +45,7 @@ def exported(folder, kind, to):
 def log(flown, tmp_path_factory):
     """A table of the flight, and what its vehicle file says."""
     path, vehicle = exported(flown[0], "table", tmp_path_factory.mktemp("log"))
-    return read_for_vehicle(path, vehicle), vehicle
+    return read_columns_of_vehicle(path, vehicle), vehicle
 
 
 def changed(recording, **functions):
@@ -66,7 +66,7 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     path, vehicle = exported(flown[0], kind, tmp_path)
-    _, rows, verdict = diagnose_with_aircraft_model(read_for_vehicle(path, vehicle), vehicle, BEAVER)
+    _, rows, verdict = diagnose_with_aircraft_model(read_columns_of_vehicle(path, vehicle), vehicle, BEAVER)
     flight = flown[1]
     assert verdict["detection_s"] == pytest.approx(flight.detection.time_s, abs=1e-9)
     assert verdict["isolation_s"] == pytest.approx(flight.isolation.time_s, abs=1e-9)
@@ -151,10 +151,10 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
     planted = np.repeat(theta, 1000, axis=0)
     innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
-    found = stepped._command_gain_upper_bounds(innovation, expected)
+    found = stepped._relative_command_gain_upper_bounds(innovation, expected)
     assert np.all(found > gain)
     assert found == pytest.approx(gain, abs=0.1)
-    assert (stepped._command_gain_upper_bounds(innovation[:200], expected[:200]) == 1.0).all()
+    assert (stepped._relative_command_gain_upper_bounds(innovation[:200], expected[:200]) == 1.0).all()
 
 
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
@@ -162,7 +162,7 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
     bf.fly(scenario).save(tmp_path, report=False)
     path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
-    recording = read_for_vehicle(path, vehicle)
+    recording = read_columns_of_vehicle(path, vehicle)
     turned = changed(recording, rudder_command=np.negative)
     assert diagnose_with_aircraft_model(recording, vehicle, BEAVER)[2]["faulty"] is False
     with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
@@ -423,7 +423,7 @@ def test_stretches_make_one_flight():
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
-    assert found.command_gain_upper_bounds.tolist() == [0.5, 0.4]
+    assert found.relative_command_gain_upper_bounds.tolist() == [0.5, 0.4]
 
 
 PAIR = SimpleNamespace(
@@ -474,7 +474,7 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     ([(-0.29, 0.9), (0.5, -0.29)], None),
 ])  # fmt: skip
 def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
-    gap_free_stretches = [SimpleNamespace(command_gain_upper_bounds=np.array(of)) for of in gains]
+    gap_free_stretches = [SimpleNamespace(relative_command_gain_upper_bounds=np.array(of)) for of in gains]
     if says is None:
         by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
         return

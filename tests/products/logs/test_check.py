@@ -58,7 +58,7 @@ def test_a_strangers_log_is_told_and_gets_a_vehicle_file(tmp_path):
     vehicle = load_vehicle(out)
     assert (vehicle.time.column, vehicle.time.unit) == ("TimeUS", "us")
     assert vehicle.rates.p.unit == "deg/s"
-    assert vehicle.command_columns == ["roll_cmd", "pitch_cmd"]
+    assert vehicle.command_column_names == ["roll_cmd", "pitch_cmd"]
     again = json.loads(run("identify", "--check", path, "--vehicle", out, "--format", "json").stdout)
     assert again["logs"][0]["usable"]
     assert again["vehicle"] is None

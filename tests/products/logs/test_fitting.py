@@ -439,7 +439,9 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     )
     monkeypatch.setattr(fitting, "fit_least_squares_of_order", lambda *of: "fit")
     monkeypatch.setattr(fitting, "group_gain_standard_error", lambda fit, model: 0.25)
-    monkeypatch.setattr(fitting.trust, "effect_share_explained_by_others", lambda used, model: np.zeros(2))
+    monkeypatch.setattr(
+        fitting.trust, "effect_share_explained_by_other_regressors", lambda used, model: np.zeros(2)
+    )
 
     monkeypatch.setattr(fitting, "gain_standard_error_by_column", lambda fit, model, between: {"p": between})
 

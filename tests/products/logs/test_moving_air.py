@@ -222,9 +222,11 @@ def test_columns_are_compared_in_white(moving, colour):
         key=lambda pair: pair[0].sample_log_likelihood_by_part.mean(),
     )
     assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
-    assert all(1.0 < gain < 1.6 for gain in likeliest[0].group_gain_upper_bounds)
+    assert all(1.0 < gain < 1.6 for gain in likeliest[0].largest_group_gain_upper_bounds)
     plain = trust._bound_gains_over_flight_parts(flight, moving.model_copy(update={"noise_models": []}))
-    assert colour == (1.0,) or min(plain.group_gain_upper_bounds) > 1.9  # what coloured noise does to the fit
+    assert (
+        colour == (1.0,) or min(plain.largest_group_gain_upper_bounds) > 1.9
+    )  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 
@@ -258,10 +260,13 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     flights = [flown((1.0,), 0.5, 2000, 31)]
     model = moving.model_copy(update={"noise_models": moving.noise_models[:1]})
     found = identification.add_unseen_noise_models(model, flights)
-    gyros, others = found.noise_models[-len(samples.ADDED_GYRO_NOISE_LEVELS_RAD_S) :], found.noise_models[1:]
+    gyros, others = (
+        found.noise_models[-len(samples.UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S) :],
+        found.noise_models[1:],
+    )
     others = others[: -len(gyros)]
     assert found.noise_models[0] == model.noise_models[0]
-    assert {tuple(one.ma_coefficients) for one in others} == {*samples.ADDED_NOISE_MA_COEFFICIENTS} - {
+    assert {tuple(one.ma_coefficients) for one in others} == {*samples.UNFITTED_NOISE_MA_CANDIDATES} - {
         tuple(model.noise_models[0].ma_coefficients)
     }
     for one in others:

@@ -11,7 +11,7 @@ from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text
-from beaver_ftc_logs.recording import columns_of_topics
+from beaver_ftc_logs.recording import columns_and_time_origin
 from products.logs import synthetic
 
 ORIGIN_NS = 1_538_768_543_780_097_959
@@ -199,7 +199,7 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
         },
         "none": {"us": [np.nan, np.nan], "w": [1, 2]},
     }
-    columns, origin_s = columns_of_topics(topics, "us")
+    columns, origin_s = columns_and_time_origin(topics, "us")
     assert origin_s == pytest.approx(2.0)
     np.testing.assert_allclose(columns["late.x"].t_s, [1.0, 1.5])
     np.testing.assert_allclose(columns["early.z"].t_s, [0.0, 0.25, 0.5])
@@ -207,7 +207,7 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
     assert columns["early.y"].note.startswith("early: row 1: its stamp is out of order")
     assert columns["late.x"].note == ""
     assert set(columns) == {"late.x", "early.y", "early.z", "none.w"}
-    assert columns_of_topics({"none": topics["none"]}, "us")[1] == 0.0
+    assert columns_and_time_origin({"none": topics["none"]}, "us")[1] == 0.0
 
 
 def test_a_ulog_says_from_when_its_time_counts(tmp_path):
@@ -262,6 +262,8 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
 
 def test_a_dataflash_log_has_the_name_of_its_file_without_the_ending(monkeypatch):
     monkeypatch.setattr(ardupilot, "_read_messages", lambda path, wanted: {"IMU": (path.name, wanted)})
-    monkeypatch.setattr(ardupilot, "columns_of_topics", lambda messages, time: ((messages, time), "rest"))
+    monkeypatch.setattr(
+        ardupilot, "columns_and_time_origin", lambda messages, time: ((messages, time), "rest")
+    )
     found = ardupilot.read(Path("logs/flight.2.bin"), ["GyrX"])
     assert (found.name, found.columns) == ("flight.2", ({"IMU": ("flight.2.bin", ["GyrX"])}, "TimeUS"))

@@ -45,8 +45,8 @@ def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
         cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
-        still_s = {name: still[:n] for name, still in samples.time_since_change_s.items()}
-        short = diagnose(replace(samples, time_since_change_s=still_s, **cut), model)
+        still_s = {name: still[:n] for name, still in samples.time_since_change_s_by_column.items()}
+        short = diagnose(replace(samples, time_since_change_s_by_column=still_s, **cut), model)
         assert np.array_equal(short.credible, whole.credible[:n])
         assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
         assert np.array_equal(short.fault_probability, whole.fault_probability[:n])
@@ -58,7 +58,7 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     flights = load_flights_for_fit(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
     model = fit_model(flights_with_usable_rows([one for one in flights if one is not kept]), vehicle)
-    read = {*model.vehicle.command_columns, *model.vehicle.signal_columns}
+    read = {*model.vehicle.command_column_names, *model.vehicle.signal_column_names}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)
     assert found["false_alarms"] == 0

@@ -217,5 +217,5 @@ def test_a_prediction_is_the_sum_over_the_samples_before_times_their_coefficient
 
 
 def test_a_flight_is_split_where_its_shortest_part_is_long_enough():
-    assert [len(part) for part in regression.split_into_flight_parts(np.arange(242))] == [61, 61, 60, 60]
-    assert regression.split_into_flight_parts(np.arange(239)) is None  # the last part has 59 rows
+    assert [len(part) for part in regression.split_into_parts_for_bounds(np.arange(242))] == [61, 61, 60, 60]
+    assert regression.split_into_parts_for_bounds(np.arange(239)) is None  # the last part has 59 rows

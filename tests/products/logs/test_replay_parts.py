@@ -109,7 +109,7 @@ def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
     assert found.verdicts == [f"verdict {k}" for k in range(1, 7)]
     for k, sample in enumerate(shown):
         assert [part.tolist() for part in sample] == [of[k].tolist() for of in samples]
-    assert found.command_gain_upper_bounds.tolist() == [1.0, 1.0]
+    assert found.relative_command_gain_upper_bounds.tolist() == [1.0, 1.0]
     thetas, bounded = np.linspace(-1.0, 0.0, 2001), 0
     for k in range(6):
         for s in range(2):

@@ -32,9 +32,9 @@ def stamps(step, n=60):
 def test_rates_that_a_log_may_have(t_s, rate_hz, says):
     if says:
         with pytest.raises(BadInput, match=says):
-            of._time_base("log", t_s, 20.0)
+            of._check_stamps_and_make_time_base("log", t_s, 20.0)
         return
-    found, run, step = of._time_base("log", t_s, 20.0)
+    found, run, step = of._check_stamps_and_make_time_base("log", t_s, 20.0)
     assert 1.0 / step == pytest.approx(rate_hz)
     assert set(run.tolist()) == {0}
     assert (found is t_s) is (rate_hz != 20.0)
@@ -45,7 +45,7 @@ def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
     t_s = stamps(0.125)
     t_s[20:] += (gap - 1.0) * 0.125
     t_s[40:] += (gap - 1.0) * 0.125
-    run = of._time_base("log", t_s, 20.0)[1]
+    run = of._check_stamps_and_make_time_base("log", t_s, 20.0)[1]
     assert run.tolist() == [0] * 20 + [gaps] * 20 + [2 * gaps] * 20
 
 
@@ -84,7 +84,7 @@ def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
     fast = column(stamps(step, 40), np.arange(40.0))
     t_s = stamps(0.1, 10) + 0.3
     found = of.values_and_mean_age_at(fast, t_s, 0.1)
-    expected = (of._averaged_values if averaged else of._held_values)(
+    expected = (of._interval_means_and_mean_age if averaged else of._latest_values_and_mean_age)(
         fast, *((t_s, 0.1) if averaged else (t_s,))
     )
     np.testing.assert_array_equal(found[0], expected[0])
@@ -93,25 +93,29 @@ def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
 
 def test_a_held_column_is_the_last_value_known():
     held = column([1.0, 2.0, 3.0, 4.0], [5.0, np.nan, 7.0, 8.0])
-    values, age_s = of._held_values(held, np.array([0.5, 1.0, 2.5, 3.0, 3.75]))
+    values, age_s = of._latest_values_and_mean_age(held, np.array([0.5, 1.0, 2.5, 3.0, 3.75]))
     np.testing.assert_array_equal(values, [np.nan, 5.0, 5.0, 7.0, 7.0])
     assert age_s == pytest.approx((0.0 + 1.5 + 0.0 + 0.75) / 4)
-    assert np.isnan(of._held_values(held, np.array([0.0, 0.5]))[1])
+    assert np.isnan(of._latest_values_and_mean_age(held, np.array([0.0, 0.5]))[1])
 
 
 def test_the_mean_over_the_interval_that_ends_at_a_sample():
     """Its end is in it, its begin is not, to a millionth of a step; of nothing, the last value."""
     fast = column([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.2], [1.0, 2.0, 4.0, np.nan, 16.0, 32.0, 64.0])
     t_s = np.array([-0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.2])
-    values, delay_s = of._averaged_values(fast, t_s, 0.2)
+    values, delay_s = of._interval_means_and_mean_age(fast, t_s, 0.2)
     np.testing.assert_allclose(values, [np.nan, 1.0, 3.0, 16.0, 32.0, 32.0, 64.0])
     assert delay_s == pytest.approx(0.1)
     near = column([0.1, 0.2 + 1e-8, 0.3], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(of._averaged_values(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0])
+    np.testing.assert_allclose(
+        of._interval_means_and_mean_age(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0]
+    )
     off = column([0.1, 0.2 + 1e-6, 0.3], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(of._averaged_values(off, np.array([0.2, 0.4]), 0.2)[0], [1.0, 3.0])
+    np.testing.assert_allclose(of._interval_means_and_mean_age(off, np.array([0.2, 0.4]), 0.2)[0], [1.0, 3.0])
     both = column([-0.2 + 1e-8, 0.0, 0.2 - 1e-8], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(of._averaged_values(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0])
+    np.testing.assert_allclose(
+        of._interval_means_and_mean_age(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0]
+    )
 
 
 def recording(n=60, step=0.1, **changes):
@@ -166,9 +170,9 @@ def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
     assert np.isfinite(found.rates[early, 0]).mean() > 0.6
     assert np.isfinite(found.rates[:, 1:]).all()
     np.testing.assert_allclose(
-        found.time_since_change_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9
+        found.time_since_change_s_by_column["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9
     )
-    assert found.time_since_change_s["p_rad_s"][early].max() < 0.5
+    assert found.time_since_change_s_by_column["p_rad_s"][early].max() < 0.5
 
 
 def test_the_mixer_has_a_row_a_surface():

@@ -81,7 +81,7 @@ def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredibl
 def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     still = np.zeros(600)
     still[300:400] = 0.1 * np.arange(100)
-    flown = small.flight(model, n=600, seed=4, time_since_change_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, time_since_change_s_by_column={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
     assert list(rows.not_credible_rows_by_reason) == ["q_rad_s stands still, for longer than 1.5 s"]
@@ -99,7 +99,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
     )
     still = np.zeros(600)
     still[300:320] = 0.1 * np.arange(20)
-    flown = small.flight(model, n=600, seed=4, time_since_change_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, time_since_change_s_by_column={"q_rad_s": still})
     assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
 
 
@@ -108,7 +108,10 @@ def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
     known = model.model_copy(update={"fitted_ranges": trained})
     for longest, share in ((11.9, 1.0), (12.5, 0.98)):
         flown = small.flight(
-            model, n=600, seed=4, time_since_change_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
+            model,
+            n=600,
+            seed=4,
+            time_since_change_s_by_column={"roll": np.where(np.arange(600) < 12, longest, 0.0)},
         )
         assert diagnose(flown, known).credible.mean() == pytest.approx(share)
 
@@ -145,7 +148,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = trust.effect_share_explained_by_others(
+    share = trust.effect_share_explained_by_other_regressors(
         [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
         small.model(history=4, lags=3),
     )
@@ -155,9 +158,9 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
     assert (
-        trust.effect_share_explained_by_others([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[
-            0
-        ]
+        trust.effect_share_explained_by_other_regressors(
+            [(far, np.ones(2000, bool))], small.model(history=4, lags=3)
+        )[0]
         == 0.0
     )
 
@@ -281,7 +284,9 @@ def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
 
 def test_a_model_that_claims_nothing_says_nothing(model):
     """Neither a name nor an alarm in a flight whose surfaces' effects are all made up by the rates."""
-    fitted = model.fitted_ranges.model_copy(update={"effect_share_explained_by_others": [0.99, 1.0]})
+    fitted = model.fitted_ranges.model_copy(
+        update={"effect_share_explained_by_other_regressors": [0.99, 1.0]}
+    )
     known = model.model_copy(update={"fitted_ranges": fitted})
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
@@ -350,7 +355,9 @@ def test_what_was_clipped_is_remembered_for_half_a_minute():
 def test_for_how_long_each_column_may_stand_still():
     """A rate for a third of 1.5 s where it is known, any column thrice as long as it did; others for ever."""
     names = ["p_rad_s", "q_rad_s", "r_rad_s", "roll", "pitch", "air"]
-    samples = small.flight(small.model(), 20, time_since_change_s=dict.fromkeys(names, np.zeros(20)))
+    samples = small.flight(
+        small.model(), 20, time_since_change_s_by_column=dict.fromkeys(names, np.zeros(20))
+    )
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
@@ -359,10 +366,10 @@ def test_for_how_long_each_column_may_stand_still():
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
-    short = replace(samples, t_s=np.arange(3.0), time_since_change_s=still_s)
-    assert trust.is_frozen_or_clipped_sample(short, model).tolist() == [False, True, False]
+    short = replace(samples, t_s=np.arange(3.0), time_since_change_s_by_column=still_s)
+    assert trust.has_frozen_column_or_clipped_rate(short, model).tolist() == [False, True, False]
     clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
-    assert trust.is_frozen_or_clipped_sample(clipped, model).tolist() == [False, True, True]
+    assert trust.has_frozen_column_or_clipped_rate(clipped, model).tolist() == [False, True, True]
 
 
 def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
@@ -390,10 +397,13 @@ def test_what_is_kept_of_the_flights_fitted():
     climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
     use = np.arange(23) != 21
     one = small.flight(
-        small.model(), 23, energy_height_rate_mps=climbs, time_since_change_s={"roll": np.array([0.3, 0.2])}
+        small.model(),
+        23,
+        energy_height_rate_mps=climbs,
+        time_since_change_s_by_column={"roll": np.array([0.3, 0.2])},
     )
     other = small.flight(
-        small.model(), 23, time_since_change_s={"roll": np.array([0.4]), "air": np.array([0.7])}
+        small.model(), 23, time_since_change_s_by_column={"roll": np.array([0.4]), "air": np.array([0.7])}
     )
     flights = [(other, use), (one, use)]
     assert trust._estimate_unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)
@@ -466,7 +476,7 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     assert what == ("sign right+left" if says == "sign" else "unit right+left")
     assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
     faint = trust._column_mistake_texts(
-        None, model, found._replace(column_gain_upper_bounds={"V": 0.49, "p": 0.5})
+        None, model, found._replace(largest_gain_upper_bound_by_column={"V": 0.49, "p": 0.5})
     )
     assert list(faint) == [what, "columns"]
     assert "answer to V is not" in faint["columns"]
@@ -479,7 +489,7 @@ def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkey
     """Four standard errors of a quarter: by such a model a sound log answers with a gain of 0.19, too."""
     monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: 3.1)
     known = SimpleNamespace(
-        effect_share_explained_by_others=[0.9],
+        effect_share_explained_by_other_regressors=[0.9],
         group_gain_standard_error=[sd],
         gain_standard_error_by_column={"V": sd},
     )

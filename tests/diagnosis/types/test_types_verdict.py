@@ -96,12 +96,12 @@ def new_case(**left):
 
 
 def locate(fdi, s, innovation, bound, effect):
-    """`infer_position` for surface s, with its estimator and its axis."""
+    """`fill_last_observation_from_innovation` for surface s, with its estimator and its axis."""
     fie = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
     types.shift_observations(surface)
-    types.infer_position(config, surface, fie, axis, innovation, bound, effect)
+    types.fill_last_observation_from_innovation(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
@@ -212,12 +212,12 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest_frames, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
-    assert bool(on(verdict.remaining_type_can_hide_at_rest, fdi, surface)) == slow
+    assert bool(on(verdict.short_anomaly_may_be_hidden_type, fdi, surface)) == slow
     assert not on(
-        verdict.remaining_type_can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames)
+        verdict.short_anomaly_may_be_hidden_type, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames)
     )
     assert not on(
-        verdict.remaining_type_can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
+        verdict.short_anomaly_may_be_hidden_type, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
     )
 
 
@@ -662,7 +662,7 @@ def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     surface = fdi["types"]["surface"][RUDDER]
     registry.restart_fault_types_of_surface(surface)
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.2, 0.1
-    on(registry.narrow_feasible_sets, fdi, surface, 6)
+    on(registry.store_first_anomaly_and_narrow_sets, fdi, surface, 6)
     assert surface["evidence"]["first_anomalous_frame"] == -1
 
 
@@ -1073,14 +1073,19 @@ def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     conclude(fdi, pairs.decide_pair_isolation_and_accommodation, 3.0)
     assert not fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR]
-    assert not on(pairs.should_be_accommodated, fdi, ELEVATOR)
+    assert not on(pairs.is_isolated_or_likeliest_in_pitch, fdi, ELEVATOR)
 
 
 def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     fdi = decided()
-    assert [bool(on(pairs.should_be_accommodated, fdi, s)) for s in range(4)] == [False, True, False, False]
+    assert [bool(on(pairs.is_isolated_or_likeliest_in_pitch, fdi, s)) for s in range(4)] == [
+        False,
+        True,
+        False,
+        False,
+    ]
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
-    assert [bool(on(pairs.should_be_accommodated, only_flap, s)) for s in range(4)] == [
+    assert [bool(on(pairs.is_isolated_or_likeliest_in_pitch, only_flap, s)) for s in range(4)] == [
         False,
         False,
         False,
@@ -1089,7 +1094,12 @@ def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     assert not on(pairs.any_pitch_surface_is_isolated, fdi)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 0, 1
     assert on(pairs.any_pitch_surface_is_isolated, fdi)
-    assert [bool(on(pairs.should_be_accommodated, fdi, s)) for s in range(4)] == [True, False, False, True]
+    assert [bool(on(pairs.is_isolated_or_likeliest_in_pitch, fdi, s)) for s in range(4)] == [
+        True,
+        False,
+        False,
+        True,
+    ]
 
 
 def test_the_verdict_is_that_of_the_first_named():

@@ -328,7 +328,7 @@ def copy_observation(target_observation, source_observation):
 
 
 @kernel
-def infer_position(
+def fill_last_observation_from_innovation(
     config,
     surface,
     fie,

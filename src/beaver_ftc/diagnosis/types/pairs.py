@@ -140,7 +140,7 @@ def update_pitch_anomaly_or_location(types, layout, estimators, innovation_by_ax
         first_fault_surface_index != NO_SURFACE
         and not types.surface[first_fault_surface_index].status.may_be_sole_fault
     ):
-        locate_or_clear_second_pitch_surface(
+        locate_second_pitch_or_deduce_healthy(
             types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
         )
         return
@@ -150,7 +150,7 @@ def update_pitch_anomaly_or_location(types, layout, estimators, innovation_by_ax
 
 
 @kernel
-def locate_or_clear_second_pitch_surface(
+def locate_second_pitch_or_deduce_healthy(
     types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
 ):
     """Find the position of the second surface, given the sets of the first."""
@@ -302,7 +302,7 @@ def other_types_no_longer_possible(config, surface):
         surface, verdict.sole_constant_type_or_undecided(surface), False
     )
     another_type_is_possible = (
-        command_independent_type_may_imitate or verdict.remaining_type_can_hide_at_rest(config, surface)
+        command_independent_type_may_imitate or verdict.short_anomaly_may_be_hidden_type(config, surface)
     )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
@@ -452,7 +452,7 @@ def any_pitch_surface_is_isolated(types, layout):
 
 
 @kernel
-def should_be_accommodated(types, layout, s):
+def is_isolated_or_likeliest_in_pitch(types, layout, s):
     """Whether the law is to act on surface s: it is isolated, or it is the most likely one in pitch."""
     if types.surface[s].status.is_isolated:
         return True
@@ -473,7 +473,7 @@ def set_pair_accommodation_choose_lead(types, layout):
     accommodated_surface_index, accommodation_mode = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         verdict.set_accommodation_mode(surface, -1)
-        if should_be_accommodated(types, layout, s):
+        if is_isolated_or_likeliest_in_pitch(types, layout, s):
             may_be_at_fault = surface.status.is_isolated == 1 or estimator_or_deduction_allows_fault(surface)
             surface_mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
             if verdict.update_fault_presence(types.config, surface, surface_mode, may_be_at_fault):

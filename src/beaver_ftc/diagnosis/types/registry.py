@@ -39,7 +39,7 @@ from beaver_ftc.diagnosis.types import (
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
-    infer_position,
+    fill_last_observation_from_innovation,
     intersect_set_or_exclude_type,
     mark_type_excluded,
     reset_feasible_sets_to_unlimited,
@@ -475,7 +475,7 @@ def shift_observations_and_infer_positions(
         mean_effect_record = (
             fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
         )
-        infer_position(
+        fill_last_observation_from_innovation(
             types.config, surface, fie, axis, innovation_by_axis, innovation_bound_by_axis, mean_effect_record
         )
 
@@ -489,7 +489,7 @@ def increment_anomalous_frame_counts(surface):
 
 
 @kernel
-def narrow_feasible_sets(config, surface, k):
+def store_first_anomaly_and_narrow_sets(config, surface, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
     anomaly_evidence, judged_observation = surface.evidence, surface.judged_observation
     if judged_observation.position_low > judged_observation.position_high:
@@ -526,7 +526,7 @@ def judge_previous_and_advance_frame(types):
             or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
         ):
             increment_anomalous_frame_counts(surface)
-            narrow_feasible_sets(config, surface, k)
+            store_first_anomaly_and_narrow_sets(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
         if config.released_surface_returns_via_actuator and types.frame_index > 0:

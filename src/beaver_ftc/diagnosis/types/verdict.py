@@ -138,7 +138,7 @@ def sole_remaining_type_once_it_shows_itself(surface):
 
 
 @kernel
-def remaining_type_can_hide_at_rest(config, surface):
+def short_anomaly_may_be_hidden_type(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
@@ -264,7 +264,7 @@ def fault_type_on_surface(config, surface):
     one may yet show itself."""
     if (
         surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames
-        or remaining_type_can_hide_at_rest(config, surface)
+        or short_anomaly_may_be_hidden_type(config, surface)
     ):
         return TYPE_UNDECIDED
     if config.has_surface_term_errors:
@@ -367,16 +367,16 @@ def choose_accommodation_mode(surface):
     """
     constant_parameter_type_remains = any_constant_parameter_type_remains(surface)
     for candidate_mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-        if constant_parameter_type_remains and serves_all_constant_parameter_types(surface, candidate_mode):
+        if constant_parameter_type_remains and is_mode_serving_all_constant_types(surface, candidate_mode):
             return candidate_mode
     for candidate_mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-        if not constant_parameter_type_remains and is_mode_of_varying_parameter_type(surface, candidate_mode):
+        if not constant_parameter_type_remains and is_mode_of_some_varying_type(surface, candidate_mode):
             return candidate_mode
     return SUBTRACT_OFFSET
 
 
 @kernel
-def serves_all_constant_parameter_types(surface, accommodation_mode):
+def is_mode_serving_all_constant_types(surface, accommodation_mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
     is_mode_of_remaining_type = False
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
@@ -395,7 +395,7 @@ def serves_all_constant_parameter_types(surface, accommodation_mode):
 
 
 @kernel
-def is_mode_of_varying_parameter_type(surface, accommodation_mode):
+def is_mode_of_some_varying_type(surface, accommodation_mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
         if (

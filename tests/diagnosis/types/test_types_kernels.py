@@ -492,7 +492,7 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    judged(held_surface.consistent_stuck_interval, fdi, surface, STUCK, 5)
+    judged(held_surface.update_stuck_and_consistent_interval, fdi, surface, STUCK, 5)
     assert on(held_surface.stuck_deflection_range, fdi, surface, STUCK) == (0.1, 0.2)
     assert types.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
@@ -649,7 +649,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
         if released_surface_returns_via_actuator
         else held_surface.STATUS_REFUTED
     )
-    judged(held_surface.consistent_held_or_returning_interval, fdi, surface, STUCK, -0.1, 0.1)
+    judged(held_surface.update_releases_and_consistent_interval, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["feasible_sets"]["excluded"][STUCK] == (not released_surface_returns_via_actuator)
     assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))

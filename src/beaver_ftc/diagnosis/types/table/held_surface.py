@@ -245,7 +245,9 @@ def update_held_status(config, surface, type_index, held_position_min, held_posi
 
 
 @kernel
-def consistent_held_or_returning_interval(config, surface, type_index, held_position_min, held_position_max):
+def update_releases_and_consistent_interval(
+    config, surface, type_index, held_position_min, held_position_max
+):
     """The parameters that explain the judged frame: all if the surface is held there or returns from there,
     none otherwise."""
     return (
@@ -342,7 +344,7 @@ def reset_stuck_memory(surface, type_index):
 
 
 @kernel
-def consistent_stuck_interval(config, surface, type_index, k):
+def update_stuck_and_consistent_interval(config, surface, type_index, k):
     """It stays where it is."""
     held_status = update_held_status(
         config,
@@ -411,10 +413,10 @@ def stuck_deflection_range(config, surface, type_index, k):
 
 
 @kernel
-def consistent_float_interval(config, surface, type_index, k):
+def update_float_and_consistent_interval(config, surface, type_index, k):
     """It is at neutral, or at the stop that is nearest to it."""
     neutral_position = limit_to_travel(surface, 0.0)
-    return consistent_held_or_returning_interval(
+    return update_releases_and_consistent_interval(
         config, surface, type_index, neutral_position, neutral_position
     )
 
@@ -465,7 +467,7 @@ def float_deflection_error(surface, type_index):
 STUCK = FaultType(
     name="stuck", has_constant_parameter=True, sort_rank=2,
     parameter_range=travel_range, reset_memory=reset_stuck_memory,
-    consistent_interval=consistent_stuck_interval, feasible_set_after_frame=stuck_set_after_frame,
+    consistent_interval=update_stuck_and_consistent_interval, feasible_set_after_frame=stuck_set_after_frame,
     # rad; EARLIER and LATER
     memory_record_name="stuck", memory_dtype=record(feasible_low_before_release=2,
     feasible_high_before_release=2),
@@ -480,7 +482,7 @@ STUCK = FaultType(
 )  # fmt: skip
 FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
-    reset_memory=allow_release_before_alarm, consistent_interval=consistent_float_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=update_float_and_consistent_interval,
     on_possible_release=add_float_release, propagate_release=propagate_returns,
     possible_deflection_range=float_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
@@ -527,9 +529,9 @@ def runaway_down_upper_limit(config, surface, frame_index):
 
 
 @kernel
-def consistent_hardover_up_interval(config, surface, type_index, k):
+def update_hardover_up_and_interval(config, surface, type_index, k):
     """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
-    return consistent_held_or_returning_interval(
+    return update_releases_and_consistent_interval(
         config,
         surface,
         type_index,
@@ -539,9 +541,9 @@ def consistent_hardover_up_interval(config, surface, type_index, k):
 
 
 @kernel
-def consistent_hardover_down_interval(config, surface, type_index, k):
+def update_hardover_down_and_interval(config, surface, type_index, k):
     """The same downwards."""
-    return consistent_held_or_returning_interval(
+    return update_releases_and_consistent_interval(
         config,
         surface,
         type_index,
@@ -602,7 +604,7 @@ def lower_stop_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | 
 
 HARDOVER_UP = FaultType(
     name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
-    reset_memory=allow_release_before_alarm, consistent_interval=consistent_hardover_up_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=update_hardover_up_and_interval,
     on_possible_release=add_hardover_up_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
     stop_direction=1,
@@ -611,7 +613,7 @@ HARDOVER_UP = FaultType(
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
-    reset_memory=allow_release_before_alarm, consistent_interval=consistent_hardover_down_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=update_hardover_down_and_interval,
     on_possible_release=add_hardover_down_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
     stop_direction=-1,

@@ -45,10 +45,10 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 def _load_column_sources_and_failure_names() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
-    column_sources_and_failure_names: dict[str, dict[str, Any]] = json.loads(
+    description_by_section: dict[str, dict[str, Any]] = json.loads(
         Path(__file__).with_name("alfa.json").read_text("utf-8")
     )
-    return column_sources_and_failure_names
+    return description_by_section
 
 
 def read(path: Path) -> RecordedFlight:

@@ -199,9 +199,9 @@ def _join_blocks_into_parts(
                 remaining_cells = joined_cells.select_rows(
                     rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)
                 )
-                part_cells.text_cell_summaries, part_cells.broken_lines = (
+                part_cells.text_cell_summaries, part_cells.broken_line_beginnings = (
                     joined_cells.text_cell_summaries,
-                    joined_cells.broken_lines,
+                    joined_cells.broken_line_beginnings,
                 )
                 held_blocks, n_held_rows = [remaining_cells], remaining_cells.n_rows
                 yield (

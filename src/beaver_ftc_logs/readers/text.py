@@ -44,7 +44,7 @@ class TableCells:
     n_rows: int
     n_rows_before: int = 0
     text_cell_summaries: dict[str, tuple[int, int, str]] = field(default_factory=dict)
-    broken_lines: list[str] = field(default_factory=list)
+    broken_line_beginnings: list[str] = field(default_factory=list)
 
     def select_rows(self, first_row: int, end_row: int | None = None) -> "TableCells":
         """The rows from first_row to before end_row, of which nothing else is said."""
@@ -59,7 +59,7 @@ def join_and_consume_blocks(blocks: Sequence[TableCells]) -> TableCells:
     numbers = {name: np.concatenate([block.numbers.pop(name) for block in blocks]) for name in column_names}
     joined_cells = TableCells(numbers, sum(block.n_rows for block in blocks), first_block.n_rows_before)
     for block in blocks:
-        joined_cells.broken_lines += block.broken_lines
+        joined_cells.broken_line_beginnings += block.broken_line_beginnings
         for name, (n_text_cells, row, cell) in block.text_cell_summaries.items():
             earlier_summary = joined_cells.text_cell_summaries.get(name, (0, row, cell))
             joined_cells.text_cell_summaries[name] = (earlier_summary[0] + n_text_cells, *earlier_summary[1:])
@@ -141,13 +141,13 @@ def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -
     """The numbers of some of a file's columns, block by block, one at least."""
     from pyarrow import csv
 
-    broken_lines: list[str] = []
+    broken_line_beginnings: list[str] = []
     options = {
         "read_options": csv.ReadOptions(
             column_names=layout.column_names, skip_rows=layout.header_line_index + 1, block_size=_BLOCK_BYTES
         ),
         "parse_options": csv.ParseOptions(
-            delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken_lines)
+            delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken_line_beginnings)
         ),
         "convert_options": _all_text_conversion(layout.column_names, wanted_columns),
     }
@@ -159,27 +159,30 @@ def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -
                 name: _convert_column_and_record_text(block[name], layout.decimal_mark, name, cells)
                 for name in wanted_columns
             }
-            cells.broken_lines, broken_lines[:] = broken_lines[:], []
+            cells.broken_line_beginnings, broken_line_beginnings[:] = broken_line_beginnings[:], []
             n_rows_read += block.num_rows
             yield cells
     yield TableCells(
-        {name: np.empty(0) for name in wanted_columns}, 0, n_rows_read, broken_lines=broken_lines
+        {name: np.empty(0) for name in wanted_columns},
+        0,
+        n_rows_read,
+        broken_line_beginnings=broken_line_beginnings,
     )
 
 
 def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
     """Raise BadInput where too many lines have another number of cells than the header."""
-    n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
+    n_broken, n_lines = len(cells.broken_line_beginnings), cells.n_rows + len(cells.broken_line_beginnings)
     if n_broken > _MAX_BROKEN_LINE_SHARE * n_lines:
         reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
         raise _unreadable_error(
-            path, f"{reason}, {len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
+            path, f"{reason}, {len(layout.column_names)}: the first {cells.broken_line_beginnings[0]!r}"
         )
 
 
-def _broken_line_recorder(broken_lines: list[str]) -> Callable[[Any], str]:
+def _broken_line_recorder(broken_line_beginnings: list[str]) -> Callable[[Any], str]:
     def record_line(row: Any) -> str:
-        broken_lines.append((row.text or "")[:60])
+        broken_line_beginnings.append((row.text or "")[:60])
         return "skip"
 
     return record_line
@@ -243,5 +246,5 @@ def text_cell_and_layout_remarks(layout: TableLayout, table_cells: TableCells) -
     if layout.delimiter != ",":
         decimal_comma_text = ", with a decimal comma" if layout.decimal_mark == "," else ""
         yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{decimal_comma_text}"
-    if table_cells.broken_lines:
-        yield "", f"lines with too few or too many cells, left out: {len(table_cells.broken_lines)}"
+    if table_cells.broken_line_beginnings:
+        yield "", f"lines with too few or too many cells, left out: {len(table_cells.broken_line_beginnings)}"

@@ -21,16 +21,18 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
 
     wanted_columns: the columns that are kept in memory, all where None.
     """
-    topics = {
+    data_by_topic = {
         _topic_name(topic): topic.data
         for topic in _read_topics(path, wanted_columns)
         if len(topic.data.get(_TIME_FIELD, ()))
     }
-    if wanted_columns is not None and topics:
-        topics = {name: _select_wanted_fields(name, data, wanted_columns) for name, data in topics.items()}
-    if not topics:
+    if wanted_columns is not None and data_by_topic:
+        data_by_topic = {
+            name: _select_wanted_fields(name, data, wanted_columns) for name, data in data_by_topic.items()
+        }
+    if not data_by_topic:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    columns, origin_s = columns_and_time_origin(topics, _TIME_FIELD)
+    columns, origin_s = columns_and_time_origin(data_by_topic, _TIME_FIELD)
     notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
     return RecordedFlight(path.stem, columns, notes=notes)
 

@@ -145,11 +145,11 @@ class InteractingMultipleModels:
         if loss_probability_by_main_surface[most_likely_axis] < self.options["isolate"]:
             min_candidate_probability = 1.0 - self.options["isolate"]
             candidates = tuple(
-                candidate_name
-                for candidate_name, probability in zip(
+                main_surface_name
+                for main_surface_name, loss_probability in zip(
                     self.context.leaders, loss_probability_by_main_surface, strict=True
                 )
-                if probability > min_candidate_probability
+                if loss_probability > min_candidate_probability
             )
             return Verdict(True, "pqr"[most_likely_axis], statistic=statistic, candidates=candidates)
         effectiveness_change = float(

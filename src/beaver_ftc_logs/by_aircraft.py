@@ -81,10 +81,10 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
 class AircraftDiagnosisInputs:
     """A log as inputs of the diagnosis.
 
-    input_arrays: rates, signals, commands and attitude, (n, ...) each, as `stepped.log_input_column_names`.
-    mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
-    rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
-    which the diagnosis is stepped without a reset."""
+    input_arrays: rates, signals, commands and attitude, (n, ...) each, as
+    `stepped.log_column_names_of_each_input`. mean_age_s_by_held_column: mean age of the values of each column
+    that is held. has_missing_value (n,): rows in which an input is not a number. gap_free_stretches: first
+    row and end of each stretch through which the diagnosis is stepped without a reset."""
 
     samples: Samples
     diagnosis: "Diagnosis"
@@ -243,8 +243,8 @@ def _log_rate_hz(samples: Samples) -> float:
 def _read_sample_inputs(
     samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.log_input_column_names`, and the mean
-    age of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
+    """Rates, signals, commands and attitude at each sample, as `stepped.log_column_names_of_each_input`, and
+    the mean age of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
     si_columns = convert_to_si(recording, vehicle).columns
     mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
 

@@ -307,7 +307,9 @@ def _fit_least_squares_of_order_uncached(
             f"identify: rate {motionless_axes[0]} does not move, allowed: flights in which every rate does"
         )
     dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
-    return regression.least_squares(regressors, rates, stretch_number, round(_NEWEY_WEST_MAX_LAG_S / dt_s))
+    return regression.ordinary_least_squares(
+        regressors, rates, stretch_number, round(_NEWEY_WEST_MAX_LAG_S / dt_s)
+    )
 
 
 def stacked_regression_data(
@@ -918,7 +920,7 @@ def _choose_alarm_threshold(
 def _max_column_mistake_log_likelihood_gain(model: Model, held_out: FlightWithUsableRows) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    sample_log_likelihood_gain_by_correction, _ = trust.log_likelihood_gain_of_corrections(
+    sample_log_likelihood_gain_by_correction, _ = trust.min_log_likelihood_gains_and_part_size(
         replace(held_out.samples, rates=rates), model
     )
     return (

@@ -19,7 +19,7 @@ from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
 _S_PER_US = 1e-6
-_N_NEAREST_NAMES = 10
+_N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
 """Least value of a divisor that may be zero."""
 
@@ -59,13 +59,15 @@ def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
         sorted_names, key=lambda name: -SequenceMatcher(None, name.lower(), wanted_name.lower()).ratio()
     )
     nearest_text = (
-        ", ".join(name if name.isprintable() else repr(name) for name in ranked_names[:_N_NEAREST_NAMES])
+        ", ".join(
+            name if name.isprintable() else repr(name) for name in ranked_names[:_N_LISTED_NEAREST_NAMES]
+        )
         or "none"
     )
     return (
         nearest_text
-        if len(sorted_names) <= _N_NEAREST_NAMES
-        else f"{nearest_text}, and {len(sorted_names) - _N_NEAREST_NAMES} more"
+        if len(sorted_names) <= _N_LISTED_NEAREST_NAMES
+        else f"{nearest_text}, and {len(sorted_names) - _N_LISTED_NEAREST_NAMES} more"
     )
 
 

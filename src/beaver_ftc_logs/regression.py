@@ -181,7 +181,7 @@ class RateRegression:
     coefficient_error_correlation: Floats
 
 
-def least_squares(
+def ordinary_least_squares(
     regressors: Floats, rates: Floats, stretch_number: NDArray[np.int64], newey_west_max_lag: int
 ) -> RateRegression:
     """Ordinary least squares of rates (n, 3) on regressors (n, m), with Newey-West standard errors over

@@ -34,7 +34,7 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    column_names_of_each_input = [*stepped.log_input_column_names(aircraft), ["altitude_m"]]
+    column_names_of_each_input = [*stepped.log_column_names_of_each_input(aircraft), ["altitude_m"]]
     log_columns = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
     ordered_input_arrays = [

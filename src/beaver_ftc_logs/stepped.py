@@ -49,7 +49,7 @@ def declared_errors(scenario: Any) -> dict[str, Any]:
     return {key: scenario_values[key] for key in _ERROR_DECLARING_SCENARIO_KEYS if key in scenario_values}
 
 
-def log_input_column_names(aircraft: Any) -> tuple[list[str], ...]:
+def log_column_names_of_each_input(aircraft: Any) -> tuple[list[str], ...]:
     """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
     attitude."""
     return (
@@ -64,7 +64,7 @@ def replay_samples(
     diagnosis: Diagnosis, ordered_input_arrays: Sequence[Floats], rate_hz: float
 ) -> ReplayedVerdicts:
     """The verdicts of evenly spaced samples; ordered_input_arrays: as
-    `log_input_column_names`, (n, ...) each."""
+    `log_column_names_of_each_input`, (n, ...) each."""
     verdicts: list[Verdict] = []
     innovation, innovation_bound = (
         np.empty_like(ordered_input_arrays[0]),

@@ -35,7 +35,7 @@ _MAX_FALSE_MISTAKE_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _DISTRUST_AFTER_CLIPPING_S = 30.0
 _MIN_MOVED_EFFECT_POWER_RATIO = 1e-6
-_MAX_EXPLAINED_SHARE, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
+_MAX_SHARE_EXPLAINED_BY_OTHERS, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR = 10.0, 1.6
 _MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
@@ -234,7 +234,7 @@ def is_group_effect_known(model: Model) -> list[bool]:
     if model.fitted_ranges is None or not model.fitted_ranges.effect_share_explained_by_other_regressors:
         return [True] * len(model.groups)
     return [
-        explained_share_of_group < _MAX_EXPLAINED_SHARE
+        explained_share_of_group < _MAX_SHARE_EXPLAINED_BY_OTHERS
         for explained_share_of_group in model.fitted_ranges.effect_share_explained_by_other_regressors
     ]
 
@@ -497,7 +497,7 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     another law (`FittedRanges.misread`).
     """
     min_sample_log_likelihood_gain_by_correction, n_effective_part_samples = (
-        log_likelihood_gain_of_corrections(samples, model)
+        min_log_likelihood_gains_and_part_size(samples, model)
     )
     if not min_sample_log_likelihood_gain_by_correction:
         return None
@@ -522,7 +522,7 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     )
 
 
-def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
+def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
     corrected_logs = list(

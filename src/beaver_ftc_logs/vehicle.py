@@ -305,25 +305,25 @@ class Vehicle(Section):
 
     def quantities_of_known_kind(self) -> list[tuple[Location, str, QuantityColumn]]:
         """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        quantities: list[tuple[Location, str, QuantityColumn]] = [
+        locations_kinds_and_quantities: list[tuple[Location, str, QuantityColumn]] = [
             (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
         ]
         if self.attitude is not None:
-            quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
+            locations_kinds_and_quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
             for angle_name in ("pitch", "yaw"):
                 if (angle_column := getattr(self.attitude, angle_name)) is not None:
-                    quantities.append((("attitude", angle_name), ANGLE, angle_column))
+                    locations_kinds_and_quantities.append((("attitude", angle_name), ANGLE, angle_column))
         if self.acceleration is not None:
-            quantities.append((("acceleration",), ACCELERATION, self.acceleration))
+            locations_kinds_and_quantities.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:
-            quantities.append((("airspeed",), SPEED, self.airspeed))
+            locations_kinds_and_quantities.append((("airspeed",), SPEED, self.airspeed))
         if self.energy is not None:
-            quantities.append((("energy", "altitude"), LENGTH, self.energy.altitude))
-            quantities.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
+            locations_kinds_and_quantities.append((("energy", "altitude"), LENGTH, self.energy.altitude))
+            locations_kinds_and_quantities.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
         for name in ("alpha_rad", "beta_rad"):
             if name in self.flow:
-                quantities.append((("flow", name), ANGLE, self.flow[name]))
-        return quantities
+                locations_kinds_and_quantities.append((("flow", name), ANGLE, self.flow[name]))
+        return locations_kinds_and_quantities
 
     def _conflicting_column_reading_mistakes(self) -> list[Conflict]:
         """One column read in two ways."""
@@ -343,11 +343,13 @@ class Vehicle(Section):
 
     def model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
-        quantities: list[tuple[Location, QuantityColumn]] = [
+        locations_and_quantities: list[tuple[Location, QuantityColumn]] = [
             (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
         ]
-        quantities += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
-        return quantities + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
+        locations_and_quantities += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
+        return locations_and_quantities + [
+            (("signals", i), quantity) for i, quantity in enumerate(self.signals)
+        ]
 
     @property
     def command_column_names(self) -> list[str]:

@@ -135,7 +135,7 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
         )
         flight_entries += [
             {"left_out": held_out_name, "method": method_title, **_score_against_log(held_out, rows, model)}
-            for method_title, rows in _diagnosis_rows_of_methods(recording, held_out, model)
+            for method_title, rows in _diagnose_with_each_method(recording, held_out, model)
         ]
     has_labels = "classes" in flight_entries[0]
     summarize = summarize_label_scores if has_labels else summarize_failure_scores
@@ -158,7 +158,7 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
     }
 
 
-def _diagnosis_rows_of_methods(
+def _diagnose_with_each_method(
     recording: RecordedFlight, held_out: FlightWithUsableRows, model: Model
 ) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
@@ -186,11 +186,11 @@ def settings_of_whole_flight(
 
 def _score_against_log(held_out: FlightWithUsableRows, rows: DiagnosisRows, model: Model) -> Document:
     if np.isfinite(held_out.samples.labels).any():
-        return scoring.score_against_labels(rows, labels_in_usable_span(held_out))
+        return scoring.score_against_labels(rows, labels_nan_outside_usable_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_in_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
+def labels_nan_outside_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
     usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)

@@ -127,14 +127,20 @@ def apply_day_changes(
     """The flight as it might have been on that day. lagged_rate_coefficients (3 h, 3) and noise_covariance
     (3, 3) of its model."""
     rng = np.random.default_rng(20)
-    effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    effectiveness_or_one = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
     trim_commands = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
         day.common_gain * day.surface_gains
     )
-    trim_drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
-    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + trim_drift) / effectiveness
+    trim_drift_as_commands = day.trim_drift_sd_commands * _coloured_noise(
+        rng, commands.shape, 300.0 / samples.dt_s
+    )
+    commands = (
+        commands
+        + day.neutral_shift_commands
+        + (day.trim_shift_commands + trim_drift_as_commands) / effectiveness_or_one
+    )
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
     extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
@@ -233,7 +239,7 @@ def _score_days(
             altered_samples = apply_day_changes(
                 day, held_out.samples, lagged_rate_coefficients, noise_covariance
             )
-            labels = benchmark.labels_in_usable_span(held_out)
+            labels = benchmark.labels_nan_outside_usable_span(held_out)
             for detector_name, part_scores in scores_by_detector.items():
                 part_scores.append(
                     scoring.score_against_labels(

@@ -177,7 +177,7 @@ def test_standard_errors_hold_for_colour_of_two_seconds():
     usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 400)])
     x, y, run = fitting.stacked_regression_data(usable_flights, MODEL.vehicle, 2, 3)
     found = fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3)
-    expected = regression.least_squares(x, y, run, 20)
+    expected = regression.ordinary_least_squares(x, y, run, 20)
     np.testing.assert_array_equal(found.standard_errors, expected.standard_errors)
 
 

@@ -87,7 +87,7 @@ def drawn(n=40, m=4, seed=1):
 
 def test_least_squares_and_its_covariance():
     x, y, run = drawn()
-    fit = regression.least_squares(x, y, run, 3)
+    fit = regression.ordinary_least_squares(x, y, run, 3)
     np.testing.assert_allclose(fit.coefficients, np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)
     rest = y - x @ fit.coefficients
     np.testing.assert_allclose(fit.residual_covariance, rest.T @ rest / 36, rtol=1e-9)
@@ -102,7 +102,7 @@ def test_least_squares_and_its_covariance():
 def test_standard_errors_for_coloured_residuals(reach):
     """Newey and West, pair by pair of samples of one stretch: Bartlett's weight of their distance."""
     x, y, run = drawn()
-    fit = regression.least_squares(x, y, run, reach)
+    fit = regression.ordinary_least_squares(x, y, run, reach)
     rest = y - x @ fit.coefficients
     inverse = np.linalg.inv(x.T @ x)
     distance = np.abs(np.subtract.outer(np.arange(40), np.arange(40)))
@@ -118,14 +118,14 @@ def test_what_is_not_excited_gets_no_coefficient():
     """A column of zeros, and one twice: the least coefficients that fit, and colour of one where none is."""
     x, y, run = drawn(m=3)
     wide = np.column_stack([x, x[:, 0], np.zeros(40)])
-    fit = regression.least_squares(wide, y, run, 2)
-    alone = regression.least_squares(x, y, run, 2)
+    fit = regression.ordinary_least_squares(wide, y, run, 2)
+    alone = regression.ordinary_least_squares(x, y, run, 2)
     np.testing.assert_allclose(fit.coefficients[0], fit.coefficients[3], rtol=1e-6)
     np.testing.assert_allclose(fit.coefficients[0] * 2, alone.coefficients[0], rtol=1e-6)
     assert fit.coefficients[4].tolist() == [0.0] * 3
     assert fit.standard_error_inflation[4].tolist() == [1.0] * 3
     assert np.isfinite(fit.coefficient_error_correlation).all()
-    few = regression.least_squares(x[:3], y[:3], run[:3], 5)
+    few = regression.ordinary_least_squares(x[:3], y[:3], run[:3], 5)
     assert np.isfinite(few.residual_covariance).all()
 
 
@@ -146,7 +146,7 @@ def test_a_direction_excited_too_little_gets_no_coefficient(share, excited):
     off = 2.0 * np.sqrt(share)
     x = np.column_stack([a, a + off * b])
     y = np.column_stack([x @ [1.0, -2.0]] * 3)
-    found = regression.least_squares(x, y, np.zeros(200, dtype=int), 0).coefficients[:, 0]
+    found = regression.ordinary_least_squares(x, y, np.zeros(200, dtype=int), 0).coefficients[:, 0]
     np.testing.assert_allclose(found, [1.0, -2.0] if excited else [-0.5, -0.5], atol=1e-3)
 
 
@@ -199,7 +199,7 @@ def test_a_column_of_rounding_gets_no_coefficient_and_changes_no_other():
     x = np.column_stack([np.ones(400), rng.standard_normal((400, 2)) * [0.3, 40.0]])
     y = x @ np.array([[0.5, -1.0, 2.0], [3.0, 0.2, -0.7], [0.01, 0.02, -0.03]])
     dead = np.column_stack([x[:, :2], 1e-140 * rng.standard_normal(400), x[:, 2:]])
-    fit = regression.least_squares(dead, y, np.zeros(400, dtype=int), 5)
+    fit = regression.ordinary_least_squares(dead, y, np.zeros(400, dtype=int), 5)
     assert fit.coefficients[2].tolist() == [0.0, 0.0, 0.0]
     np.testing.assert_allclose(fit.coefficients[[0, 1, 3]], np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)
 

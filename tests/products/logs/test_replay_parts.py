@@ -209,7 +209,7 @@ def test_columns_that_a_log_must_have(tmp_path):
     with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
         of._read_columns(path, ["t_s", "c"])
     aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
-    assert stepped.log_input_column_names(aircraft) == (
+    assert stepped.log_column_names_of_each_input(aircraft) == (
         ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
         ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
         [f"{name}_cmd_rad" for name in SURFACES],

@@ -113,7 +113,7 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
         "validation_folds": lambda stretches: folds,
         "fit_model": lambda fitted, *of: ([one.samples.name for one in fitted], *of),
         "add_fitted_ranges_and_alarm_threshold": lambda fitted, model: (len(fitted), *model),
-        "_diagnosis_rows_of_methods": lambda recording, kept, model: [
+        "_diagnose_with_each_method": lambda recording, kept, model: [
             (method, (recording.name, kept.samples.name)) for method in ("ours", "other")
         ],
         "_score_against_log": lambda kept, rows, model: {

@@ -190,7 +190,7 @@ def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
     monkeypatch.setattr(benchmark, "diagnose_with_detector", lambda name, samples, model: name)
     usable_flight = FlightWithUsableRows(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._diagnosis_rows_of_methods(recording(usable_flight.samples), usable_flight, MODEL))
+    found = list(benchmark._diagnose_with_each_method(recording(usable_flight.samples), usable_flight, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip
@@ -200,11 +200,11 @@ def test_labels_count_in_the_span_of_what_is_kept():
     samples = small.flight(MODEL, 10)
     use = np.zeros(10, dtype=bool)
     use[[2, 3, 7]] = True
-    labels = benchmark.labels_in_usable_span(FlightWithUsableRows(samples, use))
+    labels = benchmark.labels_nan_outside_usable_span(FlightWithUsableRows(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
     assert np.isnan(
-        benchmark.labels_in_usable_span(FlightWithUsableRows(samples, np.zeros(10, dtype=bool)))
+        benchmark.labels_nan_outside_usable_span(FlightWithUsableRows(samples, np.zeros(10, dtype=bool)))
     ).all()
 
 

@@ -28,7 +28,7 @@ _NO_RESPONSE_TRANSITION_SHARE = 0.02
 _PAIR_EFFECTIVENESS_LEVELS = (0.25, 0.5, 0.75)
 _PRIOR_ALL_HEALTHY_PROBABILITY, _PRIOR_NO_RESPONSE_PROBABILITY = 0.7, 0.2
 _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE = 0.3, 6.0
-_MAX_SQUARED_RESIDUAL = 30.0
+_MAX_INFORMATIVE_SQUARED_RESIDUAL = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
 
@@ -119,7 +119,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         )
     hypothesis_rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
     effectiveness, hypothesis_kind, transition_share, rate_offset_variance = (
-        np.array(per_hypothesis_values) for per_hypothesis_values in zip(*hypothesis_rows, strict=True)
+        np.array(values_of_one_field) for values_of_one_field in zip(*hypothesis_rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
     change_probability_per_sample = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
@@ -185,7 +185,7 @@ def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list
 
 def _pair_hypotheses(n_groups: int, indices_of_groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
-    group_and_level_pairs = list(
+    group_pairs_with_level_pairs = list(
         product(
             combinations(indices_of_groups_with_hypotheses, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2)
         )
@@ -194,10 +194,10 @@ def _pair_hypotheses(n_groups: int, indices_of_groups_with_hypotheses: list[int]
         (
             _group_effectiveness_row(n_groups, dict(zip(group_pair, level_pair, strict=True))),
             PAIR_LOSS,
-            _PAIR_LOSS_TRANSITION_SHARE / len(group_and_level_pairs),
+            _PAIR_LOSS_TRANSITION_SHARE / len(group_pairs_with_level_pairs),
             np.zeros(3),
         )
-        for group_pair, level_pair in group_and_level_pairs
+        for group_pair, level_pair in group_pairs_with_level_pairs
     ]
 
 
@@ -235,10 +235,11 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     settings, n_groups = model.settings, len(model.groups)
     _, _, response_coefficients, residual_covariance = model.intercept_past_response_noise()
     residual_variance = np.diag(residual_covariance)
-    trim_shift_sd_by_group = response_coefficients.sum(axis=1) * settings.trim_command_shift_sd
+    trim_sd_of_group_shift_rad_s = response_coefficients.sum(axis=1) * settings.trim_command_shift_sd
     initial_covariance = np.zeros((4 + n_groups, 4 + n_groups))
     initial_covariance[:3, :3] = (
-        np.diag(residual_variance * settings.trim_sd**2) + trim_shift_sd_by_group.T @ trim_shift_sd_by_group
+        np.diag(residual_variance * settings.trim_sd**2)
+        + trim_sd_of_group_shift_rad_s.T @ trim_sd_of_group_shift_rad_s
     )
     initial_covariance[3, 3] = settings.gain_sd**2
     initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
@@ -265,10 +266,10 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
 
 def _gain_variance_beyond_level_step(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
-    gain_variance = np.zeros(len(model.groups))
+    gain_estimation_error_variance = np.zeros(len(model.groups))
     if model.fitted_ranges is not None and model.fitted_ranges.group_gain_standard_error:
-        gain_variance += np.array(model.fitted_ranges.group_gain_standard_error) ** 2
-    return np.maximum(gain_variance - model.settings.effectiveness_level_step**2, 0.0)
+        gain_estimation_error_variance += np.array(model.fitted_ranges.group_gain_standard_error) ** 2
+    return np.maximum(gain_estimation_error_variance - model.settings.effectiveness_level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):
@@ -297,7 +298,9 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
     flight is whitened, empty if it is not."""
     settings = model.settings
     max_squared_residual = (
-        _MAX_SQUARED_RESIDUAL if len(model.residual_ar_coefficients(noise_ma_coefficients)) else np.inf
+        _MAX_INFORMATIVE_SQUARED_RESIDUAL
+        if len(model.residual_ar_coefficients(noise_ma_coefficients))
+        else np.inf
     )
     scale_memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(

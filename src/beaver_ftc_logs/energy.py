@@ -12,9 +12,9 @@ from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc_logs.recording import Floats
 
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
-UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE = 0.15
+UNPOWERED_SHARE_OF_HEALTHY_FLIGHT = 0.15
 """Share of healthy flight in which the energy height falls as fast as without power."""
-_ENERGY_HEIGHT_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
+_ENERGY_HEIGHT_WINDOW_S, _ENGINE_NAMING_DELAY_AFTER_ALARM_S = 5.0, 3.0
 
 
 def compute_energy_height_rate_mps(
@@ -62,13 +62,13 @@ def withdraw_surfaces_where_engine_may_have_failed(
             for condition in (falls_as_without_power, is_rising)
         )
         may_engine_have_failed = (last_falling_index > last_rising_index)[begin - evidence_begin_row :]
-        falling_share = np.cumsum(falls_as_without_power[begin - evidence_begin_row :]) / np.arange(
-            1, end - begin + 1
-        )
+        falling_share_since_alarm = np.cumsum(
+            falls_as_without_power[begin - evidence_begin_row :]
+        ) / np.arange(1, end - begin + 1)
         may_engine_be_named = (
             may_engine_have_failed
-            & (falling_share > 0.5)
-            & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_S)
+            & (falling_share_since_alarm > 0.5)
+            & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_AFTER_ALARM_S)
         )
         engine_or_unknown_names = np.where(
             np.logical_or.accumulate(may_engine_be_named) & may_engine_have_failed, ENGINE, UNKNOWN_SURFACE

@@ -97,7 +97,7 @@ def _estimate_unpowered_energy_height_rate_mps(
     )
     energy_height_rates_mps = energy_height_rates_mps[np.isfinite(energy_height_rates_mps)]
     return (
-        float(np.quantile(energy_height_rates_mps, energy.UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE))
+        float(np.quantile(energy_height_rates_mps, energy.UNPOWERED_SHARE_OF_HEALTHY_FLIGHT))
         if energy_height_rates_mps.size
         else None
     )

@@ -39,8 +39,8 @@ _MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
 _MAX_RELATIVE_STEP_JITTER = 0.1
 _MIN_STRETCH_SAMPLES = 50
 _AIR_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
-_MAX_COMMAND_TRAVEL_RATIO = 1.1
-_UNEXPLAINED_START_WINDOW_S = 1.0
+_MAX_COMMAND_TO_STOP_RATIO = 1.1
+_UNANTICIPATED_FAULT_AT_START_WINDOW_S = 1.0
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
@@ -81,15 +81,15 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
 class AircraftDiagnosisInputs:
     """A log as inputs of the diagnosis.
 
-    input_arrays: rates, signals, commands and attitude, (n, ...) each, as
-    `stepped.log_column_names_of_each_input`. mean_age_s_by_held_column: mean age of the values of each column
-    that is held. has_missing_value (n,): rows in which an input is not a number. gap_free_stretches: first
-    row and end of each stretch through which the diagnosis is stepped without a reset."""
+    rates_signals_commands_attitude: one array (n, ...) each, as `stepped.log_column_names_of_each_input`.
+    mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
+    rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
+    which the diagnosis is stepped without a reset."""
 
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
-    input_arrays: list[Floats]
+    rates_signals_commands_attitude: list[Floats]
     mean_age_s_by_held_column: dict[str, float]
     has_missing_value: Mask
     gap_free_stretches: list[tuple[int, int]]
@@ -109,11 +109,11 @@ def read_diagnosis_inputs(
     rate_hz = _log_rate_hz(samples)
     diagnosis = Diagnosis(diagnosed_aircraft.aircraft, rate_hz, **diagnosed_aircraft.declared_errors)
     needs_attitude = diagnosis.declared.air.moves
-    input_arrays, mean_age_s_by_held_column = _read_sample_inputs(
+    rates_signals_commands_attitude, mean_age_s_by_held_column = _read_sample_inputs(
         samples, recording, vehicle, diagnosed_aircraft.aircraft, needs_attitude
     )
-    _check_units_plausible(samples.name, input_arrays, diagnosed_aircraft.aircraft)
-    has_missing_value = np.asarray(~np.isfinite(np.hstack(input_arrays)).all(axis=1))
+    _check_units_plausible(samples.name, rates_signals_commands_attitude, diagnosed_aircraft.aircraft)
+    has_missing_value = np.asarray(~np.isfinite(np.hstack(rates_signals_commands_attitude)).all(axis=1))
     gap_free_stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
     if not gap_free_stretches:
         raise BadInput(
@@ -129,7 +129,7 @@ def read_diagnosis_inputs(
         samples,
         diagnosis,
         rate_hz,
-        input_arrays,
+        rates_signals_commands_attitude,
         mean_age_s_by_held_column,
         has_missing_value,
         gap_free_stretches,
@@ -150,13 +150,17 @@ def diagnose_inputs(
     """The rows and the document of verdict.json."""
     samples = aircraft_inputs.samples
     diagnosis = aircraft_inputs.diagnosis
-    input_arrays = aircraft_inputs.input_arrays
+    rates_signals_commands_attitude = aircraft_inputs.rates_signals_commands_attitude
     gap_free_stretches = aircraft_inputs.gap_free_stretches
     replayed_verdicts_by_stretch = []
     for begin, end in gap_free_stretches:
         diagnosis.reset()
         replayed_verdicts_by_stretch.append(
-            replay_samples(diagnosis, [array[begin:end] for array in input_arrays], aircraft_inputs.rate_hz)
+            replay_samples(
+                diagnosis,
+                [array[begin:end] for array in rates_signals_commands_attitude],
+                aircraft_inputs.rate_hz,
+            )
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_command_signs(samples.name, diagnosed_aircraft.aircraft, replayed_verdicts_by_stretch)
@@ -170,8 +174,11 @@ def diagnose_inputs(
         samples.t_s, replayed_flight_verdicts, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
     )
     rows_by_reason = _undiagnosable_rows_by_reason(
-        input_arrays[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
-    ) | _rows_after_unexplained_start_by_reason(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
+        rates_signals_commands_attitude[1],
+        diagnosed_aircraft.aircraft,
+        aircraft_inputs.has_missing_value,
+        gap_free_stretches,
+    ) | _rows_by_reason_after_unanticipated_start(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
     rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, rows_by_reason))
     return rows, _verdict_document(
         samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
@@ -245,48 +252,50 @@ def _read_sample_inputs(
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.log_column_names_of_each_input`, and
     the mean age of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
-    si_columns = convert_to_si(recording, vehicle).columns
+    si_column_by_name = convert_to_si(recording, vehicle).columns
     mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
 
     def sampled_values(quantity_column: QuantityColumn) -> Floats:
         values, mean_age_s = values_and_mean_age_at(
-            si_columns[quantity_column.column], samples.t_s, samples.dt_s
+            si_column_by_name[quantity_column.column], samples.t_s, samples.dt_s
         )
         if mean_age_s is not None:
             mean_age_s_by_held_column[quantity_column.column] = mean_age_s
         return values
 
-    alpha_rad, beta_rad, qdyn_pa, *aircraft_signals = (
+    alpha_rad, beta_rad, qdyn_pa, *signals_beyond_flow = (
         sampled_values(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
     assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signals = [alpha_rad, beta_rad, sampled_values(vehicle.airspeed), qdyn_pa, *aircraft_signals]
+    signal_arrays = [alpha_rad, beta_rad, sampled_values(vehicle.airspeed), qdyn_pa, *signals_beyond_flow]
     surface_indices = _vehicle_surface_indices(vehicle, aircraft)
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
     if needs_attitude:
         for axis, angle_name in enumerate(_ATTITUDE_ANGLE_NAMES):
             quantity_column = getattr(vehicle.attitude, angle_name) if vehicle.attitude else None
-            if quantity_column is None or quantity_column.column not in si_columns:
+            if quantity_column is None or quantity_column.column not in si_column_by_name:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
                 raise BadInput(f"{samples.name}: attitude.{angle_name}: {reason}")
             attitude[:, axis] = sampled_values(quantity_column)
     return [
         samples.rates,
-        np.column_stack(signals),
+        np.column_stack(signal_arrays),
         samples.commands[:, surface_indices] * full_deflection_rad,
         attitude,
     ], mean_age_s_by_held_column
 
 
-def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraft: Aircraft) -> None:
+def _check_units_plausible(
+    flight_name: str, rates_signals_commands_attitude: list[Floats], aircraft: Aircraft
+) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    signals, commands = input_arrays[1], input_arrays[2]
+    signals, commands = rates_signals_commands_attitude[1], rates_signals_commands_attitude[2]
     for signal_index, name in enumerate(("alpha_rad", "beta_rad")):
-        median_angle_magnitude = _median_without_nan(np.abs(signals[:, signal_index]))
-        if median_angle_magnitude > 0.5 * pi:
+        median_flow_angle_magnitude = _median_without_nan(np.abs(signals[:, signal_index]))
+        if median_flow_angle_magnitude > 0.5 * pi:
             raise BadInput(
-                f"{flight_name}: flow.{name} is {median_angle_magnitude:.3g} in the middle, "
+                f"{flight_name}: flow.{name} is {median_flow_angle_magnitude:.3g} in the middle, "
                 "allowed: rad; `unit: deg`?"
             )
     is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
@@ -303,7 +312,7 @@ def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraf
         travel = aircraft.travel[surface]
         max_deflection_rad = max(abs(travel.min_rad), abs(travel.max_rad))
         max_command_rad = np.nanmax(np.abs(commands[:, surface_index]), initial=0.0)
-        if max_command_rad > _MAX_COMMAND_TRAVEL_RATIO * max_deflection_rad:
+        if max_command_rad > _MAX_COMMAND_TO_STOP_RATIO * max_deflection_rad:
             reason = (
                 f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
                 f"{max_deflection_rad:.3g} rad"
@@ -378,15 +387,15 @@ def _undiagnosable_rows_by_reason(
     }
 
 
-def _rows_after_unexplained_start_by_reason(
+def _rows_by_reason_after_unanticipated_start(
     t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight_verdicts: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
-    is_after_unexplained_alarm = np.zeros(len(t_s), dtype=bool)
+    is_after_unanticipated_fault_alarm = np.zeros(len(t_s), dtype=bool)
     for begin, end in gap_free_stretches:
         first_second_end_row = begin + int(
-            np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_START_WINDOW_S)
+            np.searchsorted(t_s[begin:end], t_s[begin] + _UNANTICIPATED_FAULT_AT_START_WINDOW_S)
         )
         if any(
             verdict.isolated == "unanticipated"
@@ -395,11 +404,11 @@ def _rows_after_unexplained_start_by_reason(
             first_alarm_row = next(
                 k for k in range(begin, first_second_end_row) if replayed_flight_verdicts.verdicts[k].detected
             )
-            is_after_unexplained_alarm[first_alarm_row:end] = True
+            is_after_unanticipated_fault_alarm[first_alarm_row:end] = True
     reason = (
         "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
     )
-    return {reason: is_after_unexplained_alarm}
+    return {reason: is_after_unanticipated_fault_alarm}
 
 
 def _add_rows_after_doubtful_alarm(

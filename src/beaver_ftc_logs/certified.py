@@ -16,7 +16,9 @@ from beaver_ftc_logs.by_aircraft import AircraftDiagnosisInputs
 from beaver_ftc_logs.diagnose import DiagnosisRows
 
 
-def write_certificate(aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path) -> None:
+def write_certificate_and_log(
+    aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path
+) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
     stretches_with_alarm = (
@@ -25,17 +27,21 @@ def write_certificate(aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisR
         if rows.faulty[stretch[0] : stretch[1]].any()
     )
     begin, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
-    stretch_inputs = [np.ascontiguousarray(array[begin:end]) for array in aircraft_inputs.input_arrays]
+    stretch_inputs = [
+        np.ascontiguousarray(array[begin:end]) for array in aircraft_inputs.rates_signals_commands_attitude
+    ]
     diagnosis = aircraft_inputs.diagnosis
 
-    def step_samples() -> Iterator[int]:
+    def step_diagnosis_and_yield_index() -> Iterator[int]:
         for sample_index, sample in enumerate(zip(*stretch_inputs, strict=True)):
             diagnosis.step(*sample)
             yield sample_index
 
     diagnosis.reset()
-    frame_record, scenario = diagnosis.inside()
-    named_scenario = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
-    log, document = by_frames.proved(named_scenario, frame_record, step_samples())
+    diagnosis_memory, scenario = diagnosis.inside()
+    scenario_named_as_flight = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
+    log, document = by_frames.proved(
+        scenario_named_as_flight, diagnosis_memory, step_diagnosis_and_yield_index()
+    )
     document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[begin])})
-    by_frames.write(named_scenario, log, document, folder)
+    by_frames.write(scenario_named_as_flight, log, document, folder)

@@ -80,10 +80,10 @@ def identify(
     )
     model = identify(loaded_flights, loaded_vehicle)
     page_html = render_identification(loaded_flights, model)
-    for path, text in ((out, model_file_text(model)), (page_path, page_html)):
+    for path, file_text in ((out, model_file_text(model)), (page_path, page_html)):
         with clear_disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, text.encode("utf-8"))
+            write_whole(path, file_text.encode("utf-8"))
     document = {
         "model": str(out),
         "page": str(page_path),
@@ -187,7 +187,7 @@ def diagnose(options: DiagnoseOptions) -> None:
     check_detector_name(options.detector)
     model = load_model(options.model)
     verdicts = [
-        _diagnose_flight(flight, model, out, options.score, options.detector)
+        _diagnose_flight_and_write_results(flight, model, out, options.score, options.detector)
         for flight in stream_flights(flights, model.vehicle, options.reader)
     ]
     answer(
@@ -221,12 +221,12 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 def _check_replay_options(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
-    options_without_effect = {
+    is_given_by_ignored_option = {
         "--score": options.score,
         "--detector": options.detector != "bank-of-filters",
         "--reader": options.reader is not None,
     }
-    for option, is_given in options_without_effect.items():
+    for option, is_given in is_given_by_ignored_option.items():
         if is_given:
             raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
@@ -261,11 +261,13 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
             samples, surfaces = aircraft_inputs.samples, diagnosed_aircraft.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
-            write_proof = (
-                partial(certified.write_certificate, aircraft_inputs, rows) if options.certificate else None
+            certificate_writer = (
+                partial(certified.write_certificate_and_log, aircraft_inputs, rows)
+                if options.certificate
+                else None
             )
             folder = write_diagnosis_with_aircraft_model(
-                options.out, samples, surfaces, rows, verdict, write_proof
+                options.out, samples, surfaces, rows, verdict, certificate_writer
             )
             verdicts.append(verdict | {"folder": str(folder)})
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
@@ -275,10 +277,10 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
-    other_logs = [path for path in flights if not is_log_of_run(path)]
-    if other_logs:
+    paths_of_other_logs = [path for path in flights if not is_log_of_run(path)]
+    if paths_of_other_logs:
         reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
-        raise BadInput(f"diagnose: {other_logs[0]}: {reason}")
+        raise BadInput(f"diagnose: {paths_of_other_logs[0]}: {reason}")
     replays = [replay_run_log(path) for path in flights]
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
@@ -287,7 +289,7 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _diagnose_flight(
+def _diagnose_flight_and_write_results(
     samples: "Samples", model: "Model", out: Path, with_score: bool, detector_name: str
 ) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with_detector
@@ -303,8 +305,8 @@ def _diagnose_flight(
     return verdict | {"folder": str(folder)}
 
 
-def compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
-    """Compare ways to diagnose the recorded flights in a folder; page: a page of Markdown to update."""
+def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Path | None) -> None:
+    """Compare ways to diagnose the recorded flights in a folder; markdown_page: path of a page to update."""
     from beaver_ftc.results import result_folder
     from beaver_ftc.studies.present import write_files
     from beaver_ftc_logs.recorded.benchmark import as_text, result_files, run_benchmark, update_page
@@ -312,20 +314,20 @@ def compare_recorded(folder: Path, out: Path, format: Format, page: Path | None)
     document = run_benchmark(folder)
     with result_folder(out, "recorded-flights") as result_dir:
         write_files(result_dir, result_files(document))
-    if page is not None:
-        update_page(document, page)
-        figure_path = page.parent / "images" / "recorded-flights.png"
+    if markdown_page is not None:
+        update_page(document, markdown_page)
+        figure_path = markdown_page.parent / "images" / "recorded-flights.png"
         if figure_path.parent.is_dir():
             figure_path.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
     answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
 
 
-def compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
-    """The same on days made of the labelled flights."""
+def compare_other_days(folder: Path, format: Format, markdown_page: Path | None) -> None:
+    """The same on other days that are made by changing the labelled flights."""
     from beaver_ftc_logs.recorded.benchmark import as_text, update_page
     from beaver_ftc_logs.recorded.other_days import run_other_days
 
     document = {"other_days": run_other_days(folder)}
-    if page is not None:
-        update_page(document, page)
+    if markdown_page is not None:
+        update_page(document, markdown_page)
     answer(format, document, lambda: as_text(document))

@@ -352,7 +352,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
         verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
     verdicts[5] = by_aircraft.Verdict(True)
     given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._rows_after_unexplained_start_by_reason(
+    ((says, mask),) = by_aircraft._rows_by_reason_after_unanticipated_start(
         np.arange(10) * 0.5, [(1, 5), (5, 10)], given
     ).items()
     assert (says.partition(":")[0], true(mask)) == (

@@ -129,36 +129,40 @@ def _log_size_text(samples: Samples) -> str:
 
 def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, attitude_columns = recording.columns, vehicle.attitude
-    if attitude_columns is None or attitude_columns.roll.column not in columns:
+    columns, attitude_quantity_columns = recording.columns, vehicle.attitude
+    if attitude_quantity_columns is None or attitude_quantity_columns.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
-    rate_columns = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch_quantity_column = attitude_columns.pitch
-    pitch_in_si = (
+    rate_columns_in_si = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
+    pitch_quantity_column = attitude_quantity_columns.pitch
+    pitch_column_in_si = (
         _column_in_si(columns, pitch_quantity_column)
         if pitch_quantity_column is not None and pitch_quantity_column.column in columns
         else None
     )
     roll_fit = physics.fit_roll_angle_to_rates(
-        rate_columns, _column_in_si(columns, attitude_columns.roll), pitch_in_si
+        rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
     )
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    comparison_texts = [_angle_rate_fit_text(roll_fit, attitude_columns.roll.column, vehicle.rates.p.column)]
-    if pitch_quantity_column is not None and pitch_in_si is not None:
+    comparison_texts = [
+        _angle_rate_fit_text(roll_fit, attitude_quantity_columns.roll.column, vehicle.rates.p.column)
+    ]
+    if pitch_quantity_column is not None and pitch_column_in_si is not None:
         pitch_fit = physics.fit_pitch_angle_to_rates(
-            rate_columns, _column_in_si(columns, attitude_columns.roll), pitch_in_si
+            rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
         )
         comparison_texts += (
             [_angle_rate_fit_text(pitch_fit, pitch_quantity_column.column, vehicle.rates.q.column)]
             if pitch_fit
             else []
         )
-    if (yaw_quantity_column := attitude_columns.yaw) is not None and yaw_quantity_column.column in columns:
+    if (
+        yaw_quantity_column := attitude_quantity_columns.yaw
+    ) is not None and yaw_quantity_column.column in columns:
         yaw_fit = physics.fit_yaw_angle_to_rates(
-            rate_columns,
-            _column_in_si(columns, attitude_columns.roll),
-            pitch_in_si,
+            rate_columns_in_si,
+            _column_in_si(columns, attitude_quantity_columns.roll),
+            pitch_column_in_si,
             _column_in_si(columns, yaw_quantity_column),
         )
         comparison_texts += (
@@ -190,19 +194,21 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     reader_name = reader_name or reader_name_for_path(path)
-    time_column_and_unit = _find_time_column_and_unit(path, remarks) if reader_name == "table" else None
-    recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
-    recording = next(read_parts(path, reader_name, time_column_and_unit, recognized_columns))
+    time_column_and_unit = _require_time_column_and_unit(path, remarks) if reader_name == "table" else None
+    names_of_columns_to_read = (
+        _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
+    )
+    recording = next(read_parts(path, reader_name, time_column_and_unit, names_of_columns_to_read))
     names_with_numbers = [
         name for name, column in recording.columns.items() if np.isfinite(column.values).any()
     ]
-    column_of_quantity = {
-        quantity: _matching_column(pattern, names_with_numbers)
+    column_name_by_quantity = {
+        quantity: _shortest_matching_column_name(pattern, names_with_numbers)
         for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
-    command_columns = _command_columns(names_with_numbers, column_of_quantity)
-    missing_axes = [axis for axis in "pqr" if column_of_quantity[axis] is None]
-    if missing_axes or not command_columns:
+    command_column_names = _command_column_names(names_with_numbers, column_name_by_quantity)
+    missing_axes = [axis for axis in "pqr" if column_name_by_quantity[axis] is None]
+    if missing_axes or not command_column_names:
         problem = (
             f"no column looks like the rate {missing_axes[0]}"
             if missing_axes
@@ -214,7 +220,7 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
         )
         return None
     return _propose_vehicle(
-        path.stem, recording, reader_name, time_column_and_unit, column_of_quantity, command_columns
+        path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, command_column_names
     )
 
 
@@ -223,19 +229,19 @@ def _propose_vehicle(
     recording: RecordedFlight,
     reader_name: str,
     time_column_and_unit: tuple[str, str] | None,
-    column_of_quantity: dict[str, str | None],
+    column_name_by_quantity: dict[str, str | None],
     command_column_names: list[str],
 ) -> Document:
     columns = recording.columns
-    roll_column = columns[column_of_quantity["roll"]] if column_of_quantity["roll"] else None
+    roll_column = columns[column_name_by_quantity["roll"]] if column_name_by_quantity["roll"] else None
     angle_unit = (
-        _guess_angle_unit(str(column_of_quantity["roll"]), roll_column, reader_name)
+        _guess_angle_unit(str(column_name_by_quantity["roll"]), roll_column, reader_name)
         if roll_column is not None
         else "rad"
     )
     rate_unit = _guess_rate_unit(
         recording,
-        [str(column_of_quantity[axis]) for axis in "pqr"],
+        [str(column_name_by_quantity[axis]) for axis in "pqr"],
         roll_column,
         KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
@@ -243,21 +249,22 @@ def _propose_vehicle(
     if time_column_and_unit and time_column_and_unit != (TIME_COLUMN, "s"):
         vehicle["time"] = {"column": time_column_and_unit[0], "unit": time_column_and_unit[1]}
     vehicle["rates"] = {
-        axis: _vehicle_file_column_entry(str(column_of_quantity[axis]), rate_unit, "rad/s") for axis in "pqr"
+        axis: _vehicle_file_column_entry(str(column_name_by_quantity[axis]), rate_unit, "rad/s")
+        for axis in "pqr"
     }
     vehicle["commands"] = [
         _vehicle_file_command_entry(name, columns[name].values) for name in command_column_names
     ]
     vehicle["surfaces"] = {_as_vehicle_or_surface_name(name): {name: 1.0} for name in command_column_names}
-    angle_column_names = {
-        axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]
+    column_name_by_angle = {
+        axis: column_name_by_quantity[axis] for axis in ("roll", "pitch") if column_name_by_quantity[axis]
     }
     if roll_column is not None:
         vehicle["attitude"] = {
             axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
-            for axis, name in angle_column_names.items()
+            for axis, name in column_name_by_angle.items()
         }
-    if z_acceleration_column_name := column_of_quantity["az"]:
+    if z_acceleration_column_name := column_name_by_quantity["az"]:
         median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column_name].values)))
         acceleration_unit = (
             nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median_magnitude, 2.0)
@@ -268,23 +275,21 @@ def _propose_vehicle(
             vehicle["acceleration"] = _vehicle_file_column_entry(
                 z_acceleration_column_name, acceleration_unit, "m/s2"
             )
-    if column_of_quantity["airspeed"]:
-        vehicle["airspeed"] = column_of_quantity["airspeed"]
+    if column_name_by_quantity["airspeed"]:
+        vehicle["airspeed"] = column_name_by_quantity["airspeed"]
     return vehicle
 
 
-def _recognized_columns(names: Iterable[str]) -> list[str]:
+def _names_of_columns_to_read(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
-    recognized = [
-        name
-        for name in names
-        if re.fullmatch(pattern, _snake_case_name(name)) or _may_be_command_column(name)
+    names_like_quantity_or_command = [
+        name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or _is_name_like_command(name)
     ]
-    return recognized[:_MAX_READ_COLUMNS]
+    return names_like_quantity_or_command[:_MAX_READ_COLUMNS]
 
 
-def _may_be_command_column(column_name: str) -> bool:
+def _is_name_like_command(column_name: str) -> bool:
     return bool(
         re.search(_COMMAND_NAME_PATTERN, column_name.lower())
         and not re.search(_NOT_A_COMMAND_NAME_PATTERN, column_name.lower())
@@ -299,32 +304,38 @@ def _snake_case_name(column_name: str) -> str:
     return re.sub(r"[\s/]+", "_", name_with_unit_suffix)
 
 
-def _matching_column(pattern: str, names: Sequence[str]) -> str | None:
+def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
     matching_names = [
         name
         for name in names
-        if re.fullmatch(pattern, _snake_case_name(name)) and not _may_be_command_column(name)
+        if re.fullmatch(pattern, _snake_case_name(name)) and not _is_name_like_command(name)
     ]
     return min(matching_names, key=lambda name: (len(name), name), default=None)
 
 
-def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | None]) -> list[str]:
-    columns_of_other_quantities = set(column_of_quantity.values())
+def _command_column_names(names: Sequence[str], column_name_by_quantity: dict[str, str | None]) -> list[str]:
+    names_of_other_quantity_columns = set(column_name_by_quantity.values())
     return [
-        name for name in names if _may_be_command_column(name) and name not in columns_of_other_quantities
+        name for name in names if _is_name_like_command(name) and name not in names_of_other_quantity_columns
     ][:_MAX_PROPOSED_COMMANDS]
 
 
-def _find_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
+def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
-    table_columns = column_names(path)
-    columns_named_like_time = [
-        name for name in table_columns if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
+    table_column_names = column_names(path)
+    names_like_time = [
+        name
+        for name in table_column_names
+        if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
     ]
-    for name in sorted(columns_named_like_time, key=lambda name: name != TIME_COLUMN):
-        stamps = first_numbers_of_column(path, name)
-        median_step = float(np.median(np.diff(stamps[np.isfinite(stamps)][:50]))) if len(stamps) > 1 else 0.0
+    for name in sorted(names_like_time, key=lambda name: name != TIME_COLUMN):
+        first_stamps = first_numbers_of_column(path, name)
+        median_step = (
+            float(np.median(np.diff(first_stamps[np.isfinite(first_stamps)][:50])))
+            if len(first_stamps) > 1
+            else 0.0
+        )
         plausible_units = [
             unit
             for unit, seconds_per_unit in SECONDS_PER_TIME_UNIT.items()
@@ -341,7 +352,7 @@ def _find_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str
     allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     raise BadInput(
         f"{path}: no column of time, allowed: {allowed_text}; it has "
-        f"{nearest_names_text(TIME_COLUMN, table_columns)}"
+        f"{nearest_names_text(TIME_COLUMN, table_column_names)}"
     )
 
 
@@ -368,10 +379,10 @@ def _guess_rate_unit(
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
-    logged_rates = [recording.columns[name] for name in rate_column_names]
+    logged_rate_columns = [recording.columns[name] for name in rate_column_names]
     if roll_column is not None:
         roll_fit = physics.fit_roll_angle_to_rates(
-            logged_rates, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
+            logged_rate_columns, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
         )
         if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
@@ -387,7 +398,8 @@ def _guess_rate_unit(
         return unit_in_name
     return (
         "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in logged_rates) > _MAX_RATE_NUMBER_READ_AS_RAD_S
+        if max(_largest_magnitude(rate.values) for rate in logged_rate_columns)
+        > _MAX_RATE_NUMBER_READ_AS_RAD_S
         else "rad/s"
     )
 

@@ -53,14 +53,19 @@ def logs_with_one_mistake_corrected(
             f"the commands of {surfaces[first_surface_index]} and {surfaces[second_surface_index]} exchanged",
             exchanged_samples,
         )
-    for first_rate_name, second_rate_name in combinations(rate_column_names, 2):
+    for first_rate_column_name, second_rate_column_name in combinations(rate_column_names, 2):
         exchanged_samples = _with_exchanged_or_scaled_columns(
             samples,
             vehicle,
-            {first_rate_name: second_rate_name, second_rate_name: first_rate_name},
+            {
+                first_rate_column_name: second_rate_column_name,
+                second_rate_column_name: first_rate_column_name,
+            },
             {},
         )
-        yield CorrectedLog(f"{first_rate_name} and {second_rate_name} exchanged", exchanged_samples)
+        yield CorrectedLog(
+            f"{first_rate_column_name} and {second_rate_column_name} exchanged", exchanged_samples
+        )
     for name in [*rate_column_names, *vehicle.signal_column_names]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
@@ -77,11 +82,15 @@ def _with_exchanged_or_scaled_columns(
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
     column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.signal_regressor_names
     columns = dict(zip(column_names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
-    new_columns = []
+    new_rates_and_signals = []
     for name in column_names:
-        stem, suffix = name.removesuffix(" by airspeed"), name[len(name.removesuffix(" by airspeed")) :]
-        new_columns.append(
-            factor_of_column.get(stem, 1.0) * columns[source_column_of_column.get(stem, stem) + suffix]
+        logged_column_name, airspeed_suffix = (
+            name.removesuffix(" by airspeed"),
+            name[len(name.removesuffix(" by airspeed")) :],
         )
-    new_signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
-    return replace(samples, rates=np.column_stack(new_columns[:3]), signals=new_signals)
+        new_rates_and_signals.append(
+            factor_of_column.get(logged_column_name, 1.0)
+            * columns[source_column_of_column.get(logged_column_name, logged_column_name) + airspeed_suffix]
+        )
+    new_signals = np.column_stack(new_rates_and_signals[3:]) if new_rates_and_signals[3:] else samples.signals
+    return replace(samples, rates=np.column_stack(new_rates_and_signals[:3]), signals=new_signals)

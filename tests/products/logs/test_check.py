@@ -327,19 +327,27 @@ def test_names_as_the_patterns_have_them():
     plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
     assert {name: check._as_vehicle_or_surface_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
-    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], rates) == "GyrX"
+    assert check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], rates) == "GyrX"
     assert (
-        check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"])
+        check._shortest_matching_column_name(
+            check._COLUMN_NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"]
+        )
         == "agyro_x"
     )
-    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"]) == "GyrX"
-    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"]) == "gyro_x"
-    assert check._matching_column(check._COLUMN_NAME_PATTERNS["r"], rates) is None
+    assert (
+        check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"])
+        == "GyrX"
+    )
+    assert (
+        check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"])
+        == "gyro_x"
+    )
+    assert check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["r"], rates) is None
     commands = ["Aileron", "rudder_position", "da", "servo1", "elevator_truth", "elevon_error", "roll"]
-    assert check._command_columns(commands, {"p": "da"}) == ["Aileron", "servo1"]
-    assert len(check._command_columns([f"servo{k}" for k in range(9)], {})) == 8
+    assert check._command_column_names(commands, {"p": "da"}) == ["Aileron", "servo1"]
+    assert len(check._command_column_names([f"servo{k}" for k in range(9)], {})) == 8
     wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
-    assert check._recognized_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]
+    assert check._names_of_columns_to_read(wide) == ["p", *(f"servo{k}" for k in range(59))]
 
 
 @pytest.mark.parametrize(("correlation", "says"), [
@@ -364,9 +372,9 @@ def test_time_is_the_column_whose_steps_fit_a_log(tmp_path, text, found, lines):
     path.write_text(text)
     if found is None:
         with pytest.raises(BadInput, match=r"no column of time, allowed: a table with t_s in seconds"):
-            check._find_time_column_and_unit(path, said)
+            check._require_time_column_and_unit(path, said)
         return
-    assert (check._find_time_column_and_unit(path, said), said) == (found, lines)
+    assert (check._require_time_column_and_unit(path, said), said) == (found, lines)
 
 
 @pytest.mark.parametrize(("down", "acceleration"), [

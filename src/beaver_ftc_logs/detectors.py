@@ -117,7 +117,7 @@ def _diagnosis_rows_from_least_squares(
     below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
     standard deviations."""
     bank = build_hypothesis_bank(model)
-    low_by_standard_error, high_by_standard_error = (
+    low_from_standard_error, high_from_standard_error = (
         np.clip(
             effectiveness + sign * _STANDARD_ERRORS_OF_90_PERCENT * effectiveness_standard_error, 0.0, 1.0
         )
@@ -127,10 +127,10 @@ def _diagnosis_rows_from_least_squares(
     has_loss = effectiveness + _MIN_LOSS_STANDARD_ERRORS * effectiveness_standard_error < 1.0
     if model.settings.likely_effectiveness_levels_by_group:
         for group_index, group in enumerate(model.groups):
-            likely_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
+            labelled_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
             levels = (
-                np.array([*likely_levels, 1.0])
-                if likely_levels
+                np.array([*labelled_levels, 1.0])
+                if labelled_levels
                 else np.unique(bank.effectiveness[:, group_index])
             )
             estimated_effectiveness[:, group_index] = levels[
@@ -138,8 +138,8 @@ def _diagnosis_rows_from_least_squares(
             ]
         has_loss = estimated_effectiveness < 1.0
     group_bounds_by_side = {
-        "low": np.minimum(low_by_standard_error, estimated_effectiveness),
-        "high": np.maximum(high_by_standard_error, estimated_effectiveness),
+        "low": np.minimum(low_from_standard_error, estimated_effectiveness),
+        "high": np.maximum(high_from_standard_error, estimated_effectiveness),
     }
     surface_bounds_by_side = {
         side: expand_group_values_to_surfaces(bound, model) for side, bound in group_bounds_by_side.items()
@@ -179,10 +179,10 @@ def diagnose_by_freeze_rule(
 ) -> DiagnosisRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surface_names = list(model.vehicle.surfaces)
-    quantity_column_by_surface = model.vehicle.outputs
+    output_quantity_column_by_surface = model.vehicle.outputs
     servo_output_column_name_by_surface = {
         name: quantity_column.column
-        for name, quantity_column in quantity_column_by_surface.items()
+        for name, quantity_column in output_quantity_column_by_surface.items()
         if quantity_column.column in recording.columns
     }
     if not servo_output_column_name_by_surface:
@@ -223,11 +223,11 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
-    surface_groups = surface_indices_by_group(model)
-    if len(surface_groups) > len(LOOP_SURFACE_BY_GROUP_INDEX):
+    surface_indices_of_groups = surface_indices_by_group(model)
+    if len(surface_indices_of_groups) > len(LOOP_SURFACE_BY_GROUP_INDEX):
         raise BadInput(
-            f"{model.vehicle.name}: {len(surface_groups)} groups of surfaces, allowed for a detector of the "
-            f"loop: at most {len(LOOP_SURFACE_BY_GROUP_INDEX)}"
+            f"{model.vehicle.name}: {len(surface_indices_of_groups)} groups of surfaces, allowed for a "
+            f"detector of the loop: at most {len(LOOP_SURFACE_BY_GROUP_INDEX)}"
         )
     is_predictable, rates_unexplained_by_past, group_responses = unexplained_rates_and_responses(
         samples, model
@@ -239,13 +239,15 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
         is_predictable[:, None], rates_unexplained_by_past - intercept - group_responses.sum(axis=1), 0.0
     )
     expected_acceleration = (predicted_rates - previous_rates) / dt_s
-    contribution = np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP))
+    acceleration_contributions = np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP))
     command = np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP))
-    predictable_responses = np.where(is_predictable[:, None, None], group_responses, 0.0)
-    for group_index, surface_indices in enumerate(surface_groups):
-        contribution[:, :, group_index] = predictable_responses[:, group_index] / dt_s
+    group_responses_or_zero = np.where(is_predictable[:, None, None], group_responses, 0.0)
+    for group_index, surface_indices in enumerate(surface_indices_of_groups):
+        acceleration_contributions[:, :, group_index] = group_responses_or_zero[:, group_index] / dt_s
         command[:, group_index] = np.nan_to_num(samples.commands[:, surface_indices].sum(axis=1))
-    frames = zip(samples.t_s.tolist(), rates, expected_acceleration, contribution, command, strict=True)
+    frames = zip(
+        samples.t_s.tolist(), rates, expected_acceleration, acceleration_contributions, command, strict=True
+    )
     model_error_sd_rad_s2 = _model_error_sd_rad_s2(model)
     return [
         (
@@ -254,12 +256,12 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
                 frame_rates,
                 np.zeros(N_Y),
                 expected_rad_s2,
-                frame_contribution,
+                frame_acceleration_contributions,
                 model_error_sd_rad_s2.copy(),
             ),
             frame_command,
         )
-        for t_s, frame_rates, expected_rad_s2, frame_contribution, frame_command in frames
+        for t_s, frame_rates, expected_rad_s2, frame_acceleration_contributions, frame_command in frames
     ]
 
 
@@ -293,20 +295,22 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Dia
 
 def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n_samples, surface_groups = len(verdicts), surface_indices_by_group(model)
-    faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
+    n_samples, surface_indices_of_groups = len(verdicts), surface_indices_by_group(model)
+    faulty = np.array([_is_statistic_high_or_detected(verdict) for verdict in verdicts], dtype=np.int64)
     effectiveness, effectiveness_low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
     isolated_names = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACE_BY_GROUP_INDEX[: len(surface_groups)]:
+        if verdicts[k].isolated not in LOOP_SURFACE_BY_GROUP_INDEX[: len(surface_indices_of_groups)]:
             isolated_names[k], effectiveness_low[k] = UNKNOWN_SURFACE, 0.0
             continue
         group_index = LOOP_SURFACE_BY_GROUP_INDEX.index(str(verdicts[k].isolated))
-        isolated_names[k], effectiveness_low[k, surface_groups[group_index]] = (
+        isolated_names[k], effectiveness_low[k, surface_indices_of_groups[group_index]] = (
             "+".join(model.groups[group_index]),
             0.0,
         )
-        effectiveness[k, surface_groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
+        effectiveness[k, surface_indices_of_groups[group_index]] = _remaining_effectiveness(
+            verdicts[k], group_index
+        )
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
     return _rows_with_default_bounds(
@@ -319,7 +323,7 @@ def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, mode
     )
 
 
-def _raises_alarm(verdict: Verdict) -> bool:
+def _is_statistic_high_or_detected(verdict: Verdict) -> bool:
     """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
     return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
 
@@ -355,12 +359,12 @@ def diagnose_with_detector(detector_name: str, samples: Samples, model: Model) -
     check_log_fits_model(samples, model)
     if detector_name == BANK_OF_FILTERS_DETECTOR:
         return diagnose(samples, model)
-    samples_without_frozen_or_clipped_rates = with_rates_unknown_where_frozen_or_clipped(samples, model)
+    samples_with_bad_rates_unknown = with_rates_unknown_where_frozen_or_clipped(samples, model)
     if detector_name in _FLIGHT_DETECTORS:
         return finalize_rows_at_log_stamps(
-            samples, model, _FLIGHT_DETECTORS[detector_name](samples_without_frozen_or_clipped_rates, model)
+            samples, model, _FLIGHT_DETECTORS[detector_name](samples_with_bad_rates_unknown, model)
         )
     detector: Detector = made(DETECTORS, detector_name)
     return finalize_rows_at_log_stamps(
-        samples, model, run_loop_detector(detector, samples_without_frozen_or_clipped_rates, model)
+        samples, model, run_loop_detector(detector, samples_with_bad_rates_unknown, model)
     )

@@ -60,7 +60,7 @@ class DiagnosisRows:
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
-    def without_estimate(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
+    def with_uninformative_estimate(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where is_removed (n,) or (n, S) is true."""
         is_removed_by_surface = is_removed if is_removed.ndim == 2 else is_removed[:, None]
         return replace(
@@ -85,7 +85,7 @@ class DiagnosisRows:
         is_removed = np.zeros(len(self.t_s), dtype=bool)
         for has_reason in rows_by_reason.values():
             is_removed |= has_reason
-        rows = self.without_estimate(is_removed).without_alarm(is_removed)
+        rows = self.with_uninformative_estimate(is_removed).without_alarm(is_removed)
         return replace(rows, credible=np.where(is_removed, 0, 1), not_credible_rows_by_reason=rows_by_reason)
 
 
@@ -93,13 +93,13 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_log_fits_model(samples, model)
     bank = build_hypothesis_bank(model)
-    samples_without_frozen_or_clipped_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
-    posterior, _, _ = hypothesis_posterior(samples_without_frozen_or_clipped_rates, model, bank)
+    samples_with_bad_rates_unknown = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
+    posterior, _, _ = hypothesis_posterior(samples_with_bad_rates_unknown, model, bank)
     has_no_response = posterior[:, bank.no_response_hypothesis_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = diagnosis_rows_from_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
         rows = _withdraw_contradicted_isolation(
-            samples_without_frozen_or_clipped_rates, model, rows, model.settings.alarm_threshold
+            samples_with_bad_rates_unknown, model, rows, model.settings.alarm_threshold
         )
     return finalize_rows_at_log_stamps(samples, model, rows, has_no_response)
 
@@ -121,19 +121,19 @@ def finalize_rows_at_log_stamps(
         rows_by_reason["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _add_surfaces_of_unknown_effect_to_names(
+    rows = _add_unknown_effect_surfaces_widening_bounds(
         samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
-    is_group_gain_known = np.array(trust.is_group_gain_known(model), dtype=float)[None]
+    group_gain_known_as_float = np.array(trust.is_group_gain_known(model), dtype=float)[None]
     is_surface_gain_unknown = np.broadcast_to(
-        expand_group_values_to_surfaces(is_group_gain_known, model) == 0.0, rows.effectiveness_low.shape
+        expand_group_values_to_surfaces(group_gain_known_as_float, model) == 0.0, rows.effectiveness_low.shape
     )
     return _rows_at_log_stamps(
-        samples, rows.without_estimate(is_surface_gain_unknown).without_verdict(rows_by_reason)
+        samples, rows.with_uninformative_estimate(is_surface_gain_unknown).without_verdict(rows_by_reason)
     )
 
 
-def _add_surfaces_of_unknown_effect_to_names(
+def _add_unknown_effect_surfaces_widening_bounds(
     samples: Samples, model: Model, rows: DiagnosisRows
 ) -> DiagnosisRows:
     """Rows whose name also has each surface of unknown effect that may be at fault in place of the isolated
@@ -192,7 +192,8 @@ def _withdraw_isolation_after_engine_failure(
         rows.evidence_start_time_s,
     )
     return replace(
-        rows.without_estimate(isolated_names != rows.isolated_surfaces), isolated_surfaces=isolated_names
+        rows.with_uninformative_estimate(isolated_names != rows.isolated_surfaces),
+        isolated_surfaces=isolated_names,
     )
 
 
@@ -229,7 +230,7 @@ def _withdraw_contradicted_isolation(
             max_log_likelihood_gain - log_likelihood_gain_by_group[:, group_index] > min_log_likelihood_gain
         )
     return replace(
-        rows.without_estimate(is_contradicted),
+        rows.with_uninformative_estimate(is_contradicted),
         isolated_surfaces=np.where(is_contradicted, UNKNOWN_SURFACE, rows.isolated_surfaces),
     )
 
@@ -277,19 +278,19 @@ def diagnosis_rows_from_posterior(
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
     )
     is_health_or_no_response_likelier = posterior[:, 0] + no_response_probability > 0.5
-    alarm_threshold = model.settings.alarm_threshold
+    alarm_evidence_threshold = model.settings.alarm_threshold
     evidence_increments = any_fault_log_odds_gains(posterior, bank)
-    fault_evidence = page_cusum(evidence_increments, alarm_threshold or np.inf)
-    is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
+    fault_evidence = page_cusum(evidence_increments, alarm_evidence_threshold or np.inf)
+    has_alarm_evidence = has_isolation_evidence = _has_held_long_enough(
         fault_probability >= model.settings.fault_probability_for_alarm, model
     )
-    if alarm_threshold is not None:
-        naming_threshold = model.settings.isolation_evidence_factor * alarm_threshold
-        is_alarm_raised = (fault_evidence >= alarm_threshold) & ~is_health_or_no_response_likelier
+    if alarm_evidence_threshold is not None:
+        naming_evidence_threshold = model.settings.isolation_evidence_factor * alarm_evidence_threshold
+        has_alarm_evidence = (fault_evidence >= alarm_evidence_threshold) & ~is_health_or_no_response_likelier
         has_isolation_evidence = (
-            page_cusum(evidence_increments, naming_threshold) >= naming_threshold
+            page_cusum(evidence_increments, naming_evidence_threshold) >= naming_evidence_threshold
         ) & ~is_health_or_no_response_likelier
-    faulty = _latch_until_healthy(is_alarm_raised, is_health_or_no_response_likelier).astype(np.int64)
+    faulty = _latch_until_healthy(has_alarm_evidence, is_health_or_no_response_likelier).astype(np.int64)
     evidence_start_rows = np.maximum.accumulate(
         np.where(fault_evidence <= 0.0, np.arange(len(fault_evidence)), 0)
     )
@@ -359,15 +360,15 @@ def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray
 
 
 def _latch_until_healthy(
-    is_raised: NDArray[np.bool_], is_health_or_no_response_likelier: NDArray[np.bool_]
+    has_evidence: NDArray[np.bool_], is_health_or_no_response_likelier: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
-    row_indices = np.arange(len(is_raised))
-    last_raised_row = np.maximum.accumulate(np.where(is_raised, row_indices, -1))
+    row_indices = np.arange(len(has_evidence))
+    last_evidence_row = np.maximum.accumulate(np.where(has_evidence, row_indices, -1))
     last_healthy_row = np.maximum.accumulate(
-        np.where(is_health_or_no_response_likelier & ~is_raised, row_indices, -1)
+        np.where(is_health_or_no_response_likelier & ~has_evidence, row_indices, -1)
     )
-    return np.asarray((last_raised_row >= 0) & (last_raised_row > last_healthy_row))
+    return np.asarray((last_evidence_row >= 0) & (last_evidence_row > last_healthy_row))
 
 
 def _group_level_distribution(
@@ -415,19 +416,19 @@ def _surfaces_at_fault(
     out.
     """
     fault_probability = np.maximum(posterior[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    share_of_fault_by_group = [
+    fault_share_columns_of_groups = [
         posterior[:, bank.is_fault_of_group(group_index)].sum(axis=1) / fault_probability
         for group_index in range(len(model.groups))
     ]
-    group_share_of_fault = np.column_stack(share_of_fault_by_group)
-    is_group_likely = (group_share_of_fault > _MIN_FAULT_PROBABILITY_SHARE_FOR_NAME) & has_isolation_evidence[
-        :, None
-    ]
+    fault_share_by_row_and_group = np.column_stack(fault_share_columns_of_groups)
+    is_group_likely = (
+        fault_share_by_row_and_group > _MIN_FAULT_PROBABILITY_SHARE_FOR_NAME
+    ) & has_isolation_evidence[:, None]
     if model.settings.assumes_one_group_at_fault:
-        is_group_loss_hypothesis = bank.hypothesis_kind == GROUP_LOSS
+        is_any_single_group_loss = bank.hypothesis_kind == GROUP_LOSS
         group_loss_probability = np.column_stack(
             [
-                posterior[:, bank.is_fault_of_group(group_index) & is_group_loss_hypothesis].sum(axis=1)
+                posterior[:, bank.is_fault_of_group(group_index) & is_any_single_group_loss].sum(axis=1)
                 for group_index in range(len(model.groups))
             ]
         )

@@ -7,7 +7,7 @@ import pytest
 import small
 
 from beaver_ftc_logs.diagnose import (
-    _add_surfaces_of_unknown_effect_to_names,
+    _add_unknown_effect_surfaces_widening_bounds,
     _would_restore_excluded_surfaces,
 )
 from beaver_ftc_logs.filtering import recent_noise_variance_scale
@@ -60,10 +60,10 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_surfaces_of_unknown_effect_to_names(still, model, rows).isolated_surfaces[20:]) == {
+    assert set(_add_unknown_effect_surfaces_widening_bounds(still, model, rows).isolated_surfaces[20:]) == {
         "left"
     }
-    found = _add_surfaces_of_unknown_effect_to_names(flown, model, rows)
+    found = _add_unknown_effect_surfaces_widening_bounds(flown, model, rows)
     assert set(found.isolated_surfaces[20:]) == {"right+left"}
     assert (found.effectiveness_high[20:] == 1.0).all()
     assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])

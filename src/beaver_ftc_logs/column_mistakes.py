@@ -84,10 +84,8 @@ def _with_exchanged_or_scaled_columns(
     columns = dict(zip(column_names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
     new_rates_and_signals = []
     for name in column_names:
-        logged_column_name, airspeed_suffix = (
-            name.removesuffix(" by airspeed"),
-            name[len(name.removesuffix(" by airspeed")) :],
-        )
+        logged_column_name = name.removesuffix(" by airspeed")
+        airspeed_suffix = name[len(logged_column_name) :]
         new_rates_and_signals.append(
             factor_of_column.get(logged_column_name, 1.0)
             * columns[source_column_of_column.get(logged_column_name, logged_column_name) + airspeed_suffix]

@@ -221,12 +221,12 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 def _check_replay_options(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
-    is_given_by_ignored_option = {
+    given_flag_by_ignored_option = {
         "--score": options.score,
         "--detector": options.detector != "bank-of-filters",
         "--reader": options.reader is not None,
     }
-    for option, is_given in is_given_by_ignored_option.items():
+    for option, is_given in given_flag_by_ignored_option.items():
         if is_given:
             raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
@@ -251,10 +251,10 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
     verdicts = []
     for path in options.flights:
         check_exists(path)
-        vehicle_beside_log = path.with_name("vehicle.yaml")
-        if options.vehicle is None and not vehicle_beside_log.is_file():
+        vehicle_path_beside_log = path.with_name("vehicle.yaml")
+        if options.vehicle is None and not vehicle_path_beside_log.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_beside_log))
+        loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_path_beside_log))
         for recording in read_parts_for_vehicle(path, loaded_vehicle, options.reader):
             aircraft_inputs = read_diagnosis_inputs(recording, loaded_vehicle, diagnosed_aircraft)
             rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed_aircraft)

@@ -157,14 +157,14 @@ def _add_unknown_effect_surfaces_widening_bounds(
         named_surfaces = set(str(names_by_row[k]).split("+"))
         if not named_surfaces <= set(surfaces):
             continue
-        is_in_name = np.array(
+        is_in_extended_name = np.array(
             [surface in named_surfaces or bool(may_be_added[k, i]) for i, surface in enumerate(surfaces)]
         )
-        names_by_row[k] = "+".join(compress(surfaces, is_in_name))
-        if is_in_name.sum() > len(named_surfaces) or (
+        names_by_row[k] = "+".join(compress(surfaces, is_in_extended_name))
+        if is_in_extended_name.sum() > len(named_surfaces) or (
             model.settings.assumes_one_group_at_fault and not _are_in_one_group(named_surfaces, model)
         ):
-            effectiveness_high[k, is_in_name] = 1.0
+            effectiveness_high[k, is_in_extended_name] = 1.0
     return replace(rows, isolated_surfaces=names_by_row, effectiveness_high=effectiveness_high)
 
 
@@ -445,11 +445,14 @@ def _surfaces_at_fault(
     is_unknown_offset_likelier = (
         posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
     )
-    hold_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
+    hold_samples = round(model.settings.isolation_change_hold_s * model.rate_hz)
+    new_name_unchanged_samples = 0
     for k in np.flatnonzero(faulty):
         new_name, previous_name = likely_names[k] or UNKNOWN_SURFACE, isolated_names[k - 1] if k else ""
-        unchanged_samples = (
-            unchanged_samples + 1 if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE) else 0
+        new_name_unchanged_samples = (
+            new_name_unchanged_samples + 1
+            if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE)
+            else 0
         )
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
         keeps_name = previous_name and (
@@ -457,7 +460,7 @@ def _surfaces_at_fault(
             or (
                 previous_name != UNKNOWN_SURFACE
                 and (
-                    unchanged_samples < hold_samples
+                    new_name_unchanged_samples < hold_samples
                     or _would_restore_excluded_surfaces(new_name, previous_name, model)
                 )
             )

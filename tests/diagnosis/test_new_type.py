@@ -186,11 +186,11 @@ FLIGHT = """
 import sys
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
-from beaver_ftc.diagnosis.types.verdict import fault_findings
+from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 reverse = lambda k, u: -u if k >= 20 else u
 plant = DesignPlant(4, 50.0, surface=2, position=reverse, fault_class="all")
-found = lambda plant: fault_findings(plant.fdi, SURFACES)
+found = lambda plant: fault_finding_dict(plant.fdi, SURFACES)
 plant.fly(220, UNCERTAINTIES["random"], until=lambda plant: found(plant)["isolation_type"])
 said = found(plant)
 print(said["isolated"], said["isolation_type"], said["estimate"])

@@ -32,7 +32,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_findings
+from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
@@ -206,7 +206,7 @@ def _estimate(fdi: np.void, surface: int) -> float:
 def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
     if fdi["config"]["diagnoses_all_types"]:
-        return fault_findings(fdi, surfaces)
+        return fault_finding_dict(fdi, surfaces)
     isolated = int(fdi["verdict"]["isolated_estimator"])
     said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
     said["isolation_time_s"] = None

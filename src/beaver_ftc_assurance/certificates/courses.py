@@ -237,7 +237,7 @@ def statement_by_course(
     """
     diagnosis = tape.last.diagnosis
     direction, actuator = TYPES[fault_type].stop_direction, diagnosis.surface_fault_types[surface].actuator
-    rule = RULES[TYPES[fault_type].excluding_frame_comparison_name]
+    rule = RULES[TYPES[fault_type].multi_frame_exclusion_test_name]
     slowest_rad_s = scenario.fdi.slowest_oscillation_rad_s
     for sign in (direction,) if direction else (1, -1):
         bounds = _surface_bounds(tape, history, held, surface, alarm_frame, sign, slowest_rad_s)

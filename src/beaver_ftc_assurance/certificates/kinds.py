@@ -69,8 +69,8 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}
-    if row.excluding_frame_comparison_name:
-        return {f"{name}_course_{row.excluding_frame_comparison_name.replace(' ', '_')}": row.stop_direction}
+    if row.multi_frame_exclusion_test_name:
+        return {f"{name}_course_{row.multi_frame_exclusion_test_name.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
     actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator

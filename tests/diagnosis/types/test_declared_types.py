@@ -12,7 +12,7 @@ import fault_kinds
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.verdict import fault_findings
+from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
@@ -70,7 +70,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
     assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
 
@@ -88,7 +88,7 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     assert known["feasible_sets"]["high"][fault_kinds.STUCK] - known["feasible_sets"]["low"][
         fault_kinds.STUCK
     ] < np.deg2rad(4)
-    assert fault_findings(plant.fdi, SURFACES)["isolated"] == "aileron"
+    assert fault_finding_dict(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
 def test_blocks_see_what_frames_do_not():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import fault_kinds
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.verdict import fault_findings
+from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 from samples import samples
 
 FRAMES = 200
@@ -137,7 +137,7 @@ def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, unc
 def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, share, uncertainty):
     case = {"seed": seed, "rate_hz": 50.0, "airspeed_mps": 45.0}
     plant, code = fly(case, kind, surface, 30, share, uncertainty, frames=700)
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
     if said["isolated"]:
@@ -150,7 +150,7 @@ def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, sha
 def test_a_short_fault_of_any_course_stays_among_the_candidates(kind, case, surface, at, share, uncertainty):
     """Though a constant explains the few frames of it, too."""
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 6)
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     if said["candidates"]:
         name, left = types.TYPE_NAMES[code], said["candidates"]
         assert name in left or f"{SURFACES[surface]}:{name}" in left
@@ -162,7 +162,7 @@ def test_the_estimate_is_certain_to_lie_in_its_interval(kind, true):
     case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
     share = 0.25 if kind == "stuck" else 0.8
     plant, _ = fly(case, kind, 0, 30, share, UNCERTAINTIES["random"], frames=900)
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     low, high = said["estimate_interval"]
     assert said["isolation_type"] == kind
     assert low <= true <= high
@@ -173,7 +173,7 @@ def test_the_estimate_is_certain_to_lie_in_its_interval(kind, true):
 def test_amplitude_and_frequency_of_an_oscillation():
     case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
     plant, _ = fly(case, "oscillatory", 0, 30, 0.5, UNCERTAINTIES["random"], frames=1500)
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolation_type"] == "oscillatory"
     assert said["estimate"] == pytest.approx(0.035, rel=0.05)
     assert said["frequency_rad_s"] == pytest.approx(5.5, rel=0.02)
@@ -183,7 +183,7 @@ def test_what_cannot_be_told_apart_stays_a_candidate():
     """Trailing, jammed at neutral, or all effectiveness lost: no measurement of rates can tell."""
     case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
     plant, _ = fly(case, "float", 0, 30, 0.0, UNCERTAINTIES["random"], frames=900)
-    said = fault_findings(plant.fdi, SURFACES)
+    said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolated"] == "aileron"
     assert said["isolation_type"] is None
     assert set(said["candidates"]) >= {"float", "stuck", "loss_of_effectiveness"}

@@ -49,21 +49,24 @@ def said(*kinds):
 
 
 def test_without_an_alarm_nothing_is_found():
-    found = verdict.fault_findings(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
+    found = verdict.fault_finding_dict(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
     assert (found["isolated"], found["candidates"], found["faults"]) == (None, (), ())
 
 
 def test_what_is_open_is_each_type_of_each_surface_that_is_possible():
-    found = verdict.fault_findings(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
+    found = verdict.fault_finding_dict(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
     expected = [f"aileron:{kind}" for kind in said(*sorted((STUCK, BIAS)))] + said(CONSTANT_LOSS)
     assert found["candidates"] == (*expected[:-1], f"rudder:{expected[-1]}")
     assert found["isolated"] is None
 
 
 def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unanticipated():
-    assert verdict.fault_findings(new({AILERON: []}), SURFACES)["candidates"] == ("aileron", "unanticipated")
-    assert verdict.fault_findings(new(), SURFACES)["candidates"] == ("unanticipated",)
-    both = verdict.fault_findings(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
+    assert verdict.fault_finding_dict(new({AILERON: []}), SURFACES)["candidates"] == (
+        "aileron",
+        "unanticipated",
+    )
+    assert verdict.fault_finding_dict(new(), SURFACES)["candidates"] == ("unanticipated",)
+    both = verdict.fault_finding_dict(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
     assert both == ("aileron", f"rudder:{TYPE_NAMES[STUCK]}")
 
 
@@ -81,7 +84,9 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
         fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][RUDDER],
     ) = named, standing
     fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = excluded
-    assert (f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
+    assert (
+        f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_finding_dict(fdi, SURFACES)["candidates"]
+    ) == possible
 
 
 @pytest.mark.parametrize(
@@ -111,14 +116,14 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
 
 def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
     fdi = new({ELEVATOR: [STUCK, FLOAT]}, verdict=POSITION_OF[ELEVATOR])
-    found = verdict.fault_findings(fdi, SURFACES)
+    found = verdict.fault_finding_dict(fdi, SURFACES)
     assert (found["isolated"], found["isolation_type"]) == ("elevator", None)
     assert (found["isolation_time_s"], found["type_time_s"]) == (12.5, None)
     assert set(found["candidates"]) == set(said(STUCK, FLOAT))
     assert found["estimate"] is None
     assert found["frequency_rad_s"] is None
     fdi["verdict"]["fault_type"], fdi["verdict"]["type_decided_at_s"] = 0, 14.0
-    found = verdict.fault_findings(fdi, SURFACES)
+    found = verdict.fault_finding_dict(fdi, SURFACES)
     assert (found["isolation_type"], found["type_time_s"], found["candidates"]) == (
         TYPE_NAMES[0],
         14.0,
@@ -127,10 +132,10 @@ def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
 
 
 def test_a_fault_outside_the_class_is_unanticipated():
-    found = verdict.fault_findings(new(verdict=UNANTICIPATED), SURFACES)
+    found = verdict.fault_finding_dict(new(verdict=UNANTICIPATED), SURFACES)
     assert (found["isolated"], found["isolation_type"]) == ("unanticipated", "unanticipated")
     assert (found["isolation_time_s"], found["candidates"]) == (12.5, ())
-    several = verdict.fault_findings(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
+    several = verdict.fault_finding_dict(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
     assert (several["isolated"], several["faults"]) == ("unanticipated", ())
 
 
@@ -145,7 +150,7 @@ def several(named=(), alarmed=(0, 0), left=None):
             at_s,
         )
     fdi["types"]["pair"]["group_has_alarm"] = alarmed
-    return verdict.fault_findings(fdi, SURFACES)
+    return verdict.fault_finding_dict(fdi, SURFACES)
 
 
 def test_of_several_faults_the_first_named_is_told_first():
@@ -163,7 +168,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
         surface["status"]["is_isolated"][s], surface["status"]["isolated_at_s"][s] = 1, named_at_s
         surface["status"]["fault_type"][s], surface["status"]["type_decided_at_s"][s] = kind, type_at_s
     apart(instants=[9.0, 11.5, 7.0])
-    elevator, rudder = verdict.fault_findings(fdi, SURFACES)["faults"]
+    elevator, rudder = verdict.fault_finding_dict(fdi, SURFACES)["faults"]
     keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
     assert [elevator[key] for key in keys] == ["elevator", 7.0, None, None]
     assert [rudder[key] for key in keys] == ["rudder", 9.0, "stuck", 11.5]

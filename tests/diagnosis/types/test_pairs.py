@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.pairs import locate_and_test_lateral_surfaces
-from beaver_ftc.diagnosis.types.verdict import fault_findings
+from beaver_ftc.diagnosis.types.pairs import locate_lateral_and_flag_unreachable
+from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
 from samples import samples
@@ -43,7 +43,7 @@ def check(plant, faults):
     true = {
         ("aileron", "elevator", "rudder")[s]: types.TYPE_NAMES[TYPES[kind][1]] for s, kind, _, _ in faults
     }
-    for one in fault_findings(plant.fdi, SURFACES)["faults"]:
+    for one in fault_finding_dict(plant.fdi, SURFACES)["faults"]:
         if one["isolated"]:
             assert one["isolated"] in true
             assert one["isolation_type"] in (true[one["isolated"]], None)
@@ -74,15 +74,18 @@ def test_one_fault_is_not_taken_for_two(seed, uncertainty, kind, surface, at, sh
     faults = ((surface, kind, at, share),)
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
-    assert len(fault_findings(plant.fdi, SURFACES)["faults"]) <= 1
+    assert len(fault_finding_dict(plant.fdi, SURFACES)["faults"]) <= 1
 
 
 def test_both_are_named_and_a_search_for_one_finds_neither():
     faults = (AILERON, "stuck", 30, 0.6), (RUDDER, "bias", 200, 0.8)
     plant = fly(4, UNCERTAINTIES["random"], faults)
-    assert {one["isolated"] for one in fault_findings(plant.fdi, SURFACES)["faults"]} == {"aileron", "rudder"}
+    assert {one["isolated"] for one in fault_finding_dict(plant.fdi, SURFACES)["faults"]} == {
+        "aileron",
+        "rudder",
+    }
     alone = fly(4, UNCERTAINTIES["random"], faults, pairs=False)
-    assert fault_findings(alone.fdi, SURFACES)["isolated"] == "unanticipated"
+    assert fault_finding_dict(alone.fdi, SURFACES)["isolated"] == "unanticipated"
 
 
 def test_pairs_belong_to_the_class_of_all_faults():
@@ -109,7 +112,7 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = 0.02
     fdi["bound"]["frame_innovation_bound"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    locate_and_test_lateral_surfaces(
+    locate_lateral_and_flag_unreachable(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],

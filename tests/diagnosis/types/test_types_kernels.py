@@ -51,7 +51,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
         min(LOW, 0.0),
         max(HIGH, 0.0),
     )
-    registry.restart_fault_types_of_surface(surface)
+    registry.restart_surface_sets_and_evidence(surface)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, np.inf
     (
         surface["judged_observation"]["position_low"],
@@ -85,7 +85,7 @@ def test_what_is_known_of_a_surface_as_it_begins():
         5,
     )
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
-    registry.restart_fault_types_of_surface(surface)
+    registry.restart_surface_sets_and_evidence(surface)
     assert not surface["feasible_sets"]["excluded"].any()
     assert (
         surface["evidence"]["n_anomalous_frames"],
@@ -172,7 +172,9 @@ def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval,
             place - 1e-3,
             place + 1e-3,
         )
-        assert registry.judged_frame_agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
+        assert registry.judged_position_agrees_with_rest_position(surface) == (
+            stands and 0.0 <= place <= 0.2
+        ), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
@@ -404,7 +406,7 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
     assert swung([-1] * 22)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    on(commanded_surface.skip_oscillation_frame, fdi, surface, OSCILLATORY)
+    on(commanded_surface.restart_error_sign_duration, fdi, surface, OSCILLATORY)
     assert surface["oscillatory"]["sign_since_frame"] == 20
 
 

@@ -212,12 +212,14 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest_frames, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
-    assert bool(on(verdict.short_anomaly_may_be_hidden_type, fdi, surface)) == slow
+    assert bool(on(verdict.short_anomaly_may_be_rest_hidden_type, fdi, surface)) == slow
     assert not on(
-        verdict.short_anomaly_may_be_hidden_type, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames)
+        verdict.short_anomaly_may_be_rest_hidden_type,
+        *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames),
     )
     assert not on(
-        verdict.short_anomaly_may_be_hidden_type, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
+        verdict.short_anomaly_may_be_rest_hidden_type,
+        *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames),
     )
 
 
@@ -311,14 +313,25 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
 
 
 def test_the_surface_at_fault():
-    assert on(verdict.find_surface_at_fault, new_case()) == NOT_ISOLATED
-    assert on(verdict.find_surface_at_fault, new_case(**NOBODY_ELSE)) == RUDDER
-    assert on(verdict.find_surface_at_fault, new_case(rudder=None, **NOBODY_ELSE)) == UNANTICIPATED
+    assert on(verdict.find_isolated_surface_or_unanticipated, new_case()) == NOT_ISOLATED
+    assert on(verdict.find_isolated_surface_or_unanticipated, new_case(**NOBODY_ELSE)) == RUDDER
+    assert (
+        on(verdict.find_isolated_surface_or_unanticipated, new_case(rudder=None, **NOBODY_ELSE))
+        == UNANTICIPATED
+    )
     pitch = {"aileron": None, "rudder": None, "flap": None}
-    assert on(verdict.find_surface_at_fault, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
-    assert on(verdict.find_surface_at_fault, new_case(elevator=(OSCILLATORY,), **pitch)) == NOT_ISOLATED
+    assert (
+        on(verdict.find_isolated_surface_or_unanticipated, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
+    )
+    assert (
+        on(verdict.find_isolated_surface_or_unanticipated, new_case(elevator=(OSCILLATORY,), **pitch))
+        == NOT_ISOLATED
+    )
     lateral = dict(NOBODY_ELSE)
-    assert on(verdict.find_surface_at_fault, new_case(rudder=(OSCILLATORY,), **lateral)) == RUDDER
+    assert (
+        on(verdict.find_isolated_surface_or_unanticipated, new_case(rudder=(OSCILLATORY,), **lateral))
+        == RUDDER
+    )
 
 
 @pytest.mark.parametrize(
@@ -345,7 +358,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
     assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == position_estimator_excluded
     if flap is not None:
-        assert on(verdict.find_surface_at_fault, fdi) == (
+        assert on(verdict.find_isolated_surface_or_unanticipated, fdi) == (
             ELEVATOR if position_estimator_excluded else NOT_ISOLATED
         )
     fdi["types"]["surface"]["status"]["may_be_sole_fault"][FLAP] = 0
@@ -416,7 +429,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = (
@@ -425,13 +438,13 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     )  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
+        take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert fdi["verdict"]["accommodated_surface"] == RUDDER
-    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
     surface["last_observation"]["position_low"] = 0.1
-    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert (
         surface["accommodation"]["n_frames_without_sign_of_fault"],
         fdi["verdict"]["accommodated_surface"],
@@ -597,7 +610,7 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     fdi = new_case()
     fdi["types"]["config"]["frame_shows_single_instant"], fdi["types"]["frame_index"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_fault_types_of_surface(surface)
+    registry.restart_surface_sets_and_evidence(surface)
     surface["evidence"]["n_anomalous_frames"], surface["accommodation"]["mode"] = 5, -1
     (
         surface["earlier_observation"]["is_anomalous"],
@@ -619,7 +632,7 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_fault_types_of_surface(surface)
+    registry.restart_surface_sets_and_evidence(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
         (
@@ -660,7 +673,7 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_fault_types_of_surface(surface)
+    registry.restart_surface_sets_and_evidence(surface)
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.2, 0.1
     on(registry.store_first_anomaly_and_narrow_sets, fdi, surface, 6)
     assert surface["evidence"]["first_anomalous_frame"] == -1
@@ -674,7 +687,7 @@ def n_rest_frames(low=0.1, high=0.2, frames=1, **fields):
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
-        on(registry.count_rest_and_exclude_types, fdi, RUDDER)
+        on(registry.count_rest_evidence_and_exclude_types, fdi, RUDDER)
     return fdi, surface
 
 
@@ -691,7 +704,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     ]
     fdi, surface = n_rest_frames()
     fdi["types"]["surface"]["status"]["may_be_sole_fault"] = 1, 1, 0, 1
-    on(registry.count_rest_and_exclude_types, fdi, RUDDER)
+    on(registry.count_rest_evidence_and_exclude_types, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist() == [
         1,
         1,
@@ -835,7 +848,7 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["last_observation"]["healthy_position"] = 0.1
-    assert types.set_position_and_check_reach(surface, 0.2, 0.05)
+    assert types.fill_observation_and_check_reach(surface, 0.2, 0.05)
     assert (
         surface["last_observation"]["position_low"],
         surface["last_observation"]["position_high"],
@@ -845,14 +858,14 @@ def test_a_surface_off_its_command_is_within_its_travel():
         pytest.approx(0.35),
         1,
     )
-    assert types.set_position_and_check_reach(surface, 0.4, 0.05)
+    assert types.fill_observation_and_check_reach(surface, 0.4, 0.05)
     assert surface["last_observation"]["position_high"] == 0.5
-    assert not types.set_position_and_check_reach(surface, 0.5, 0.05)
-    assert types.set_position_and_check_reach(surface, -0.49, 0.05)
+    assert not types.fill_observation_and_check_reach(surface, 0.5, 0.05)
+    assert types.fill_observation_and_check_reach(surface, -0.49, 0.05)
     assert surface["last_observation"]["position_low"] == -0.4
-    types.set_position_and_check_reach(surface, 0.04, 0.05)
+    types.fill_observation_and_check_reach(surface, 0.04, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
-    types.set_position_and_check_reach(surface, 0.05, 0.05)
+    types.fill_observation_and_check_reach(surface, 0.05, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
 
 
@@ -894,7 +907,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         -1.2 + 0.4,
         0.05,
     )
-    on(pairs.update_pitch_anomaly_or_location, fdi)
+    on(pairs.flag_pitch_anomaly_or_locate_second, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (
         flap["last_observation"]["position_low"],
@@ -907,7 +920,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         0.14,
     )
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
-    on(pairs.update_pitch_anomaly_or_location, fdi)
+    on(pairs.flag_pitch_anomaly_or_locate_second, fdi)
     assert flap["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY
 
 
@@ -923,7 +936,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
         0.03,
         innovation,
     )
-    on(pairs.update_pitch_anomaly_or_location, fdi)
+    on(pairs.flag_pitch_anomaly_or_locate_second, fdi)
     assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [
         0,
         is_anomalous,
@@ -937,19 +950,19 @@ def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     elevator = fdi["types"]["surface"][ELEVATOR]
     fdi["types"]["pair"]["first_pitch_fault_surface"] = NO_SURFACE
     elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK] = 0.1, 0.14
-    on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
+    on(pairs.update_first_fault_surface_and_sets, fdi, ELEVATOR)
     known = elevator["first_pitch_fault_sets"]
     assert fdi["types"]["pair"]["first_pitch_fault_surface"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
     elevator["feasible_sets"]["excluded"][STUCK], elevator["feasible_sets"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
-        on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
+        on(pairs.update_first_fault_surface_and_sets, fdi, ELEVATOR)
         assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (
             0.1,
             k + 1,
         )
-    on(pairs.store_first_fault_sets_when_due, fdi, ELEVATOR)
+    on(pairs.update_first_fault_surface_and_sets, fdi, ELEVATOR)
     assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (0.12, 0)
 
 
@@ -968,7 +981,7 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     elevator["first_pitch_fault_sets"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
     for frame in ("last_observation", "judged_observation", "earlier_observation"):
         fdi["types"]["surface"][frame]["is_anomalous"] = 1
-    assert on(pairs.begin_second_pitch_fault_if_shown, fdi)
+    assert on(pairs.detect_and_begin_second_pitch_fault, fdi)
     assert verdict.sole_constant_type_or_undecided(elevator) == STUCK
     assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible_sets"]["excluded"].any()
@@ -987,8 +1000,8 @@ def test_a_second_begins_with_what_was_known_of_the_first():
             0,
         )
     assert fdi["types"]["surface"]["status"]["may_be_sole_fault"][[AILERON, RUDDER]].tolist() == [1, 1]
-    assert not on(pairs.begin_second_pitch_fault_if_shown, _first(new_case(elevator=(STUCK,)), ELEVATOR))
-    assert not on(pairs.begin_second_pitch_fault_if_shown, _first(new_case(elevator=()), NO_SURFACE))
+    assert not on(pairs.detect_and_begin_second_pitch_fault, _first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not on(pairs.detect_and_begin_second_pitch_fault, _first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
@@ -1008,7 +1021,7 @@ def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patie
     assert (
         bool(
             on(
-                pairs.other_types_no_longer_possible,
+                pairs.varying_types_can_be_dismissed,
                 *one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence),
             )
         )
@@ -1024,7 +1037,7 @@ def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
         ((BIAS,), BIAS),
         ((CONSTANT_LOSS,), CONSTANT_LOSS),
     ):
-        assert on(pairs.pitch_type_unless_given_up, *one(*kinds)) == found
+        assert on(pairs.pitch_type_unless_mode_gives_up, *one(*kinds)) == found
 
 
 def decided(alarmed=(1, 0), **left):
@@ -1109,7 +1122,7 @@ def test_the_verdict_is_that_of_the_first_named():
         fdi["types"]["surface"]["status"]["type_decided_at_s"][RUDDER],
         fdi["types"]["surface"]["status"]["isolated_at_s"][RUDDER],
     ) = 2.0, 1.5
-    conclude(fdi, pairs.first_fault_finding_values, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_estimator_type_and_times, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     assert (found["isolated_estimator"], found["fault_type"], found["type_decided_at_s"]) == (
         4 + RUDDER,
@@ -1117,15 +1130,15 @@ def test_the_verdict_is_that_of_the_first_named():
         2.0,
     )
     assert found["isolated_at_s"] == 1.5
-    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_estimator_type_and_times, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
     assert (found["isolated_estimator"], found["fault_type"], found["isolated_at_s"]) == (
         UNANTICIPATED,
         -1,
         4.0,
     )
-    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_estimator_type_and_times, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
-    conclude(fdi, pairs.first_fault_finding_values, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_estimator_type_and_times, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
     assert (found["isolated_estimator"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
@@ -1221,7 +1234,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         Z @ off,
         room,
     )
-    on(pairs.locate_and_test_lateral_surfaces, fdi)
+    on(pairs.locate_lateral_and_flag_unreachable, fdi)
     slack = room + spread.sum(axis=1)
     corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
     least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
@@ -1233,7 +1246,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
         ) == pytest.approx((least[k], greatest[k]))
     assert not fdi["types"]["pair"]["lateral_fault_outside_class"]
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
-    on(pairs.locate_and_test_lateral_surfaces, fdi)
+    on(pairs.locate_lateral_and_flag_unreachable, fdi)
     assert fdi["types"]["pair"]["lateral_fault_outside_class"]
 
 
@@ -1304,7 +1317,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated_estimator"] = UNANTICIPATED
     fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, 2
-    take_lead(fdi, verdict.choose_and_set_accommodation, fdi["verdict"]["isolated_estimator"])
+    take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
@@ -1312,7 +1325,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
     fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
     assert on(verdict.sole_possible_surface, fdi, False) == SEVERAL_SURFACES
-    assert on(verdict.find_surface_at_fault, fdi) == AILERON
+    assert on(verdict.find_isolated_surface_or_unanticipated, fdi) == AILERON
 
 
 @pytest.mark.parametrize(("s", "outside"), [(AILERON, 0), (RUDDER, 1), (NO_SURFACE, 0), (NO_SURFACE, 1)])
@@ -1329,7 +1342,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
         4.0,
         3.0,
     )
-    conclude(fdi, pairs.first_fault_finding_values, s, outside, 5.0, lead=(NO_SURFACE, -1))
+    conclude(fdi, pairs.first_fault_estimator_type_and_times, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
         assert (found["isolated_estimator"], found["fault_type"]) == (

@@ -156,7 +156,7 @@ class FaultType:
 
     deflection_relation     deflection by command and one parameter, where that is all that the type says; of
                             a type that is not constant theta may differ from frame to frame
-    excluding_frame_comparison_name
+    multi_frame_exclusion_test_name
                             name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
@@ -199,7 +199,7 @@ class FaultType:
     deflection_error: Kernel | None = None
     deflection_error_precedence: int = 100
     deflection_relation: DeflectionRelation | None = None
-    excluding_frame_comparison_name: str = ""
+    multi_frame_exclusion_test_name: str = ""
     estimate_parameter: Callable[[np.void, int, int], float | None] = _return_none_as_estimate
     estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = (
         _return_none_as_estimate
@@ -234,7 +234,7 @@ def midpoint_parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
 
 
 @kernel
-def reset_feasible_sets_to_unlimited(surface):
+def reset_feasible_sets_and_exclusions(surface):
     """Allow every type with any parameter."""
     surface.feasible_sets.low[:], surface.feasible_sets.high[:] = -np.inf, np.inf
     surface.feasible_sets.excluded[:] = 0
@@ -389,7 +389,7 @@ def mark_stops_that_can_hide_deflection(surface, position_interval_width):
 
 
 @kernel
-def set_position_and_check_reach(surface, deflection_error, deflection_error_tolerance):
+def fill_observation_and_check_reach(surface, deflection_error, deflection_error_tolerance):
     """A surface was off its command by deflection_error +- deflection_error_tolerance (rad). False:
     nowhere within its reach."""
     last_observation, actuator_limits = surface.last_observation, surface.actuator

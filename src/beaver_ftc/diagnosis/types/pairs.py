@@ -23,13 +23,13 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
+    fill_observation_and_check_reach,
     last_midpoint_deflection_error,
     mark_observations_not_anomalous,
     registry,
     restore_first_pitch_fault_sets,
     set_is_anomalous,
     set_known_position_and_clear_anomaly,
-    set_position_and_check_reach,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import (
@@ -59,7 +59,9 @@ def latch_group_alarms(pair_record, filter_bank):
 
 
 @kernel
-def locate_and_test_lateral_surfaces(types, layout, estimators, innovation_by_axis, innovation_bound_by_axis):
+def locate_lateral_and_flag_unreachable(
+    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
+):
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
     innovation_by_axis (3,), |eta| <= innovation_bound_by_axis (3,) rad/s2."""
     aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
@@ -92,7 +94,7 @@ def locate_and_test_lateral_surfaces(types, layout, estimators, innovation_by_ax
         roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
         + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
     ) / abs_determinant
-    aileron_is_within_reach = set_position_and_check_reach(
+    aileron_is_within_reach = fill_observation_and_check_reach(
         types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
     rudder_deflection_error = (
@@ -104,7 +106,7 @@ def locate_and_test_lateral_surfaces(types, layout, estimators, innovation_by_ax
         + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
     ) / abs_determinant
     if not (
-        set_position_and_check_reach(
+        fill_observation_and_check_reach(
             types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
         )
         and aileron_is_within_reach
@@ -132,7 +134,9 @@ def constant_parameter_types_deflection_range(config, surface, k):
 
 
 @kernel
-def update_pitch_anomaly_or_location(types, layout, estimators, innovation_by_axis, innovation_bound_by_axis):
+def flag_pitch_anomaly_or_locate_second(
+    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
+):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
     first_fault_surface_index = types.pair.first_pitch_fault_surface
@@ -182,7 +186,7 @@ def locate_second_pitch_or_deduce_healthy(
         + first_effect_record.error_bound[PITCH]
         + second_effect_record.error_bound[PITCH]
     )
-    if not set_position_and_check_reach(
+    if not fill_observation_and_check_reach(
         types.surface[second_surface_index],
         (innovation_by_axis[PITCH] - first_fault_acceleration) / second_pitch_acceleration_per_rad,
         acceleration_tolerance / abs(second_pitch_acceleration_per_rad),
@@ -198,10 +202,10 @@ def observe_pairs_and_judge_previous(types, layout, estimators, filter_bank, inn
     registry.shift_observations_and_infer_positions(
         types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
     )
-    locate_and_test_lateral_surfaces(
+    locate_lateral_and_flag_unreachable(
         types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
     )
-    update_pitch_anomaly_or_location(
+    flag_pitch_anomaly_or_locate_second(
         types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
     )
     registry.judge_previous_and_advance_frame(types)
@@ -256,7 +260,7 @@ def isolate_lateral_or_find_unanticipated(types, layout, t):
 
 
 @kernel
-def store_first_fault_sets_when_due(types, s):
+def update_first_fault_surface_and_sets(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
@@ -289,20 +293,20 @@ def begin_second_pitch_fault(types, layout):
     first_surface = types.surface[types.pair.first_pitch_fault_surface]
     second_surface = types.surface[layout.partner[types.pair.first_pitch_fault_surface]]
     restore_first_pitch_fault_sets(first_surface)
-    registry.restart_fault_types_of_surface(second_surface)
+    registry.restart_surface_sets_and_evidence(second_surface)
     for surface in (first_surface, second_surface):
         surface.status.may_be_sole_fault, surface.status.can_be_at_fault_basis = 0, verdict.DEDUCED_FAULTY
         mark_observations_not_anomalous(surface)
 
 
 @kernel
-def other_types_no_longer_possible(config, surface):
+def varying_types_can_be_dismissed(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
     command_independent_type_may_imitate = verdict.can_be_another_type(
         surface, verdict.sole_constant_type_or_undecided(surface), False
     )
     another_type_is_possible = (
-        command_independent_type_may_imitate or verdict.short_anomaly_may_be_hidden_type(config, surface)
+        command_independent_type_may_imitate or verdict.short_anomaly_may_be_rest_hidden_type(config, surface)
     )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
@@ -313,7 +317,7 @@ def other_types_no_longer_possible(config, surface):
 
 
 @kernel
-def begin_second_pitch_fault_if_shown(types, layout):
+def detect_and_begin_second_pitch_fault(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
     if (
         types.pair.first_pitch_fault_surface == NO_SURFACE
@@ -330,7 +334,7 @@ def begin_second_pitch_fault_if_shown(types, layout):
 
 
 @kernel
-def pitch_type_unless_given_up(config, surface):
+def pitch_type_unless_mode_gives_up(config, surface):
     """The type of the one fault of pitch, or -1 while it is open.
 
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
@@ -346,7 +350,7 @@ def pitch_type_unless_given_up(config, surface):
 @kernel
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if begin_second_pitch_fault_if_shown(types, layout):
+    if detect_and_begin_second_pitch_fault(types, layout):
         first_surface = types.surface[types.pair.first_pitch_fault_surface]
         second_surface_index = layout.partner[types.pair.first_pitch_fault_surface]
         second_surface = types.surface[second_surface_index]
@@ -366,7 +370,7 @@ def decide_pitch_isolation(types, layout, t):
             update_isolation_type_and_times(
                 surface,
                 surface_index == sole_surface_index,
-                pitch_type_unless_given_up(types.config, surface)
+                pitch_type_unless_mode_gives_up(types.config, surface)
                 if surface_index == sole_surface_index
                 else -1,
                 t,
@@ -377,14 +381,14 @@ def decide_pitch_isolation(types, layout, t):
 def find_and_store_sole_pitch_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = (
-        verdict.find_surface_at_fault(types, layout)
+        verdict.find_isolated_surface_or_unanticipated(types, layout)
         if types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
         else NO_SURFACE
     )
     if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
         return NO_SURFACE
-    if other_types_no_longer_possible(types.config, types.surface[s]):
-        store_first_fault_sets_when_due(types, s)
+    if varying_types_can_be_dismissed(types.config, types.surface[s]):
+        update_first_fault_surface_and_sets(types, s)
     return s
 
 
@@ -406,8 +410,10 @@ def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, 
             or finding_record.isolated_at_s < first_finding_record.isolated_at_s
         ):
             first_isolated_surface_index = s
-    isolated_estimator_index, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding_values(
-        types, previous_conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
+    isolated_estimator_index, isolated_at_s, fault_type, type_decided_at_s = (
+        first_fault_estimator_type_and_times(
+            types, previous_conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
+        )
     )
     accommodated_surface_index, accommodation_mode = set_pair_accommodation_choose_lead(types, layout)
     return (
@@ -421,7 +427,9 @@ def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, 
 
 
 @kernel
-def first_fault_finding_values(types, previous_conclusion, layout, s, lateral_fault_outside_class, t):
+def first_fault_estimator_type_and_times(
+    types, previous_conclusion, layout, s, lateral_fault_outside_class, t
+):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
     if s >= 0:
@@ -474,9 +482,13 @@ def set_pair_accommodation_choose_lead(types, layout):
     for s, surface in enumerate(types.surface):
         verdict.set_accommodation_mode(surface, -1)
         if is_isolated_or_likeliest_in_pitch(types, layout, s):
-            may_be_at_fault = surface.status.is_isolated == 1 or estimator_or_deduction_allows_fault(surface)
-            surface_mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
-            if verdict.update_fault_presence(types.config, surface, surface_mode, may_be_at_fault):
+            fault_is_possible = surface.status.is_isolated == 1 or estimator_or_deduction_allows_fault(
+                surface
+            )
+            surface_mode = (
+                verdict.choose_accommodation_mode(surface) if fault_is_possible else SUBTRACT_OFFSET
+            )
+            if verdict.update_fault_presence(types.config, surface, surface_mode, fault_is_possible):
                 verdict.set_accommodation_mode(surface, surface_mode)
                 elevator_is_scaled_or_given_up = s == layout.main[PITCH] and surface_mode in (
                     SCALE_COMMAND,

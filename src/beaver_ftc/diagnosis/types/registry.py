@@ -42,7 +42,7 @@ from beaver_ftc.diagnosis.types import (
     fill_last_observation_from_innovation,
     intersect_set_or_exclude_type,
     mark_type_excluded,
-    reset_feasible_sets_to_unlimited,
+    reset_feasible_sets_and_exclusions,
     set_feasible_set,
     set_is_anomalous,
     set_last_position_to_reachable_range,
@@ -317,13 +317,13 @@ FRAME_BLOCK_RECORD = record(
 def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
     what is concluded. position_estimator_excluded: as verdict.py keeps it."""
-    memory_dtypes = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
+    memory_dtype_by_name = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
         evidence=ANOMALOUS_FRAME_EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD,
         release=POSSIBLE_RELEASES_BY_TYPE_RECORD,
-        **memory_dtypes,
+        **memory_dtype_by_name,
         position_estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
         first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
     )  # fmt: skip
@@ -342,9 +342,14 @@ def fault_types_dtype(n_surfaces: int) -> np.dtype:
 
 
 def configure_fault_types(
-    types: np.void, layout: np.void, prediction_actuators: np.void, scenario: Scenario, travel: np.ndarray
+    types: np.void,
+    layout: np.void,
+    prediction_actuators: np.void,
+    scenario: Scenario,
+    travel_low_and_high: np.ndarray,
 ) -> None:
-    """Fill the configuration of the types and the actuator of each surface; travel (2, n) rad: the stops."""
+    """Fill the configuration of the types and the actuator of each surface; travel_low_and_high (2, n): the
+    stops, rad."""
     config, types_config, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
     types_config["frames_per_block"] = frames_per_block = (
         ceil(BLOCK_DURATION_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
@@ -365,7 +370,7 @@ def configure_fault_types(
     types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
     surface_names, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
-        zip(surface_names, types["surface"], *travel, strict=True)
+        zip(surface_names, types["surface"], *travel_low_and_high, strict=True)
     ):
         rate_limit_deg_s = getattr(scenario.actuators, surface_name).rate_limit_deg_s
         actuator_record = surface_record["actuator"]
@@ -394,13 +399,13 @@ def configure_fault_types(
 def restart_fault_types(types):
     """Nothing is known of any surface yet."""
     for surface in types.surface:
-        restart_fault_types_of_surface(surface)
+        restart_surface_sets_and_evidence(surface)
 
 
 @kernel
-def restart_fault_types_of_surface(surface):
+def restart_surface_sets_and_evidence(surface):
     """Nothing is known of this surface yet."""
-    reset_feasible_sets_to_unlimited(surface)
+    reset_feasible_sets_and_exclusions(surface)
     set_parameter_range_each(surface)
     set_last_position_to_reachable_range(surface)
     surface.evidence.first_anomalous_frame = -1
@@ -411,9 +416,9 @@ def restart_fault_types_of_surface(surface):
 
 
 @kernel
-def record_commands(types, commanded_rad, frame_means_and_extremes):
+def record_commands(types, commanded_rad, effectiveness_and_position_extremes):
     """Add a frame to the commands of the surfaces: commanded_rad (n,); positions of healthy surfaces and
-    their least and greatest effectiveness within it: frame_means_and_extremes, of a
+    their least and greatest effectiveness within it: effectiveness_and_position_extremes, of a
     `model_prediction.frame_means_dtype`.
     """
     frames_per_block = types.config.frames_per_block
@@ -444,16 +449,16 @@ def record_commands(types, commanded_rad, frame_means_and_extremes):
             max(command_record.max_command[0], limited_command),
         )
         command_record.min_healthy_position[0] = min(
-            command_record.min_healthy_position[0], frame_means_and_extremes.u_min[s]
+            command_record.min_healthy_position[0], effectiveness_and_position_extremes.u_min[s]
         )
         command_record.max_healthy_position[0] = max(
-            command_record.max_healthy_position[0], frame_means_and_extremes.u_max[s]
+            command_record.max_healthy_position[0], effectiveness_and_position_extremes.u_max[s]
         )
         command_record.min_acceleration_per_rad = min(
-            command_record.min_acceleration_per_rad, frame_means_and_extremes.G_min[s]
+            command_record.min_acceleration_per_rad, effectiveness_and_position_extremes.G_min[s]
         )
         command_record.max_acceleration_per_rad = max(
-            command_record.max_acceleration_per_rad, frame_means_and_extremes.G_max[s]
+            command_record.max_acceleration_per_rad, effectiveness_and_position_extremes.G_max[s]
         )
 
 
@@ -520,7 +525,7 @@ def judge_previous_and_advance_frame(types):
             and surface.accommodation.mode == GIVE_UP
             and not surface.judged_observation.is_anomalous
         ):
-            count_rest_and_exclude_types(types, s)
+            count_rest_evidence_and_exclude_types(types, s)
         elif surface.judged_observation.is_anomalous and (
             config.frame_shows_single_instant
             or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
@@ -599,14 +604,14 @@ def advance_block_and_judge_previous(types, layout, estimators, innovation_by_ax
 
 
 @kernel
-def count_rest_and_exclude_types(types, surface_index):
+def count_rest_evidence_and_exclude_types(types, surface_index):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
     fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
     surface = types.surface[surface_index]
-    if not judged_frame_agrees_with_rest(surface):
+    if not judged_position_agrees_with_rest_position(surface):
         return
     for each_surface_index, each_surface in enumerate(types.surface):
         if each_surface_index == surface_index or (
@@ -624,7 +629,7 @@ def count_rest_and_exclude_types(types, surface_index):
 
 
 @kernel
-def judged_frame_agrees_with_rest(surface):
+def judged_position_agrees_with_rest_position(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for type_index in range(N_TYPES):
         set_low, set_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]

@@ -4,8 +4,8 @@ No type is named here: the columns of the table (`FaultType`) say what distingui
 of one surface assume that it is at fault; `estimator_or_deduction_allows_fault` says whether it can be.
 types: of `fault_types_dtype`; previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 
-`fault_findings` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and in
-which unit, the type's row says (`FaultType.estimate_parameter`).
+`fault_finding_dict` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and
+in which unit, the type's row says (`FaultType.estimate_parameter`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -49,7 +49,7 @@ NO_SURFACE, SEVERAL_SURFACES = -1, -2
 TYPE_UNDECIDED, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 ESTIMATOR_DECIDES_POSSIBLE_FAULT, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
-FAULT_ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
+MAX_TIME_WITHOUT_FAULT_SIGN_S = 0.2  # a fault that has not shown for so long is taken for gone
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -138,7 +138,7 @@ def sole_remaining_type_once_it_shows_itself(surface):
 
 
 @kernel
-def short_anomaly_may_be_hidden_type(config, surface):
+def short_anomaly_may_be_rest_hidden_type(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
@@ -156,7 +156,7 @@ def short_anomaly_may_be_hidden_type(config, surface):
 
 
 @kernel
-def can_be_confused_with(surface, type_index, apparent_type):
+def can_look_like_apparent_type(surface, type_index, apparent_type):
     """Whether a fault of type `type_index` may look like one of `apparent_type`, or of another type left of
     that name and of constant parameter."""
     for other_type in range(N_CONSTANT_PARAMETER_TYPES):
@@ -181,7 +181,7 @@ def can_be_another_type(surface, apparent_type, includes_command_dependent_types
             is_alternative = type_is_not_excluded(surface, type_index) and (
                 includes_command_dependent_types or not ERROR_DEPENDS_ON_COMMAND[type_index]
             )
-            if is_alternative and can_be_confused_with(surface, type_index, apparent_type):
+            if is_alternative and can_look_like_apparent_type(surface, type_index, apparent_type):
                 return True
     return False
 
@@ -202,7 +202,7 @@ def sole_possible_surface(surfaces, needs_constant_parameter_type):
 
 
 @kernel
-def find_surface_at_fault(types, layout):
+def find_isolated_surface_or_unanticipated(types, layout):
     """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
 
     What acts on pitch alone shows no direction, so a surface left over there must also have a type that
@@ -264,7 +264,7 @@ def fault_type_on_surface(config, surface):
     one may yet show itself."""
     if (
         surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames
-        or short_anomaly_may_be_hidden_type(config, surface)
+        or short_anomaly_may_be_rest_hidden_type(config, surface)
     ):
         return TYPE_UNDECIDED
     if config.has_surface_term_errors:
@@ -299,12 +299,15 @@ def varying_parameter_fault_type_on_surface(surface, types_have_had_time_to_show
 
 
 @kernel
-def sole_remaining_varying_parameter_type(surface, must_show_itself):
+def sole_remaining_varying_parameter_type(surface, among_types_that_must_show):
     """The one type of a parameter that varies which is left, of those that must show themselves or of those
     that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
     remaining_type = NO_TYPE
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_is_not_excluded(surface, type_index) and MUST_SHOW_ITSELF[type_index] == must_show_itself:
+        if (
+            type_is_not_excluded(surface, type_index)
+            and MUST_SHOW_ITSELF[type_index] == among_types_that_must_show
+        ):
             remaining_type = type_index if remaining_type == NO_TYPE else TYPE_UNDECIDED
             if remaining_type == TYPE_UNDECIDED:
                 return TYPE_UNDECIDED
@@ -318,7 +321,7 @@ def decide_isolation_and_accommodation(types, previous_conclusion, layout, estim
 
     previous_conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
-    surface_index = find_surface_at_fault(types, layout)
+    surface_index = find_isolated_surface_or_unanticipated(types, layout)
     previous_estimator_index = previous_conclusion.isolated_estimator
     previous_surface_index = (
         estimators[previous_estimator_index].surface
@@ -335,7 +338,7 @@ def decide_isolation_and_accommodation(types, previous_conclusion, layout, estim
     isolated_estimator_index = (
         estimator_of_fault(layout, surface_index, fault_type) if surface_index >= 0 else surface_index
     )
-    accommodated_surface_index, accommodation_mode = choose_and_set_accommodation(
+    accommodated_surface_index, accommodation_mode = decide_accommodated_surface_and_mode(
         types, isolated_estimator_index, layout, estimators
     )
     return (
@@ -438,7 +441,7 @@ def clear_all_accommodation_modes(surfaces):
 
 
 @kernel
-def choose_and_set_accommodation(types, isolated_estimator_index, layout, estimators):
+def decide_accommodated_surface_and_mode(types, isolated_estimator_index, layout, estimators):
     """The surface on which the law acts, or NO_SURFACE, and how; isolated_estimator_index: if any."""
     surface_index = find_presumed_faulty_surface(types, isolated_estimator_index, layout, estimators)
     clear_all_accommodation_modes(types.surface)
@@ -453,10 +456,10 @@ def choose_and_set_accommodation(types, isolated_estimator_index, layout, estima
 
 
 @kernel
-def update_fault_presence(config, surface, accommodation_mode, is_at_fault):
+def update_fault_presence(config, surface, accommodation_mode, fault_is_possible):
     """Whether the fault of a surface shows, or did a moment ago."""
     last_observation, accommodation = surface.last_observation, surface.accommodation
-    expected_deflection_rad = deflection_error(surface, is_at_fault) + last_observation.healthy_position
+    expected_deflection_rad = deflection_error(surface, fault_is_possible) + last_observation.healthy_position
     frame_agrees_with_fault = (
         last_observation.position_low <= expected_deflection_rad <= last_observation.position_high
         or accommodation_mode == SCALE_COMMAND
@@ -465,14 +468,14 @@ def update_fault_presence(config, surface, accommodation_mode, is_at_fault):
         0 if frame_agrees_with_fault else accommodation.n_frames_without_sign_of_fault + 1
     )
     fault_absence_s = accommodation.n_frames_without_sign_of_fault * config.dt
-    return fault_absence_s < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
+    return fault_absence_s < MAX_TIME_WITHOUT_FAULT_SIGN_S - _TIME_TOLERANCE_S
 
 
 @kernel
-def deflection_error(surface, is_at_fault):
+def deflection_error(surface, fault_is_possible):
     """Return the deflection error of a surface, rad: by the types left if it is at fault, or as the last
     frame shows it."""
-    if is_at_fault:
+    if fault_is_possible:
         for type_index in DEFLECTION_ERROR_TYPES_BY_PRECEDENCE:
             if type_is_not_excluded(surface, type_index):
                 deflection_error_rad = deflection_error_under_type(surface, type_index)
@@ -505,7 +508,7 @@ _NO_FINDINGS: FindingDict = {
 }  # fmt: skip
 
 
-def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:
+def fault_finding_dict(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:
     """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
 
     surface_names: in the order of the aircraft.
@@ -631,8 +634,8 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
     surface = fdi["types"]["surface"][s]
     type_indices = [
         type_index
-        for type_index, is_excluded in enumerate(surface["feasible_sets"]["excluded"])
-        if _can_be_at_fault(fdi, s) and not is_excluded
+        for type_index, type_is_excluded in enumerate(surface["feasible_sets"]["excluded"])
+        if _can_be_at_fault(fdi, s) and not type_is_excluded
     ]
     constant_parameter_type_indices = [
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES

@@ -292,12 +292,12 @@ def tape(travel=(-0.2, 0.7), blocks=1):
 def test_the_checker_defines_every_type_as_its_row_does(kind):
     """It is written apart from the rows; of the types of the package it takes nothing from the log."""
     row, words, travel = TYPES[kind], DESCRIPTIONS_IN_TYPE_ORDER[kind], (-0.2, 0.7)
-    if row.excluding_frame_comparison_name:
+    if row.multi_frame_exclusion_test_name:
         assert check_certificate.COURSES[words] == (
-            row.excluding_frame_comparison_name.replace(" ", "_"),
+            row.multi_frame_exclusion_test_name.replace(" ", "_"),
             row.stop_direction,
         )
-        assert row.excluding_frame_comparison_name in courses.RULES
+        assert row.multi_frame_exclusion_test_name in courses.RULES
     else:
         expected = (
             row.deflection_relation.command_gain,
@@ -314,7 +314,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
 @pytest.mark.parametrize(("course", "direction"), [("runaway", -1), ("growing offset", 0), ("", 0)])
 def test_what_a_type_is_that_the_checker_does_not_define_stands_in_the_log(monkeypatch, course, direction):
     added = dataclasses.replace(
-        TYPES[STUCK], name="creeps", excluding_frame_comparison_name=course, stop_direction=direction,
+        TYPES[STUCK], name="creeps", multi_frame_exclusion_test_name=course, stop_direction=direction,
         deflection_relation=None
         if course
         else DeflectionRelation(-1.0, True, lambda low, high: (0.5 * low, high)),

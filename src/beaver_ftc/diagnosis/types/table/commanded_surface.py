@@ -148,21 +148,21 @@ def offset_interval_of_judged_frame(surface):
     command_record = surface.commands
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
         return isolation.EMPTY_THETA_INTERVAL
-    min_surface_position_within_frame = position_low - max(
+    min_actual_position_within_frame = position_low - max(
         healthy_position - command_record.min_healthy_position[1], 0.0
     )
-    max_surface_position_within_frame = position_high + max(
+    max_actual_position_within_frame = position_high + max(
         command_record.max_healthy_position[1] - healthy_position, 0.0
     )
     offset_low = (
         position_low - healthy_position
-        if min_surface_position_within_frame > surface.actuator.travel_low
+        if min_actual_position_within_frame > surface.actuator.travel_low
         else -np.inf
     )
     return (
         offset_low,
         position_high - healthy_position
-        if max_surface_position_within_frame < surface.actuator.travel_high
+        if max_actual_position_within_frame < surface.actuator.travel_high
         else np.inf,
     )
 
@@ -217,11 +217,11 @@ def reset_growing_bias_memory(surface, type_index):
     memory = surface.growing_bias
     memory.min_growth_up = memory.min_growth_down = 0.0
     memory.has_run_towards_stop[:] = 0
-    reset_offset_interval(memory)
+    set_offset_interval_unlimited(memory)
 
 
 @kernel
-def reset_offset_interval(memory):
+def set_offset_interval_unlimited(memory):
     """Its offset is not known."""
     memory.offset_low, memory.offset_high = -np.inf, np.inf
 
@@ -243,7 +243,7 @@ def widen_offset_interval(config, surface, type_index):
 @kernel
 def forget_bias_offset_interval(config, surface, type_index, k):
     """The fault may have gone, and begin again with any offset."""
-    reset_offset_interval(surface.growing_bias)
+    set_offset_interval_unlimited(surface.growing_bias)
 
 
 @kernel
@@ -315,7 +315,7 @@ BIAS = FaultType(
     deflection_relation=DeflectionRelation(
         1.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low - high, high - low)
     ),
-    excluding_frame_comparison_name="offset", estimate_parameter=midpoint_parameter_estimate,
+    multi_frame_exclusion_test_name="offset", estimate_parameter=midpoint_parameter_estimate,
     estimate_parameter_interval=bias_interval,
 )  # fmt: skip
 GROWING_BIAS = FaultType(
@@ -334,7 +334,7 @@ GROWING_BIAS = FaultType(
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
     can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"),
     motion_rules_out=has_run_towards_stop,
-    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison_name="growing offset",
+    accommodation_mode=SUBTRACT_OFFSET, multi_frame_exclusion_test_name="growing offset",
     estimate_parameter=last_offset_rad,
 )  # fmt: skip
 
@@ -399,7 +399,7 @@ def end_oscillation_half_cycle(memory, k):
 
 
 @kernel
-def skip_oscillation_frame(config, surface, type_index, k):
+def restart_error_sign_duration(config, surface, type_index, k):
     """In a frame that is not judged it may have swung to the other side, unseen."""
     surface.oscillatory.sign_since_frame = k + 1
 
@@ -438,7 +438,7 @@ OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
     reset_memory=reset_oscillation_memory, before_judging_frame=add_squared_deflection_error,
     consistent_interval=update_oscillation_and_consistent_interval,
-    on_skipped_frame=skip_oscillation_frame, memory_record_name="oscillatory",
+    on_skipped_frame=restart_error_sign_duration, memory_record_name="oscillatory",
     memory_dtype=record(
         error_sign=int, sign_since_frame=int,
         n_half_cycles=int, first_half_cycle_end_frame=int, last_half_cycle_end_frame=int,
@@ -448,7 +448,7 @@ OSCILLATORY = FaultType(
     ),
     has_shown=oscillation_has_shown, shows_within_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
     can_look_like=("rate_limit",),
-    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison_name="swing",
+    accommodation_mode=SUBTRACT_OFFSET, multi_frame_exclusion_test_name="swing",
     estimate_parameter=oscillation_amplitude_rad,
     estimate_frequency_rad_s=oscillation_frequency_rad_s,
 )  # fmt: skip
@@ -541,6 +541,6 @@ RATE_LIMIT = FaultType(
     # a slow surface that has not been seen to creep looks as if it stood still
     evidence_at_rest=REST_HIDES_TYPE, can_look_like=("stuck", "float", "hardover"),
     accommodation_mode=WAIT_FOR_SURFACE,
-    excluding_frame_comparison_name="approach",
+    multi_frame_exclusion_test_name="approach",
 )  # fmt: skip
 TYPES = LOSS, VARYING_LOSS, BIAS, GROWING_BIAS, OSCILLATORY, RATE_LIMIT

@@ -362,12 +362,14 @@ def update_stuck_and_consistent_interval(config, surface, type_index, k):
 def add_stuck_release(config, surface, type_index, k):
     """Add a release from the interval of the jammed position."""
     replace_earlier_release_if_impossible(surface, type_index)
-    start_position_low, start_position_high, _ = start_position_interval_and_frame(config, surface, k)
+    frame_start_position_low, frame_start_position_high, _ = start_position_interval_and_frame(
+        config, surface, k
+    )
     add_release(
         surface,
         type_index,
-        max(start_position_low, surface.feasible_sets.low[type_index]),
-        min(start_position_high, surface.feasible_sets.high[type_index]),
+        max(frame_start_position_low, surface.feasible_sets.low[type_index]),
+        min(frame_start_position_high, surface.feasible_sets.high[type_index]),
     )
 
 
@@ -424,13 +426,15 @@ def update_float_and_consistent_interval(config, surface, type_index, k):
 @kernel
 def add_float_release(config, surface, type_index, k):
     """Add a release from the neutral position."""
-    start_position_low, start_position_high, _ = start_position_interval_and_frame(config, surface, k)
+    frame_start_position_low, frame_start_position_high, _ = start_position_interval_and_frame(
+        config, surface, k
+    )
     neutral_position = limit_to_travel(surface, 0.0)
     add_release(
         surface,
         type_index,
-        max(start_position_low, neutral_position),
-        min(start_position_high, neutral_position),
+        max(frame_start_position_low, neutral_position),
+        min(frame_start_position_high, neutral_position),
     )
 
 
@@ -608,7 +612,7 @@ HARDOVER_UP = FaultType(
     on_possible_release=add_hardover_up_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
     stop_direction=1,
-    accommodation_mode=GIVE_UP, excluding_frame_comparison_name="runaway",
+    accommodation_mode=GIVE_UP, multi_frame_exclusion_test_name="runaway",
     estimate_parameter=upper_stop_deflection_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
@@ -617,7 +621,7 @@ HARDOVER_DOWN = FaultType(
     on_possible_release=add_hardover_down_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
     stop_direction=-1,
-    accommodation_mode=GIVE_UP, excluding_frame_comparison_name="runaway",
+    accommodation_mode=GIVE_UP, multi_frame_exclusion_test_name="runaway",
     estimate_parameter=lower_stop_deflection_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

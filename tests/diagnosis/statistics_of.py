@@ -56,7 +56,9 @@ class Statistical:
     @staticmethod
     def prepare(record, fdi, design, x, y, u):
         parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
-        statistical.prepare_tests(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
+        statistical.prepare_tests_of_next_frame(
+            *parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"]
+        )
 
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):

@@ -190,7 +190,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             )
             is_loss_precise = (
                 uses_statistics
-                and statistical.estimate_loss(statistical_detector.block, s)[1]
+                and statistical.estimate_loss_theta_and_information(statistical_detector.block, s)[1]
                 > MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY
             )
             estimated_theta = estimated_theta_of_isolated_loss(
@@ -228,7 +228,7 @@ def assess_surface_at_fault(assessment, types, layout, estimators, s):
 def estimated_theta_of_isolated_loss(config, conclusion, layout, estimators, statistical_detector, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
     if uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority):
-        return statistical.estimate_loss(statistical_detector.block, s)[0]
+        return statistical.estimate_loss_theta_and_information(statistical_detector.block, s)[0]
     return estimators[conclusion.isolated_estimator].theta[layout.dominant_axis[s]]
 
 

@@ -526,8 +526,8 @@ def test_the_estimate_of_a_loss_is_the_surest():
         STEP_FAULT,
         9.0,
     )
-    assert statistical.estimate_loss(record["block"], 2) == (-0.4, 5.0)
-    assert statistical.estimate_loss(record["block"], 1) == (0.0, 0.0)
+    assert statistical.estimate_loss_theta_and_information(record["block"], 2) == (-0.4, 5.0)
+    assert statistical.estimate_loss_theta_and_information(record["block"], 1) == (0.0, 0.0)
 
 
 def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0, 0.0, 0.0), **keys):

@@ -51,7 +51,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
         7,
         "a loss is excluded only if its log-likelihood ratio is below this share of the largest ratio",
         statistical,
-        "MIN_CONSTANT_OVER_GROWING_LOSS_LLR",
+        "MIN_LLR_SHARE_OF_CONSTANT_THETA",
         "",
     ),
     (7, "number of frequencies of the oscillation tests", parity, "N_TONE_FREQUENCIES", ""),

@@ -205,7 +205,7 @@ def derive_isolation_llr_margin(
 
 def configure_statistical_detector(
     fdi: np.void,
-    config: FdiConfig,
+    fdi_config: FdiConfig,
     declared: Declared,
     design_model: np.void,
     mass_properties: MassProperties,
@@ -213,7 +213,7 @@ def configure_statistical_detector(
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
-    statistical, statistical_settings = fdi["statistical"], config.statistical
+    statistical, statistical_settings = fdi["statistical"], fdi_config.statistical
     statistical["alarm"]["detected_at_s"] = -1.0
     if statistical_settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
@@ -228,12 +228,17 @@ def configure_statistical_detector(
     test_config["non_loss_llr_bounds_include_uncertainty"] = (
         aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     )
-    statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
+    statistical["forces"]["in_use"] = compares_accelerometers_with_forces = declared.uses_accelerometers
     gust_estimate["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust_estimate, declared, mass_properties)
-    uses_parity_views = config.compares_across(n_instants_per_frame)
+    uses_parity_views = fdi_config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
-        aircraft, *(iterate_parity_directions(aircraft, uses_forces) if uses_parity_views else ())
+        aircraft,
+        *(
+            iterate_parity_directions(aircraft, compares_accelerometers_with_forces)
+            if uses_parity_views
+            else ()
+        ),
     )
     test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
     configure_gust_velocity_and_speed_error(
@@ -242,9 +247,11 @@ def configure_statistical_detector(
     test_config["isolation_llr_margin"] = derive_isolation_llr_margin(
         statistical_settings.misnaming, rate_hz, aircraft
     )
-    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * fdi_config.forgetting_time_s))
     _configure_blocks(statistical, sensor_errors, aircraft)
-    _configure_bounded_uncertainty(statistical, config, declared, frame_uncertainty_change_over_bound, dt_s)
+    _configure_uncertainty_and_loss_growth(
+        statistical, fdi_config, declared, frame_uncertainty_change_over_bound, dt_s
+    )
     statistical["noise"]["base_frame_uncertainty_change_over_bound"] = (
         statistical_settings.uncertainty_rad_s * dt_s
     )
@@ -256,8 +263,8 @@ def configure_statistical_detector(
         trim,
         dt_s,
     )
-    term_tolerances = moment_term_tolerances(declared, design_model, mass_properties, *trim[1:])
-    _configure_regressor_tolerances(statistical, aircraft, term_tolerances)
+    absolute_term_tolerances = moment_term_tolerances(declared, design_model, mass_properties, *trim[1:])
+    _configure_regressor_tolerances(statistical, aircraft, absolute_term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
         false_alarm_probability_per_test_frame = statistical_settings.false_alarms_per_h / (
@@ -270,7 +277,7 @@ def configure_statistical_detector(
             frame_uncertainty_change_over_bound * rate_hz,
             dt_s,
         )
-        if uses_forces:
+        if compares_accelerometers_with_forces:
             acceleration_slopes_by_air_data = jacobian(design_model, *trim)[3]
             configure_forces(fdi, declared, trim, acceleration_slopes_by_air_data, dt_s)
             gust_estimate["output"][
@@ -320,13 +327,15 @@ def configure_statistical_detector(
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
     axes_and_hypotheses = axes_and_hypotheses_by_block(aircraft)
-    loss_surface_indices = [
+    all_loss_surface_indices = [
         aircraft.surfaces.index(surface_name) for surface_name in aircraft.class_of_losses
     ]
-    statistical["test_config"]["n_score_columns"] = len(loss_surface_indices) + len(AXES)
+    statistical["test_config"]["n_score_columns"] = len(all_loss_surface_indices) + len(AXES)
     for block, (axes, hypothesis_entries) in zip(statistical["block"], axes_and_hypotheses, strict=True):
         block["n_axes"], block["n_hypotheses"] = len(axes), len(hypothesis_entries)
-        block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
+        block["n_regressors"] = sum(
+            moment_axis_of_term(moment_term) in axes for moment_term in aircraft.moments
+        )
         block["drift_decay_factor"], block["gust_drift_intensity_factor"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axes"][i] = axis
@@ -340,9 +349,9 @@ def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraf
             hypothesis["kind"], hypothesis["surface"] = kind, surface_index
             hypothesis["axis"], hypothesis["raises_alarm"] = axis, raises_alarm
             hypothesis["score_column_index"] = (
-                loss_surface_indices.index(surface_index)
+                all_loss_surface_indices.index(surface_index)
                 if kind == LOSS
-                else len(loss_surface_indices) + axis
+                else len(all_loss_surface_indices) + axis
             )
 
 
@@ -373,9 +382,9 @@ def drift_uncertainty_frequency_rad_s(statistical_settings: Statistical, aircraf
     )
 
 
-def _configure_bounded_uncertainty(
+def _configure_uncertainty_and_loss_growth(
     statistical: np.void,
-    config: FdiConfig,
+    fdi_config: FdiConfig,
     declared: Declared,
     frame_uncertainty_change_over_bound: float,
     dt_s: float,
@@ -387,10 +396,10 @@ def _configure_bounded_uncertainty(
         block["alarm_level"] = statistical["test_config"]["alarm_level"]
         block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
         block["uncertainty_change_over_bound_per_frame"] = frame_uncertainty_change_over_bound
-        hypothesis_kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
-        if config.fault_profile == "abrupt":
+        kind_of_each_hypothesis = block["hypothesis"]["kind"][: block["n_hypotheses"]]
+        if fdi_config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum(
-                (hypothesis_kinds != GROWING_LOSS) & (hypothesis_kinds != LOSS_END)
+                (kind_of_each_hypothesis != GROWING_LOSS) & (kind_of_each_hypothesis != LOSS_END)
             )
         block["hypothesis"]["remaining_growth_decay_factor"] = exp(-LOSS_GROWTH_RATE_PER_S * dt_s)
 
@@ -406,13 +415,13 @@ def _configure_drift_and_model_noise(
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
     u."""
     reading_noise_std = declared.sensors.each("random")
-    gyro_noise_std = float(reading_noise_std[:3].max())
+    largest_gyro_noise_std = float(reading_noise_std[:3].max())
     largest_constant_bound_over_axes_rad_s2 = max(declared.constant_rad_s2)
     alarm_level = float(statistical["test_config"]["alarm_level"])
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
         largest_constant_bound_over_axes_rad_s2,
         uncertainty_frequency_rad_s,
-        gyro_noise_std,
+        largest_gyro_noise_std,
         alarm_level,
         dt_s,
     )
@@ -484,18 +493,18 @@ def derive_drift_correlation_length_m(
 
 
 def _configure_regressor_tolerances(
-    statistical: np.void, aircraft: Aircraft, term_tolerances: np.ndarray
+    statistical: np.void, aircraft: Aircraft, absolute_term_tolerances: np.ndarray
 ) -> None:
     """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
-    axis_of_term = np.array([moment_axis_of_term(term) for term in aircraft.moments])
+    axis_of_term = np.array([moment_axis_of_term(moment_term) for moment_term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
-        block_term_tolerances = term_tolerances[np.isin(axis_of_term, axes)]
+        block_term_tolerances = absolute_term_tolerances[np.isin(axis_of_term, axes)]
         block["regressor_tolerance"][: block_term_tolerances.size] = block_term_tolerances
-    statistical["test_config"]["uses_regressors"] = bool(np.any(term_tolerances))
+    statistical["test_config"]["uses_regressors"] = bool(np.any(absolute_term_tolerances))
 
 
 def configure_reading_regressors(
-    statistical: np.void, sensor_errors: SensorErrors, declared_errors: np.void
+    statistical: np.void, sensor_errors: SensorErrors, declared_error_record: np.void
 ) -> None:
     """Add the readings of the air data to the regressors of the blocks."""
     steady_error_bounds = np.zeros(N_INPUT_READINGS)
@@ -503,11 +512,11 @@ def configure_reading_regressors(
     for sensor_name, reading_index in _READING_INDEX_BY_SENSOR.items():
         steady_error_bounds[reading_index] = sensor_errors[sensor_name].steady
         reading_noise_std[reading_index] = sensor_errors[sensor_name].random
-    steady_error_bounds[_ENGINE_POWER_READING_INDEX] = declared_errors[
+    steady_error_bounds[_ENGINE_POWER_READING_INDEX] = declared_error_record[
         "power_error_kw_by_instruments"
     ]  # all of it: so many standard deviations are part of that
     reading_noise_std[_ENGINE_POWER_READING_INDEX] = (
-        declared_errors["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
+        declared_error_record["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
     )
     if not (steady_error_bounds.any() or reading_noise_std.any()):
         return
@@ -522,7 +531,7 @@ def configure_reading_regressors(
 
 @kernel
 def fill_signal_slopes_for_one_reading(
-    moment_table, declared_errors, y, reading_index, signal_slopes_for_one_reading
+    moment_table, declared_error_record, y, reading_index, signal_slopes_for_one_reading
 ):
     """Fill signal_slopes_for_one_reading (N_SIGNALS,): change of a table's signals per unit of a reading."""
     signal_slopes_for_one_reading[:] = 0.0
@@ -531,9 +540,9 @@ def fill_signal_slopes_for_one_reading(
     if reading_index == AIRSPEED:
         for k in range(PH, RH + 1):
             signal_slopes_for_one_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
-    if declared_errors.has_engine_instrument_errors and reading_index >= AIRSPEED:
+    if declared_error_record.has_engine_instrument_errors and reading_index >= AIRSPEED:
         slipstream_per_airspeed, slipstream_per_qdyn, slipstream_per_kw = slipstream_slopes(
-            y, declared_errors.power_error_kw_per_density_ratio
+            y, declared_error_record.power_error_kw_per_density_ratio
         )
         slipstream_per_qdyn_or_kw = slipstream_per_qdyn if reading_index == QDYN else slipstream_per_kw
         signal_slopes_for_one_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
@@ -574,7 +583,7 @@ def fill_acceleration_slopes_for_one_reading(
 
 @kernel
 def add_reading_regressors_and_fill_noise(
-    frame_share_per_instant, noise_model, blocks, declared_errors, design_model, y, u
+    frame_share_per_instant, noise_model, blocks, declared_error_record, design_model, y, u
 ):
     """Add this instant, a `frame_share_per_instant` of the frame, to the readings' regressors, rad/s2 per
     unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
@@ -583,7 +592,7 @@ def add_reading_regressors_and_fill_noise(
     noise_model.acceleration_variance_by_input_noise[:] = noise_model.acceleration_variance_without_air_data
     for reading_index in range(N_INPUT_READINGS):
         fill_signal_slopes_for_one_reading(
-            moment_table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
+            moment_table, declared_error_record, y, reading_index, noise_model.signal_change_per_reading
         )
         directional(
             moment_table,
@@ -616,7 +625,7 @@ def add_reading_regressors_and_fill_noise(
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
-MIN_CONSTANT_OVER_GROWING_LOSS_LLR = 0.25
+MIN_LLR_SHARE_OF_CONSTANT_THETA = 0.25
 # The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
 # moves by this share of its travel.
 TRAVEL_SHARE_REVERSING_ERROR = 0.25
@@ -762,14 +771,14 @@ def fill_statistical_unmodelled_acceleration(blocks, gust_estimate, out):
 
 @kernel
 def update_alarm(
-    alarm, test_config, blocks, views, measured_forces, gust_estimate, t, is_model_error_known=True
+    alarm, test_config, blocks, views, measured_forces, gust_estimate, t, model_error_bound_applies=True
 ):
     """Fill the largest score over the alarm level, its axis, and at the first alarm its time t s.
 
-    The score is 0 where the model's error is not `is_model_error_known`.
+    The score is 0 unless `model_error_bound_applies`: outside its map, the model's error has no bound.
     """
     alarm.score_over_alarm_level = 0.0
-    if not is_model_error_known:
+    if not model_error_bound_applies:
         return
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
@@ -917,17 +926,15 @@ def excludes_loss(
 
     Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
     only. A loss that is not declared `is_abrupt` may grow. A constant theta then explains only a part of its
-    effect, so the loss is excluded only if its ratio is also below MIN_CONSTANT_OVER_GROWING_LOSS_LLR of the
+    effect, so the loss is excluded only if its ratio is also below MIN_LLR_SHARE_OF_CONSTANT_THETA of the
     best. The same holds for a loss that begins inside a frame of several instants, and for the end of a loss
     there. The end of a loss in pitch counts only if `includes_loss_end_in_pitch` is set: a fault outside the
     class may look like it. Arguments as in `confirms_loss`.
     """
     pitch_block = blocks[likelihood.PITCH_BLOCK]
     has_one_instant_per_frame = test_config.frame_share_per_instant == 1.0
-    loss_llr_share_limit = (
-        1.0 if is_abrupt and has_one_instant_per_frame else MIN_CONSTANT_OVER_GROWING_LOSS_LLR
-    )
-    loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_CONSTANT_OVER_GROWING_LOSS_LLR
+    loss_llr_share_limit = 1.0 if is_abrupt and has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_THETA
+    loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_THETA
     for lateral_block in blocks[LATERAL_BLOCK:]:
         alternative_llr_lower_bound = best_alternative_llr_lower_bound(
             pitch_block, estimators, loss_estimator_indices, surface_index
@@ -947,12 +954,12 @@ def excludes_loss(
             upper_bound_of_loss_end_llr = max(
                 upper_bound_of_loss_end_llr, loss_llr_upper_bound(pitch_block, surface_index, True)
             )
-        is_loss_unlikely = (
+        is_loss_llr_below_share_limits = (
             upper_bound_of_loss_llr < loss_llr_share_limit * alternative_llr_lower_bound
             and upper_bound_of_loss_end_llr < loss_end_llr_share_limit * alternative_llr_lower_bound
         )
         if (
-            is_loss_unlikely
+            is_loss_llr_below_share_limits
             and alternative_llr_lower_bound - max(upper_bound_of_loss_llr, upper_bound_of_loss_end_llr)
             > test_config.isolation_llr_margin
         ):
@@ -961,7 +968,7 @@ def excludes_loss(
 
 
 @kernel
-def estimate_loss(blocks, surface_index):
+def estimate_loss_theta_and_information(blocks, surface_index):
     """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
     theta_estimate, theta_information = 0.0, 0.0
     for block in blocks:
@@ -976,7 +983,7 @@ def estimate_loss(blocks, surface_index):
 
 
 @kernel
-def prepare_tests(
+def prepare_tests_of_next_frame(
     test_config, noise_model, blocks, gust_estimate, bound_record, design_model, measured, u, dt
 ):
     """Prepare the next frame, of dt s: gust, regressors, drift and model noise at this instant.
@@ -1013,18 +1020,18 @@ def prepare_tests(
 def update_uncertainty_change(noise_model, blocks, error_map, u):
     """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
     surfaces."""
-    max_travel_share_moved = 0.0
+    max_travel_share_moved_in_frame = 0.0
     for s in range(u.size):
         travel_width_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
-        max_travel_share_moved = max(
-            max_travel_share_moved,
+        max_travel_share_moved_in_frame = max(
+            max_travel_share_moved_in_frame,
             abs(u[s] - error_map.surface_positions_before[s]) / travel_width_rad,
         )
         error_map.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
             noise_model.base_frame_uncertainty_change_over_bound
-            + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * max_travel_share_moved,
+            + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * max_travel_share_moved_in_frame,
             UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
         )
 
@@ -1051,7 +1058,9 @@ def add_instant_to_gust_and_regressors(
 
 
 @kernel
-def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design_model, measured, u):
+def add_regressors(
+    frame_share_per_instant, noise_model, blocks, declared_error_record, design_model, measured, u
+):
     """Add this instant, a `frame_share_per_instant` of the frame, to all regressors of unknown constants."""
     y = measured.y
     evaluate(design_model.moments, measured.x, y)
@@ -1060,7 +1069,7 @@ def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors
     )
     if noise_model.has_reading_errors:
         add_reading_regressors_and_fill_noise(
-            frame_share_per_instant, noise_model, blocks, declared_errors, design_model, y, u
+            frame_share_per_instant, noise_model, blocks, declared_error_record, design_model, y, u
         )
 
 

@@ -421,7 +421,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         k,
         has_statistical_alarm_been_raised,
     )
-    is_model_error_known = fdi.bound.error_map.is_outside_all_boxes == 0
+    model_error_bound_applies = fdi.bound.error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
         statistical_detector.alarm,
         test_config,
@@ -430,7 +430,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         forces_record,
         gust,
         t,
-        is_model_error_known,
+        model_error_bound_applies,
     )
     form_innovation_after_known_faults(prediction, measured.x, dt)
     statistical.filter_innovation_after_known_faults(
@@ -451,7 +451,7 @@ def update_gusts_and_prepare_tests(fdi, prediction, measured, k):
         k,
         dt,
     )
-    statistical.prepare_tests(
+    statistical.prepare_tests_of_next_frame(
         statistical_detector.test_config,
         statistical_detector.noise,
         statistical_detector.block,

@@ -20,7 +20,7 @@ from beaver_ftc.design import inertia_coefficients, inertial
 from beaver_ftc.diagnosis.monitors import (
     ENGINE_YAWING_MOMENT_SIGNAL_NAME,
     THRUST_SIGNAL_NAME,
-    mean_thrust_arm_over_span,
+    healthy_yawing_moment_per_thrust,
 )
 from beaver_ftc.plant import ENGINE_SIGNALS
 from beaver_ftc.studies.engine import Forks
@@ -313,7 +313,8 @@ def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike
     where one is. Of others nobody has measured what they do while levers move: a c310's alarmed."""
     of = alike.signals
     apart = np.abs(
-        of[ENGINE_YAWING_MOMENT_SIGNAL_NAME] - mean_thrust_arm_over_span(aircraft) * of[THRUST_SIGNAL_NAME]
+        of[ENGINE_YAWING_MOMENT_SIGNAL_NAME]
+        - healthy_yawing_moment_per_thrust(aircraft) * of[THRUST_SIGNAL_NAME]
     )
     for i, box in enumerate(boxes if apart.max() < MIRRORED else ()):
         box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)

@@ -44,7 +44,7 @@ def new_watch(lead=ALPHA_FLOW_TEST, bound=1e-3):
         monitor["config"]["min_frozen_samples"],
     ) = NO_SENSOR, lead, 1, 3
     relations = monitor["redundancy"]
-    relations["config"]["sample_time_s"], relations["config"]["filter_decay"] = H, (0.0, 0.9, 0.99)
+    relations["config"]["sample_time_s"], relations["config"]["filter_decay_by_pole"] = H, (0.0, 0.9, 0.99)
     relations["test"]["filtered_bound"] = bound
     relations["memory"]["previous_reading"] = monitor["memory"]["reading_two_samples_ago"] = level()
     return monitor
@@ -54,7 +54,7 @@ def looks(monitor, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
         monitor["redundancy"]["test"]["residual"][monitor["output"]["alarm_test_index"]] = residual
-        sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
+        sensor_monitor.update_identical_counts_and_accelerometer_jump(monitor, signal)
         sensor_monitor.update_cleared_sensors(monitor, signal)
         monitor["memory"]["reading_two_samples_ago"] = monitor["redundancy"]["memory"]["previous_reading"]
         monitor["redundancy"]["memory"]["previous_reading"] = signal
@@ -81,13 +81,13 @@ def test_which_instrument_a_test_of_the_flow_asks():
 def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
     monitor, signal = new_watch(), level()
     for expected in (1, 2, 3):
-        sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
+        sensor_monitor.update_identical_counts_and_accelerometer_jump(monitor, signal)
         assert monitor["memory"]["n_identical_samples"][ALPHA] == expected
     assert sensor_monitor.is_frozen(monitor, ALPHA)
     monitor["config"]["min_frozen_samples"][ALPHA] = 4
     assert not sensor_monitor.is_frozen(monitor, ALPHA)
     signal[ALPHA] += 1e-15
-    sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
+    sensor_monitor.update_identical_counts_and_accelerometer_jump(monitor, signal)
     assert monitor["memory"]["n_identical_samples"][[ALPHA, BETA]].tolist() == [0, 4]
 
 
@@ -136,7 +136,7 @@ def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate(
             monitor["memory"]["fading_max_accelerometer_jump"],
         ) = h, 3.0
         for _ in range(round(2.0 / h)):
-            sensor_monitor.update_identical_counts_and_max_jump(
+            sensor_monitor.update_identical_counts_and_accelerometer_jump(
                 monitor, monitor["redundancy"]["memory"]["previous_reading"].copy()
             )
         assert monitor["memory"]["fading_max_accelerometer_jump"] == pytest.approx(

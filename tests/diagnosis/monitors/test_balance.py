@@ -16,4 +16,4 @@ def test_thrust_on_the_right_turns_the_nose_to_the_left(named, arm):
     apart(engines=list(ENGINES.values()))
     effectors = {name: SimpleNamespace(share=ENGINES[name][0], right_m=ENGINES[name][1]) for name in named}
     aircraft = SimpleNamespace(effectors=effectors, geometry=SimpleNamespace(span_m=12.0, chord_m=2.0))
-    assert monitors.mean_thrust_arm_over_span(aircraft) == pytest.approx(arm / 12.0)
+    assert monitors.healthy_yawing_moment_per_thrust(aircraft) == pytest.approx(arm / 12.0)

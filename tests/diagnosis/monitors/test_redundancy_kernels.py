@@ -70,7 +70,7 @@ def test_a_look_keeps_attitude_velocity_and_acceleration(seed):
     )
     relations, force = new_step(), rng.normal(size=3)
     relations["memory"]["reading_error_bound"], relations["memory"]["previous_error_bound"] = 0.2, 0.1
-    redundancy.store_sample(relations, signal, force)
+    redundancy.store_sample_as_previous(relations, signal, force)
     rotation = as_rotation(signal[PHI : PHI + 3])
     kept = Rotation.from_quat(
         [*relations["memory"]["previous_quaternion"][1:], relations["memory"]["previous_quaternion"][0]]
@@ -90,7 +90,7 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     rng = np.random.default_rng(seed)
     signal = reading(attitude=rng.uniform(-1.0, 1.0, 3), rates=rng.uniform(-0.5, 0.5, 3))
     relations, before = new_step(), rng.normal(size=3)
-    redundancy.store_sample(relations, signal, rng.normal(size=3))
+    redundancy.store_sample_as_previous(relations, signal, rng.normal(size=3))
     relations["memory"]["previous_body_acceleration"], now = (
         before,
         relations["memory"]["body_acceleration"].copy(),
@@ -220,10 +220,10 @@ def residuals(looks):
     """The record after three looks, and the residuals (RPM,) of the last."""
     relations = new_step()
     relations["config"]["attitude_drift_rad_s"] = relations["config"]["max_gust_speed_mps"] = 0.0
-    redundancy.store_sample(relations, looks[0], looks[0, AX:])
+    redundancy.store_sample_as_previous(relations, looks[0], looks[0, AX:])
     relations["memory"]["previous_body_acceleration"] = relations["memory"]["body_acceleration"]
     redundancy.advance_motion_and_predict_readings(relations)
-    redundancy.store_sample(relations, looks[1], looks[1, AX:])
+    redundancy.store_sample_as_previous(relations, looks[1], looks[1, AX:])
     redundancy.advance_motion_and_predict_readings(relations)
     redundancy.fill_residuals(relations, looks[2])
     return relations, relations["test"]["residual"][:RPM_TEST].copy()
@@ -310,7 +310,7 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
     test, relations = np.zeros(1, TEST_RECORD)[0], new_step()
-    relations["config"]["filter_decay"] = keep = np.array([0.0, 0.8, 0.97])
+    relations["config"]["filter_decay_by_pole"] = keep = np.array([0.0, 0.8, 0.97])
     relations["config"]["gust_change_bound_mps"], test["residual_per_gust_speed_change"] = (
         [0.1, 0.2, 0.3],
         0.5,
@@ -332,7 +332,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
 @pytest.mark.parametrize("engine", [False, True])
 def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine):
     relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    relations["config"]["filter_decay"] = [0.0, 0.8, 0.97]
+    relations["config"]["filter_decay_by_pole"] = [0.0, 0.8, 0.97]
     (
         relations["memory"]["commanded_engine_readings"],
         relations["config"]["error_bound_at_zero_reading"][ENGINE_SPEED],
@@ -342,7 +342,9 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
         10.0,
         0.25,
     )
-    redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    redundancy.store_sample_as_previous(
+        relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)])
+    )
     relations["test"]["filtered_bound_per_sample_part"] = 1e-6
     redundancy.run_tests_with_equation(relations, signal, engine)
     assert (relations["test"]["residual_bound_ratio"][:CLIMB_TEST] < 1.0).all()
@@ -356,7 +358,9 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
 
 def test_a_reading_that_jumps_fails_its_own_test():
     relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    redundancy.store_sample_as_previous(
+        relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)])
+    )
     signal[ALTITUDE] += 5.0
     redundancy.run_tests_with_equation(relations, signal, False)
     assert np.flatnonzero(relations["test"]["residual_bound_ratio"] > 1.0).tolist() == [CLIMB_TEST]
@@ -420,7 +424,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
     (
         relations["config"]["sample_time_s"],
-        relations["config"]["filter_decay"],
+        relations["config"]["filter_decay_by_pole"],
         relations["config"]["max_gust_speed_mps"],
     ) = (
         h,
@@ -447,7 +451,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
             redundancy.start_redundancy_tests(relations, reading, reading[AX:])
         else:
             redundancy.run_tests_with_equation(relations, reading, True)
-            redundancy.store_sample(relations, reading, reading[AX:])
+            redundancy.store_sample_as_previous(relations, reading, reading[AX:])
         nearest = np.maximum(nearest, relations["test"]["residual_bound_ratio"])
     assert (nearest <= 1.0).all(), nearest
     assert (nearest > 0.2).sum() >= 4, nearest
@@ -455,13 +459,13 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
 
 def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
     relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0.1, 1.25, 0.2))
-    relations["config"]["filter_decay"] = 0.0, 0.8, 0.97
+    relations["config"]["filter_decay_by_pole"] = 0.0, 0.8, 0.97
     redundancy.start_redundancy_tests(relations, signal, signal[AX:])
     shares = []
     for pitch in (1.28, 1.31, 1.28, 1.25):
         signal[THETA] = pitch
         redundancy.run_tests_with_equation(relations, signal, False)
-        redundancy.store_sample(relations, signal, signal[AX:])
+        redundancy.store_sample_as_previous(relations, signal, signal[AX:])
         shares.append(relations["test"]["residual_bound_ratio"][FIRST_ANGLE_TEST + 1])
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
     assert shares[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
@@ -475,7 +479,7 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
 
     def rate(*pulled):
         relations, signal = new_step(), reading()
-        redundancy.store_sample(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
+        redundancy.store_sample_as_previous(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
         (
             relations["memory"]["acceleration_magnitude"],
             relations["memory"]["earlier_acceleration_magnitudes"],
@@ -492,7 +496,7 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     signal, pull, rates = reading(rates=np.zeros(3), attitude=np.zeros(3), alpha=0.0, beta=0.0), 30.0, []
     for off in (0.0, 2.0):
         relations = new_step()
-        redundancy.store_sample(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
+        redundancy.store_sample_as_previous(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
         relations["memory"]["acceleration_magnitude"] = pull
         rates.append(allowed(relations, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
     V = signal[AIRSPEED]
@@ -505,7 +509,7 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
 def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(seed):
     """A heading that leaps back and forth turns each time about the axis that a blurred bank has by then."""
     rng, relations, signal = np.random.default_rng(seed), new_step(), reading(rates=np.zeros(3))
-    relations["config"]["filter_decay"], relations["config"]["attitude_drift_rad_s"] = (
+    relations["config"]["filter_decay_by_pole"], relations["config"]["attitude_drift_rad_s"] = (
         (0.0, 0.99, 0.9999),
         0.0,
     )
@@ -517,7 +521,7 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
             redundancy.start_redundancy_tests(relations, signal, signal[AX:])
         else:
             redundancy.run_tests_with_equation(relations, signal, False)
-            redundancy.store_sample(relations, signal, signal[AX:])
+            redundancy.store_sample_as_previous(relations, signal, signal[AX:])
         assert (
             relations["test"]["residual_bound_ratio"][FIRST_TURN_TEST : FIRST_TURN_TEST + 3] <= 1.0
         ).all(), k

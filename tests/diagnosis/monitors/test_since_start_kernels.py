@@ -92,7 +92,7 @@ def new_watch(h):
     relations = monitor["redundancy"]
     (
         relations["config"]["sample_time_s"],
-        relations["config"]["filter_decay"],
+        relations["config"]["filter_decay_by_pole"],
         relations["config"]["gravity_m_s2"],
     ) = (
         h,
@@ -127,7 +127,7 @@ def looks(signal, h):
     monitor = new_watch(h)
     redundancy.start_redundancy_tests(monitor["redundancy"], signal[0], signal[0, AX:])
     initial_errors.set_error_bounds_at_start(monitor["initial_errors"], signal[0])
-    redundancy.store_sample(monitor["redundancy"], signal[0], signal[0, AX:])
+    redundancy.store_sample_as_previous(monitor["redundancy"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
         redundancy.run_tests_with_equation(monitor["redundancy"], signal[k], 0)
@@ -137,7 +137,7 @@ def looks(signal, h):
         fired |= monitor["redundancy"]["test"]["residual_bound_ratio"] > 1.0
         initial_errors.latch_refuted_hypotheses(monitor["redundancy"], monitor["initial_errors"], fired)
         yield k, monitor, fired
-        redundancy.store_sample(monitor["redundancy"], signal[k], signal[k, AX:])
+        redundancy.store_sample_as_previous(monitor["redundancy"], signal[k], signal[k, AX:])
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
@@ -159,7 +159,7 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
                 size,
                 k,
             )
-            moved |= set(np.flatnonzero(initial["is_refuted_by_test"][i]).tolist())
+            moved |= set(np.flatnonzero(initial["refutations_by_hypothesis_and_test"][i]).tolist())
         assert all(initial_errors.test_reacts_to_error_change(i, t) for t in moved), (size, moved)
         assert kind != "constant" or not moved
 
@@ -215,7 +215,7 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
 )  # fmt: skip
 def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
     initial = new_watch(0.01)["initial_errors"]
-    initial["is_refuted_by_test"][i, list(by)] = 1
+    initial["refutations_by_hypothesis_and_test"][i, list(by)] = 1
     assert initial_errors.initial_error_explains_exceeded_tests(initial, i, lead) == explained
 
 

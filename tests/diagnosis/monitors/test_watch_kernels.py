@@ -58,7 +58,7 @@ def new_watch(**fields):
     ) = 1, 4, NO_SENSOR, 1.0
     (
         monitor["redundancy"]["config"]["sample_time_s"],
-        monitor["redundancy"]["config"]["filter_decay"],
+        monitor["redundancy"]["config"]["filter_decay_by_pole"],
         monitor["output"]["alarmed_at_s"],
     ) = (
         H,
@@ -179,7 +179,7 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
         airspeed,
         DENSITY_TEST,
     )
-    monitor["initial_errors"]["is_refuted_by_test"] = 1
+    monitor["initial_errors"]["refutations_by_hypothesis_and_test"] = 1
     assert watching.airspeed_error_would_exceed_speed_test(monitor) == (who == {QDYN})
     watching.find_suspects(monitor)
     assert set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist()) == who
@@ -196,7 +196,7 @@ def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
     assert (
         suspects(
             {FIRST_TURN_TEST + 1: 2.0, FIRST_ANGLE_TEST + 1: 1.5},
-            gyro_error_verdict=(GYRO_ERROR_UNDECIDED, say, GYRO_ERROR_UNDECIDED),
+            gyro_error_verdict_by_axis=(GYRO_ERROR_UNDECIDED, say, GYRO_ERROR_UNDECIDED),
         )
         == who
     )
@@ -380,7 +380,7 @@ def asked(
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     monitor["redundancy"]["test"]["bound_per_sample"] = noise
     on(watching.judge_gyro_errors, fdi, monitor)
-    return monitor["memory"]["gyro_error_verdict"].tolist()
+    return monitor["memory"]["gyro_error_verdict_by_axis"].tolist()
 
 
 def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
@@ -404,7 +404,7 @@ def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
         error=(0.3, 0, 0),
         then=(0.3, 0, 0),
         gyro_error_estimate=(0.3, 0, 0),
-        gyro_error_estimate_bound=(0.1, 1, 1),
+        sound_gyro_estimate_bound=(0.1, 1, 1),
     ) == [
         GYRO_ERROR_CONFIRMED,
         GYRO_ERROR_UNDECIDED,
@@ -423,7 +423,7 @@ def test_how_much_an_own_error_may_explain(less, say):
         error=(0.02, 0, 0),
         innovation=(jump - off, 0, 0),
         noise=noise,
-        gyro_error_estimate_bound=(9, 9, 9),
+        sound_gyro_estimate_bound=(9, 9, 9),
         gyro_error_estimate=(0, 0, 0),
     )
     assert (say_[0] == GYRO_ERROR_REFUTED) == (say == GYRO_ERROR_REFUTED)
@@ -432,15 +432,15 @@ def test_how_much_an_own_error_may_explain(less, say):
 @pytest.mark.parametrize(("error", "say"), [(0.0029, GYRO_ERROR_REFUTED), (0.0031, GYRO_ERROR_UNDECIDED)])
 def test_what_has_shown_and_is_gone_is_no_gyros(error, say):
     assert (
-        asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, gyro_error_estimate_bound=(1, 1, 1))[0]
+        asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, sound_gyro_estimate_bound=(1, 1, 1))[0]
         == say
     )
 
 
 def test_a_spike_within_the_attitudes_noise_says_nothing():
     noise = 0.6 * H / 4.0  # a blur of 0.6: below half of which a spike of 1 is none
-    assert asked(spike=1.0, noise=noise, gyro_error_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_UNDECIDED
-    assert asked(spike=1.21, noise=noise, gyro_error_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_REFUTED
+    assert asked(spike=1.0, noise=noise, sound_gyro_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_UNDECIDED
+    assert asked(spike=1.21, noise=noise, sound_gyro_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_REFUTED
 
 
 @pytest.mark.parametrize(("error", "say"), [(0.99, GYRO_ERROR_UNDECIDED), (1.01, GYRO_ERROR_REFUTED)])
@@ -451,7 +451,7 @@ def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
             error=(error,) * 3,
             then=(error,) * 3,
             gyro_error_estimate=(-0.2,) * 3,
-            gyro_error_estimate_bound=(0.5,) * 3,
+            sound_gyro_estimate_bound=(0.5,) * 3,
             noise=1e-4,
         )
         == [say] * 3
@@ -460,7 +460,8 @@ def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
 
 def test_what_the_rates_have_said_stays_said():
     assert asked(
-        error=(0, 0.3, 0), gyro_error_verdict=(GYRO_ERROR_CONFIRMED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED)
+        error=(0, 0.3, 0),
+        gyro_error_verdict_by_axis=(GYRO_ERROR_CONFIRMED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED),
     ) == [
         GYRO_ERROR_CONFIRMED,
         GYRO_ERROR_CONFIRMED,
@@ -478,13 +479,13 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
         monitor["memory"]["substep"] = substep
         watching.advance_start_stage_and_widen_gyro_error_bound(monitor)
     assert monitor["memory"]["start_stage"] == 2
-    assert monitor["memory"]["gyro_error_estimate_bound"].tolist() == [first, first, 2.0 * first], (
+    assert monitor["memory"]["sound_gyro_estimate_bound"].tolist() == [first, first, 2.0 * first], (
         "once, at the first look of the frame"
     )
     error = (0.7, -0.7, 1.4)
     assert (
         asked(
-            error=error, then=error, gyro_error_estimate_bound=monitor["memory"]["gyro_error_estimate_bound"]
+            error=error, then=error, sound_gyro_estimate_bound=monitor["memory"]["sound_gyro_estimate_bound"]
         )[0]
         == say
     )
@@ -503,15 +504,15 @@ def test_the_first_whole_frame_shows_no_jump(begun, asked):
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
     on(watching.raise_alarm_and_isolate_broken_sensor, fdi, monitor, seen(), 5.0)
-    assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
+    assert (monitor["memory"]["gyro_error_verdict_by_axis"][1] == GYRO_ERROR_REFUTED) == asked
 
 
 @pytest.mark.parametrize("quiet", ["error", "then", "previous_substep_gyro_error_peak"])
 def test_what_comes_again_within_a_frame_is_not_gone(quiet):
     given = {"error": (0, 0, 0), "then": (0, 0, 0), "previous_substep_gyro_error_peak": 0.0}
-    assert asked(spike=1.0, gyro_error_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_REFUTED
+    assert asked(spike=1.0, sound_gyro_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_REFUTED
     given[quiet] = 0.004 if quiet == "previous_substep_gyro_error_peak" else (0.004, 0, 0)
-    assert asked(spike=1.0, gyro_error_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_UNDECIDED
+    assert asked(spike=1.0, sound_gyro_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_UNDECIDED
 
 
 def test_the_filter_of_a_gyros_error_follows_it_exactly():
@@ -526,34 +527,34 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     fdi["bound"]["eta_bar"] = eta_bar
     for k in range(frames):
         fdi["bank"]["output"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
-        watching.update_gyro_error_estimate(
+        watching.update_gyro_error_from_dynamics(
             monitor, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
         )
         bound = bound + DT * (eta_bar + growing @ bound)
     assert monitor["memory"]["gyro_error_estimate"] == pytest.approx(error[-1])
-    assert monitor["memory"]["gyro_error_estimate_bound"] == pytest.approx(bound)
+    assert monitor["memory"]["sound_gyro_estimate_bound"] == pytest.approx(bound)
 
 
 def test_a_bound_of_that_filter_is_never_below_zero():
     monitor = new_watch(
-        rate_damping_per_s=np.diag([200.0, 1.0, 1.0]), gyro_error_estimate_bound=(1.0, 1.0, 1.0)
+        rate_damping_per_s=np.diag([200.0, 1.0, 1.0]), sound_gyro_estimate_bound=(1.0, 1.0, 1.0)
     )
-    watching.update_gyro_error_estimate(monitor, np.zeros(3), np.zeros(3), DT)
-    assert monitor["memory"]["gyro_error_estimate_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
+    watching.update_gyro_error_from_dynamics(monitor, np.zeros(3), np.zeros(3), DT)
+    assert monitor["memory"]["sound_gyro_estimate_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
 
 
 @pytest.mark.parametrize(("size", "clear"), [(0.999, 0), (1.001, 1)])
 def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
-    monitor = new_watch(gyro_error_estimate=(0.0, -0.5, 0.0), gyro_error_estimate_bound=(0.1, 0.3, 0.1))
+    monitor = new_watch(gyro_error_estimate=(0.0, -0.5, 0.0), sound_gyro_estimate_bound=(0.1, 0.3, 0.1))
     test = monitor["redundancy"]["test"]
     test["filtered_bound"][:] = 9.0
     test["filtered_bound"][FIRST_TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
     test["residual"][FIRST_TURN_TEST + 1] = size * limit + H * 0.5
-    watching.update_turn_difference_and_rule_out_gyros(monitor)
+    watching.exclude_all_gyros_on_turn_difference(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
-    watching.update_turn_difference_and_rule_out_gyros(monitor)
+    watching.exclude_all_gyros_on_turn_difference(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx(size * limit * kept)
     assert monitor["memory"]["filtered_turn_difference_bound"][1] == pytest.approx(
@@ -713,7 +714,7 @@ def test_the_rates_are_asked_once_a_frame(substep, asked):
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
     on(watching.raise_alarm_and_isolate_broken_sensor, fdi, monitor, seen(), 5.0)
-    assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
+    assert (monitor["memory"]["gyro_error_verdict_by_axis"][1] == GYRO_ERROR_REFUTED) == asked
 
 
 @pytest.mark.parametrize(
@@ -813,7 +814,7 @@ def test_suspicions_of_the_frame_before_are_gone():
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
     monitor, fdi = (
-        new_watch(apparent_gyro_error=(0.0, 0.3, 0.0), gyro_error_estimate_bound=(9.0, 9.0, 9.0)),
+        new_watch(apparent_gyro_error=(0.0, 0.3, 0.0), sound_gyro_estimate_bound=(9.0, 9.0, 9.0)),
         new_fdi(),
     )
     (
@@ -827,7 +828,7 @@ def test_an_alarm_on_roll_counts_as_one():
     )
     fdi["bank"]["output"]["residual"][0, 0] = 2.0
     on(watching.judge_gyro_errors, fdi, monitor)
-    assert monitor["memory"]["gyro_error_verdict"].tolist() == [GYRO_ERROR_CONFIRMED] * 3
+    assert monitor["memory"]["gyro_error_verdict_by_axis"].tolist() == [GYRO_ERROR_CONFIRMED] * 3
 
 
 def test_what_is_named_is_replaced_and_flags_are_one():

@@ -225,7 +225,7 @@ def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
     aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
     of_it = {
         "thrust": thrust,
-        "engines_n": monitors.mean_thrust_arm_over_span(aircraft) * thrust + [0.0, off, 0.5 * off],
+        "engines_n": monitors.healthy_yawing_moment_per_thrust(aircraft) * thrust + [0.0, off, 0.5 * off],
     }
     set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
     assert [("engines_apart" in box) for box in boxes] == [known, known]

@@ -31,12 +31,12 @@ THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME = "thrust", "engines_n"  # 
 MAX_CENTRE_OF_MASS_OFFSET_M = 0.05
 
 # n_engines: engines, 0 where they are not monitored. thrust_index, yawing_moment_index: places of the signals
-# in y. mean_thrust_arm_over_span: a. yawing_moment_tolerance_per_thrust: of the bound, per CT.
+# in y. healthy_yawing_moment_per_thrust: a. yawing_moment_tolerance_per_thrust: of the bound, per CT.
 ENGINE_MONITOR_CONFIG_RECORD = record(
     n_engines=int,
     thrust_index=int,
     yawing_moment_index=int,
-    mean_thrust_arm_over_span=float,
+    healthy_yawing_moment_per_thrust=float,
     yawing_moment_tolerance_per_thrust=float,
 )
 # A law has moved an engine apart: the levers are no longer alike.
@@ -49,7 +49,7 @@ ENGINE_MONITOR_RECORD = record(
 )
 
 
-def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
+def healthy_yawing_moment_per_thrust(aircraft: Aircraft) -> float:
     """a: the yawing moment of the thrust with all levers alike, per CT."""
     return (
         -sum(effector.share * effector.right_m for effector in aircraft.effectors.values())
@@ -59,19 +59,19 @@ def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
 
 def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
-    model_error_map, signal_names = aircraft.file.model_error_map, list(aircraft.signals)
+    model_error_map, aircraft_signal_names = aircraft.file.model_error_map, list(aircraft.signals)
     if (
         model_error_map is None
         or not model_error_map.knows_engines
-        or not {THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME} <= set(signal_names)
+        or not {THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME} <= set(aircraft_signal_names)
     ):
         return
-    config["n_engines"], config["mean_thrust_arm_over_span"] = (
+    config["n_engines"], config["healthy_yawing_moment_per_thrust"] = (
         len(aircraft.effectors),
-        mean_thrust_arm_over_span(aircraft),
+        healthy_yawing_moment_per_thrust(aircraft),
     )
     config["thrust_index"], config["yawing_moment_index"] = (
-        DPT + signal_names.index(signal_name)
+        DPT + aircraft_signal_names.index(signal_name)
         for signal_name in (THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME)
     )
     config["yawing_moment_tolerance_per_thrust"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
@@ -94,7 +94,7 @@ def detect_engine_failure(engine_monitor, engine_asymmetry_bound, y):
     if config.n_engines > 0 and not engine_monitor.memory.disabled_by_differential_thrust:
         thrust_coefficient = y[config.thrust_index]
         if abs(
-            y[config.yawing_moment_index] - config.mean_thrust_arm_over_span * thrust_coefficient
+            y[config.yawing_moment_index] - config.healthy_yawing_moment_per_thrust * thrust_coefficient
         ) > engine_asymmetry_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust_coefficient):
             engine_monitor.output.engine_failed = 1
     return engine_monitor.output.engine_failed == 1

@@ -18,7 +18,7 @@ samples, s; test t; and filter pole m
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
                                     and for each test, or pair of tests, that couples with the error
                                       b <- min(b, (r + B + 2 d W_tm)
-                                                  / (ASSUMED_REMAINING_ERROR_EFFECT_SHARE C))
+                                                  / (MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY C))
     error_change_bound              d: bound on the change of x within the memory of the slowest filter,
                                     d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
                                     of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
@@ -71,10 +71,10 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     BETA_HYPOTHESIS,
     CLIMB_TEST,
     DENSITY_TEST,
+    DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA,
     FIRST_ANGLE_TEST,
     FIRST_TURN_TEST,
     MAX_PITCH_RAD,
-    MIN_DYNAMIC_PRESSURE_PA,
     N_INITIAL_ERROR_HYPOTHESES,
     PHI_HYPOTHESIS,
     QDYN,
@@ -96,7 +96,7 @@ MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL = (
     0.05  # temperature over that at sea level, below which none is extrapolated
 )
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
-ASSUMED_REMAINING_ERROR_EFFECT_SHARE = 0.8
+MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY = 0.8
 SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 
 # Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
@@ -150,7 +150,9 @@ def set_error_bounds_at_start(initial_errors, readings):
     error_bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
     V = max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     airspeed_in_standard_atmosphere = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
-        2.0 * max(readings[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(readings[ALTITUDE])
+        2.0
+        * max(readings[QDYN], DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA)
+        / standard_air_density(readings[ALTITUDE])
     )
     (
         max_reading_over_truth,
@@ -180,7 +182,7 @@ def index_of_test_showing_error_change(hypothesis_index):
 def update_recent_change_and_widen_bounds(redundancy, initial_errors):
     """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
     part of it that this filter forgets in a sample."""
-    share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
+    share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay_by_pole[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         test_index = index_of_test_showing_error_change(i)
         error_bound_at_start = initial_errors.error_bound_at_start[i]
@@ -393,18 +395,20 @@ def fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r):
 @kernel
 def filter_effects_per_unit_error(redundancy, initial_errors):
     """Pass effects per unit error, largest and signed, through the filters of the tests."""
-    filter_decay = redundancy.config.filter_decay
+    filter_decay_by_pole = redundancy.config.filter_decay_by_pole
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         for test_index in range(RPM_TEST):
-            for m in range(filter_decay.size):
+            for m in range(filter_decay_by_pole.size):
                 initial_errors.filtered_max_effect_per_unit_error[i, test_index, m] = (
-                    filter_decay[m] * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
+                    filter_decay_by_pole[m]
+                    * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
                     + initial_errors.max_effect_per_unit_error[i, test_index]
                 )
     for signed_effect_index in range(initial_errors.signed_effect_per_unit_error.size):
-        for m in range(filter_decay.size):
+        for m in range(filter_decay_by_pole.size):
             initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m] = (
-                filter_decay[m] * initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m]
+                filter_decay_by_pole[m]
+                * initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m]
                 + initial_errors.signed_effect_per_unit_error[signed_effect_index]
             )
 
@@ -435,7 +439,7 @@ def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect
     if min_effect_per_unit_error > 0.0:
         initial_errors.error_bound[hypothesis_index] = min(
             initial_errors.error_bound[hypothesis_index],
-            max_effect / (ASSUMED_REMAINING_ERROR_EFFECT_SHARE * min_effect_per_unit_error),
+            max_effect / (MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY * min_effect_per_unit_error),
         )
 
 
@@ -474,7 +478,7 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_in
 @kernel
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
-    for m in range(redundancy.config.filter_decay.size):
+    for m in range(redundancy.config.filter_decay_by_pole.size):
         filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
@@ -626,7 +630,7 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis_inde
         if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST
         else 0.0
     )
-    for m in range(redundancy.config.filter_decay.size):
+    for m in range(redundancy.config.filter_decay_by_pole.size):
         max_error_effect = (
             error_bound_with_recent_change
             * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
@@ -655,15 +659,15 @@ def max_error_effect_at_alarm(initial_errors, hypothesis_index, test_index, pole
 @kernel
 def latch_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
     """Record by which of `tests_exceeded_since_alarm` (N_TESTS,) each hypothesis is refuted."""
-    is_refuted_by_test = initial_errors.is_refuted_by_test
+    refutations_by_hypothesis_and_test = initial_errors.refutations_by_hypothesis_and_test
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         for test_index in range(tests_exceeded_since_alarm.size):
             if (
                 tests_exceeded_since_alarm[test_index]
-                and not is_refuted_by_test[i, test_index]
+                and not refutations_by_hypothesis_and_test[i, test_index]
                 and exceeds_bound_with_initial_error(redundancy, initial_errors, i, test_index)
             ):
-                is_refuted_by_test[i, test_index] = 1
+                refutations_by_hypothesis_and_test[i, test_index] = 1
 
 
 @kernel
@@ -686,8 +690,8 @@ def initial_error_explains_exceeded_tests(initial_errors, hypothesis_index, alar
     If the test that raised the alarm reacts at once to such a change, sensor_monitor.py judges changes: here
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
-    for test_index in range(initial_errors.is_refuted_by_test.shape[1]):
-        if initial_errors.is_refuted_by_test[hypothesis_index, test_index] and (
+    for test_index in range(initial_errors.refutations_by_hypothesis_and_test.shape[1]):
+        if initial_errors.refutations_by_hypothesis_and_test[hypothesis_index, test_index] and (
             test_reacts_to_error_change(hypothesis_index, alarm_test_index)
             or not test_reacts_to_error_change(hypothesis_index, test_index)
         ):

@@ -92,13 +92,13 @@ FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first 
 N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
 MIN_FAULTY_FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
-GYRO_ERROR_UNDECIDED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED = 0, 1, 2  # of `gyro_error_verdict`
+GYRO_ERROR_UNDECIDED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED = 0, 1, 2  # of `gyro_error_verdict_by_axis`
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # at which the attitude corrects a replaced rate, if its noise is declared
 REPLACED_RATE_CORRECTION_PER_S = 3.0
 # Number of samples of a sensor that are never identical without resolution
 MIN_FROZEN_SAMPLES_WITHOUT_ROUNDING = 3
-MIN_FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
+MIN_FROZEN_NOISY_ROUNDED_SAMPLES = 50  # the same with noise of more than a quarter of the resolution
 UNREACHABLE_FROZEN_SAMPLES = (
     1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 )
@@ -126,7 +126,7 @@ TEST_RECORD = record(
 
 REDUNDANCY_RECORD = record(
     config=record(
-        sample_time_s=float, filter_decay=N_POLES, gravity_m_s2=float,
+        sample_time_s=float, filter_decay_by_pole=N_POLES, gravity_m_s2=float,
         # Declared turbulence: bound on a gust's speed; bound on its changes through each filter, which holds
         # up to max_airspeed_mps, and above low_altitude_limit_m: below it a gust changes faster
         max_gust_speed_mps=float, gust_change_bound_mps=N_POLES, max_airspeed_mps=float,
@@ -166,7 +166,7 @@ INITIAL_ERRORS_RECORD = record(
     # effects of a unit with their sign
     signed_effect_per_unit_error=N_SIGNED_INITIAL_ERROR_EFFECTS,
     filtered_signed_effect_per_unit_error=(N_SIGNED_INITIAL_ERROR_EFFECTS, N_POLES),
-    is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
+    refutations_by_hypothesis_and_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 
 MONITOR_CONFIG_RECORD = record(
@@ -184,14 +184,14 @@ MONITOR_MEMORY_RECORD = record(
     apparent_gyro_error=3, previous_apparent_gyro_error=3,
     substep_gyro_error_peak=3, previous_substep_gyro_error_peak=3, earlier_substep_gyro_error_peak=3,
     # W of sensor_monitor.py, rad/s, by axis: the gyro's error if the dynamics are right; and its bound
-    gyro_error_estimate=3, gyro_error_estimate_bound=3, previous_gyro_error_estimate_bound=3,
+    gyro_error_estimate=3, sound_gyro_estimate_bound=3, previous_sound_gyro_estimate_bound=3,
     previous_gyro_error_estimate=3,
     # a sensor with the reading that it should equal
     has_duplicate_agreed=(int, max(len(DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE), 1)),
     # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
     # beyond it no gyro can be broken
     gyros_excluded=int, filtered_turn_difference=(3, N_POLES), filtered_turn_difference_bound=(3, N_POLES),
-    gyro_error_verdict=(int, 3), is_rate_replaced=(int, 3),
+    gyro_error_verdict_by_axis=(int, 3), is_rate_replaced=(int, 3),
     n_identical_samples=(int, N_SENSORS), reading_two_samples_ago=N_SENSORS, is_cleared=(int, N_SENSORS),
     fading_max_accelerometer_jump=float,  # m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
@@ -261,9 +261,9 @@ def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Sc
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
     initial_state, sample_time_s = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
     config["sample_time_s"] = sample_time_s
-    config["filter_decay"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
+    config["filter_decay_by_pole"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
     config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial_state.altitude_m / EARTH_RADIUS_M) ** -2
-    config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_speed_and_change_bounds(
+    config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_speed_and_filtered_change_bounds(
         declared.air, initial_state.airspeed_mps, sample_time_s
     )
     config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial_state.airspeed_mps
@@ -313,10 +313,10 @@ def min_frozen_samples(noise_std: float, resolution: float) -> int:
     """Number of identical samples that a sound sensor of this noise and resolution does not give."""
     if resolution == 0.0:
         return MIN_FROZEN_SAMPLES_WITHOUT_ROUNDING
-    return MIN_FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else UNREACHABLE_FROZEN_SAMPLES
+    return MIN_FROZEN_NOISY_ROUNDED_SAMPLES if noise_std > resolution / 4.0 else UNREACHABLE_FROZEN_SAMPLES
 
 
-def gust_speed_and_change_bounds(
+def gust_speed_and_filtered_change_bounds(
     turbulence: Dryden, trim_airspeed_mps: float, sample_time_s: float
 ) -> tuple[float, np.ndarray]:
     """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
@@ -363,7 +363,7 @@ EARTH_ACCELERATION_BOUND_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's cha
 DENSITY_SCALE_HEIGHT_M = 6300.0  # over which the density falls by a factor e at most: in the stratosphere
 MAX_PITCH_RAD = 1.3  # beyond it, roll and heading cannot be distinguished: the attitude tests restart
 AIRSPEED_DIVISOR_FLOOR_MPS = 1.0  # at least so much where an airspeed divides
-MIN_DYNAMIC_PRESSURE_PA = 1.0  # the same of the dynamic pressure
+DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA = 1.0  # the same of the dynamic pressure
 MIN_QDYN_PER_AIRSPEED_SQUARED = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
 MIN_PREDICTED_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
 # of a reading that its constant error leaves, at least, under a logarithm
@@ -469,7 +469,7 @@ def fill_reading_error_bounds(redundancy, readings):
 
 
 @kernel
-def store_sample(redundancy, readings, specific_force):
+def store_sample_as_previous(redundancy, readings, specific_force):
     """Store this sample for the next one; readings (N_SENSORS,) SI, specific_force (3,) m/s2."""
     memory, gravity_m_s2 = redundancy.memory, redundancy.config.gravity_m_s2
     memory.previous_reading[:], memory.error_bound_two_samples_ago[:] = readings, memory.previous_error_bound
@@ -640,7 +640,7 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
         + changing_error_bound[PSI]
     )
     for i in range(3):
-        rate_error_bound_by_attitude = (
+        rate_error_bound_from_attitude_error = (
             max_turn_rate * (attitude_error_bound_sum + max_pitch_secant * previous_error_bound[THETA])
             + tilt_reading_change * momentary_theta_and_psi_error_bound / config.sample_time_s
         )
@@ -649,15 +649,15 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
             + 2.0 * config.attitude_drift_rad_s
             + previous_error_bound[P + i]
             + max_turn_angle * gyro_error_bound_sum
-            + rate_error_bound_by_attitude
+            + rate_error_bound_from_attitude_error
         )
-        rate_error_bound_by_attitude = (
+        rate_error_bound_from_attitude_error = (
             2.0 * max_pitch_secant * max_turn_rate * (previous_error_bound[PHI] + previous_error_bound[THETA])
         )
         total_rate_error_bound = (
             EARTH_RATE_BOUND_RAD_S
             + (1.0 + max_pitch_secant * max_turn_angle) * gyro_error_bound_sum
-            + rate_error_bound_by_attitude
+            + rate_error_bound_from_attitude_error
         )
         tests[FIRST_ANGLE_TEST + i].bound_per_s, tests[FIRST_ANGLE_TEST + i].bound_per_sample = (
             max_pitch_secant * total_rate_error_bound + config.attitude_drift_rad_s,
@@ -771,10 +771,10 @@ def log_change_error_bound(redundancy, readings, sensor_index):
     constant_error_bound = redundancy.config.constant_error_bound[sensor_index]
     previous_reading = redundancy.memory.previous_reading[sensor_index]
     smaller_reading = max(min(readings[sensor_index], previous_reading), 1.0)
-    first_order_bound = constant_error_bound * abs(
+    first_order_log_change_bound = constant_error_bound * abs(
         1.0 / max(readings[sensor_index], 1.0) - 1.0 / max(previous_reading, 1.0)
     )
-    return first_order_bound / max(
+    return first_order_log_change_bound / max(
         1.0 - constant_error_bound / smaller_reading, MIN_READING_SHARE_LEFT_BY_ERROR
     )
 
@@ -791,14 +791,14 @@ def bound_density_change_test(redundancy, readings):
         + config.max_vertical_wind_mps
         + config.max_gust_speed_mps
     )
-    apparent_log_change_bound = log_change_error_bound(
+    log_change_bound_from_reading_errors = log_change_error_bound(
         redundancy, readings, QDYN
     ) + 2.0 * log_change_error_bound(redundancy, readings, AIRSPEED)
     test.bound_per_s = (
-        max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_log_change_bound / config.sample_time_s
+        max_climb_rate / DENSITY_SCALE_HEIGHT_M + log_change_bound_from_reading_errors / config.sample_time_s
     )
     test.bound_per_sample = changing_error_bound[QDYN] / max(
-        readings[QDYN] - reading_error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
+        readings[QDYN] - reading_error_bound[QDYN], DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA
     )
     test.bound_per_sample += (
         2.0
@@ -832,7 +832,7 @@ def filter_residual_and_update_bound_ratio(redundancy, test):
     """Pass one test's residual through its filters, and find its largest ratio to the bound."""
     config = redundancy.config
     test.residual_bound_ratio = 0.0
-    for m, decay in enumerate(config.filter_decay):
+    for m, decay in enumerate(config.filter_decay_by_pole):
         test.filtered_residual[m] = decay * test.filtered_residual[m] + test.residual
         test.filtered_bound_per_s_part[m] = advance_residual_bound(
             test.filtered_bound_per_s_part[m], test.bound_per_s, decay, config.sample_time_s
@@ -904,7 +904,7 @@ def start_redundancy_tests(redundancy, readings, specific_force):
     specific_force (3,) m/s2."""
     memory = redundancy.memory
     fill_reading_error_bounds(redundancy, readings)
-    store_sample(redundancy, readings, specific_force)
+    store_sample_as_previous(redundancy, readings, specific_force)
     memory.error_bound_two_samples_ago[:], memory.previous_body_acceleration[:] = (
         memory.previous_error_bound,
         memory.body_acceleration,
@@ -939,6 +939,6 @@ def run_tests_with_equation(redundancy, readings, has_engine_sensors):
 
 
 @kernel
-def set_attitude_drift_bound(redundancy, t):
+def set_accumulated_attitude_drift_bound(redundancy, t):
     """Fill the bound on the attitude's drift by t s, which begins with the flight."""
     redundancy.memory.attitude_drift_bound_rad = redundancy.config.attitude_drift_rad_s * t

@@ -97,9 +97,9 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     body_turn_per_euler_angle,
     compare_duplicate_sensors,
     run_tests_with_equation,
-    set_attitude_drift_bound,
+    set_accumulated_attitude_drift_bound,
     start_redundancy_tests,
-    store_sample,
+    store_sample_as_previous,
 )
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
@@ -116,7 +116,7 @@ from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 # Accelerometers or flow sensor
 FLOW_JUMP_WINDOW_AFTER_ALARM_S = 1.0  # after the alarm: later, a jump by chance is too likely
-ACCELEROMETER_JUMP_FADE_TIME_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+ACCELEROMETER_JUMP_MEMORY_TIME_S = 2.0  # time constant with which the largest jump of an accelerometer fades
 MIN_READING_JUMP_PER_RESIDUAL = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
 MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
 # An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
@@ -149,13 +149,13 @@ def is_flow_test(test_index):
 
 
 @kernel
-def update_identical_counts_and_max_jump(monitor, readings):
+def update_identical_counts_and_accelerometer_jump(monitor, readings):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within
-    ACCELEROMETER_JUMP_FADE_TIME_S."""
+    ACCELEROMETER_JUMP_MEMORY_TIME_S."""
     memory, previous_reading = monitor.memory, monitor.redundancy.memory.previous_reading
     memory.fading_max_accelerometer_jump *= (
-        1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_FADE_TIME_S
+        1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_MEMORY_TIME_S
     )
     for i in range(N_SENSORS):
         memory.n_identical_samples[i] = (
@@ -278,9 +278,9 @@ def update_flow_evidence_since_alarm(monitor, readings):
         * np.cos(readings[PHI])
         * np.cos(readings[THETA])
     )
-    for m in range(config.filter_decay.size):
+    for m in range(config.filter_decay_by_pole.size):
         memory.filtered_climb_error_m[m] = (
-            config.filter_decay[m] * memory.filtered_climb_error_m[m] + climb_error_in_sample_m
+            config.filter_decay_by_pole[m] * memory.filtered_climb_error_m[m] + climb_error_in_sample_m
         )
     memory.n_samples_since_alarm += 1
 
@@ -311,7 +311,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
     if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test_index]:
         return False
     flow_hypothesis_index = initial_error_hypothesis_of_test(alarm_test_index)
-    for m in range(redundancy.config.filter_decay.size):
+    for m in range(redundancy.config.filter_decay_by_pole.size):
         expected_residual = abs(monitor.memory.filtered_climb_error_m[m])
         speed_test = redundancy.test[SPEED_TEST]
         if (
@@ -403,13 +403,13 @@ RATE_DAMPING_RELATIVE_TOLERANCE = 0.2  # relative error of the damping away from
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 MAX_INNOVATION_TO_GYRO_ERROR_RATIO_PER_S = 10.0
 GYRO_JUMP_TOLERANCE_SHARE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_GYRO_ERROR_SHARE_IN_ESTIMATE = 0.7  # of a gyro's error, which W shows
+MIN_GYRO_ERROR_SHARE_ESTIMATED = 0.7  # of a gyro's error, which W shows
 N_NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
 MIN_TRANSIENT_NOISE_RATIO = (
     2.0  # of the size of a transient to the bound on noise: else noise may be all of it
 )
 MAX_REMAINING_TRANSIENT_SHARE = 0.003  # of a jump of the attitude within a frame, in the next frame
-RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
+RATE_AND_ACCELERATION_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
 
 # Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign
 MAX_HIDDEN_ERROR_PER_TEST_BOUND = 2.0
@@ -419,7 +419,7 @@ FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 @kernel
 def check_sensors_and_replace_readings(
-    monitor, acceleration_prediction, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
+    monitor, prediction_record, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
 ):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
@@ -432,13 +432,15 @@ def check_sensors_and_replace_readings(
         begin_monitor(monitor, measured, t)
         return
     if memory.substep == 0:
-        update_gyro_error_estimate(monitor, detection_filter_bank.output.innovation, bound_record.eta_bar, dt)
+        update_gyro_error_from_dynamics(
+            monitor, detection_filter_bank.output.innovation, bound_record.eta_bar, dt
+        )
     run_tests_with_equation(redundancy, readings, monitor.config.has_engine_sensors)
     if N_TESTS > N_TESTS_WITH_EQUATION:
         compare_duplicate_sensors(redundancy, readings, measured.fresh)
         latch_duplicates_agreeing_before_alarm(monitor, measured.fresh)
     update_initial_error_bounds(redundancy, initial_errors, readings)
-    update_identical_counts_and_max_jump(monitor, readings)
+    update_identical_counts_and_accelerometer_jump(monitor, readings)
     if memory.substep == 0:
         memory.previous_apparent_gyro_error[:], memory.earlier_substep_gyro_error_peak[:] = (
             memory.apparent_gyro_error,
@@ -459,14 +461,14 @@ def check_sensors_and_replace_readings(
     if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
         advance_start_stage_and_widen_gyro_error_bound(monitor)
     if monitor.config.attitude_is_noisy:
-        update_turn_difference_and_rule_out_gyros(monitor)
+        exclude_all_gyros_on_turn_difference(monitor)
     raise_alarm_and_isolate_broken_sensor(
         monitor, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
     )
-    replace_isolated_and_missing_readings(monitor, acceleration_prediction, measured)
+    replace_isolated_and_missing_readings(monitor, prediction_record, measured)
     disable_accelerometers_if_suspect(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
-    store_sample(redundancy, readings, measured.force)
+    store_sample_as_previous(redundancy, readings, measured.force)
     memory.substep = (memory.substep + 1) % monitor.config.substeps
 
 
@@ -481,7 +483,7 @@ def begin_monitor(monitor, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
     memory, redundancy = monitor.memory, monitor.redundancy
     memory.start_stage, memory.started_at_s = 1, t
-    set_attitude_drift_bound(redundancy, t)
+    set_accumulated_attitude_drift_bound(redundancy, t)
     start_redundancy_tests(redundancy, measured.signal, measured.force)
     set_error_bounds_at_start(monitor.initial_errors, measured.signal)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
@@ -497,19 +499,19 @@ def advance_start_stage_and_widen_gyro_error_bound(monitor):
         memory.start_stage += 1
     if memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE - 1 and memory.substep == 0:
         for i in range(3):
-            memory.gyro_error_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
+            memory.sound_gyro_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
 
 
 @kernel
-def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
+def update_gyro_error_from_dynamics(monitor, innovation, eta_bar, dt):
     """Advance W (3,) rad/s, the gyro error if the dynamics are right, and its bound by the frame of dt s with
     innovation and eta_bar (3,) rad/s2."""
     memory, D = monitor.memory, monitor.config.rate_damping_per_s
     gyro_error = memory.gyro_error_estimate
-    gyro_error_bound = memory.gyro_error_estimate_bound
+    sound_gyro_estimate_bound = memory.sound_gyro_estimate_bound
     previous_frame_gyro_error = memory.previous_gyro_error_estimate
-    previous_frame_gyro_error_bound = memory.previous_gyro_error_estimate_bound
-    previous_frame_gyro_error_bound[:] = gyro_error_bound
+    previous_sound_gyro_estimate_bound = memory.previous_sound_gyro_estimate_bound
+    previous_sound_gyro_estimate_bound[:] = sound_gyro_estimate_bound
     previous_frame_gyro_error[:] = gyro_error
     for i in range(3):
         damping_deceleration, bound_growth_rate_from_damping = 0.0, 0.0
@@ -517,15 +519,15 @@ def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
             damping_deceleration += D[i, j] * previous_frame_gyro_error[j]
             bound_growth_rate_from_damping += (
                 -D[i, j] if i == j else abs(D[i, j])
-            ) * previous_frame_gyro_error_bound[j]
+            ) * previous_sound_gyro_estimate_bound[j]
         gyro_error[i] += dt * (innovation[i] - damping_deceleration)
-        gyro_error_bound[i] = max(
-            previous_frame_gyro_error_bound[i] + dt * (eta_bar[i] + bound_growth_rate_from_damping), 0.0
+        sound_gyro_estimate_bound[i] = max(
+            previous_sound_gyro_estimate_bound[i] + dt * (eta_bar[i] + bound_growth_rate_from_damping), 0.0
         )
 
 
 @kernel
-def update_turn_difference_and_rule_out_gyros(monitor):
+def exclude_all_gyros_on_turn_difference(monitor):
     """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
     Where the attitude is noisy, a surface is isolated only after that.
@@ -533,10 +535,10 @@ def update_turn_difference_and_rule_out_gyros(monitor):
     memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
         test = monitor.redundancy.test[FIRST_TURN_TEST + i]
-        gyro_estimate_error_bound = memory.gyro_error_estimate_bound[
+        gyro_estimate_error_bound = memory.sound_gyro_estimate_bound[
             i
         ] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(memory.gyro_error_estimate[i])
-        for m, decay in enumerate(config.filter_decay):
+        for m, decay in enumerate(config.filter_decay_by_pole):
             memory.filtered_turn_difference[i, m] = (
                 decay * memory.filtered_turn_difference[i, m]
                 + test.residual
@@ -642,7 +644,7 @@ def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
     memory, innovation = monitor.memory, detection_filter_bank.output.innovation
     filter_bank_alarm_axis = bank_alarm_axis(detection_filter_bank)
     for i in range(3):
-        if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
+        if memory.gyro_error_verdict_by_axis[i] != GYRO_ERROR_UNDECIDED:
             continue
         gyro_error_by_attitude = memory.apparent_gyro_error[i]
         previous_frame_gyro_error_by_attitude = memory.previous_apparent_gyro_error[i]
@@ -655,11 +657,12 @@ def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
             * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
         )
-        innovation_bound = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
-        dynamics_show_any_error = (
+        innovation_bound = bound_record.frame_innovation_bound[i] + RATE_AND_ACCELERATION_ROUNDING
+        error_shows_in_dynamics = (
             abs(innovation[i]) > innovation_bound
             or filter_bank_alarm_axis >= 0
-            or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
+            or abs(memory.gyro_error_estimate[i])
+            > memory.sound_gyro_estimate_bound[i] + RATE_AND_ACCELERATION_ROUNDING
         )
         earlier_gyro_error_peak = memory.earlier_substep_gyro_error_peak[i]
         later_gyro_error_peak = max(
@@ -675,18 +678,18 @@ def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
             abs(innovation[i] - jump_acceleration)
             <= innovation_bound + jump_acceleration_tolerance + attitude_rate_noise_bound / dt
         )
-        estimate_may_contain_gyro_error = (
-            MIN_GYRO_ERROR_SHARE_IN_ESTIMATE * abs(gyro_error_by_attitude)
-            <= memory.gyro_error_estimate_bound[i]
+        gyro_error_estimate_allows_error = (
+            MIN_GYRO_ERROR_SHARE_ESTIMATED * abs(gyro_error_by_attitude)
+            <= memory.sound_gyro_estimate_bound[i]
             + abs(memory.gyro_error_estimate[i])
             + attitude_rate_noise_bound
         )
         if not innovation_fits_gyro_jump or (
-            not dynamics_show_any_error and (gyro_error_is_transient or not estimate_may_contain_gyro_error)
+            not error_shows_in_dynamics and (gyro_error_is_transient or not gyro_error_estimate_allows_error)
         ):
-            memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
-        elif dynamics_show_any_error:
-            memory.gyro_error_verdict[i] = GYRO_ERROR_CONFIRMED
+            memory.gyro_error_verdict_by_axis[i] = GYRO_ERROR_REFUTED
+        elif error_shows_in_dynamics:
+            memory.gyro_error_verdict_by_axis[i] = GYRO_ERROR_CONFIRMED
 
 
 @kernel
@@ -911,7 +914,7 @@ def suspect_gyros_and_attitude(monitor):
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
     tests_exceeded_since_alarm = memory.tests_exceeded_since_alarm
-    gyro_error_verdict = memory.gyro_error_verdict
+    gyro_error_verdict_by_axis = memory.gyro_error_verdict_by_axis
     n_exceeded_turn_tests, any_angle_is_frozen = 0, False
     for i in range(3):
         n_exceeded_turn_tests += tests_exceeded_since_alarm[FIRST_TURN_TEST + i]
@@ -921,7 +924,9 @@ def suspect_gyros_and_attitude(monitor):
             tests_exceeded_since_alarm[FIRST_TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
         )
         is_suspect[i] = (
-            no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not any_angle_is_frozen
+            no_other_axis_exceeded
+            and gyro_error_verdict_by_axis[i] != GYRO_ERROR_REFUTED
+            and not any_angle_is_frozen
         )
         angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
         may_be_only_this_angle = angle_error_explains_other_angle_tests(monitor, i) and (
@@ -929,7 +934,7 @@ def suspect_gyros_and_attitude(monitor):
         )
         angle_may_be_wrong = (
             may_be_only_this_angle
-            and gyro_error_verdict[axis_of_worst_turn_test(monitor, i)] != GYRO_ERROR_CONFIRMED
+            and gyro_error_verdict_by_axis[axis_of_worst_turn_test(monitor, i)] != GYRO_ERROR_CONFIRMED
         )
         n_identical_samples = memory.n_identical_samples[PHI + i]
         min_frozen_samples = monitor.config.min_frozen_samples[PHI + i]
@@ -946,7 +951,9 @@ def angle_error_explains_other_angle_tests(monitor, angle_index):
         is_exceeded = (
             monitor.memory.tests_exceeded_since_alarm[FIRST_ANGLE_TEST + j]
             if angle_index == 2
-            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, FIRST_ANGLE_TEST + j]
+            else monitor.initial_errors.refutations_by_hypothesis_and_test[
+                PHI_HYPOTHESIS + angle_index, FIRST_ANGLE_TEST + j
+            ]
         )
         if j != angle_index and is_exceeded:
             return False
@@ -963,7 +970,7 @@ def angle_error_explains_turn_tests(monitor, angle_index):
     for j in range(3):
         turn_test = redundancy.test[FIRST_TURN_TEST + j]
         max_turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
-        for m in range(redundancy.config.filter_decay.size):
+        for m in range(redundancy.config.filter_decay_by_pole.size):
             max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
             max_initial_error_effect = (
                 max_error_effect_at_alarm(
@@ -1034,7 +1041,7 @@ def has_alarm(monitor):
 
 
 @kernel
-def replace_isolated_and_missing_readings(monitor, acceleration_prediction, measured):
+def replace_isolated_and_missing_readings(monitor, prediction_record, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: then none of them is used."""
     readings, any_reading_replaced, slipstream_input_replaced = measured.signal, False, False
@@ -1042,7 +1049,7 @@ def replace_isolated_and_missing_readings(monitor, acceleration_prediction, meas
         if measured.missing[i]:
             monitor.output.is_reading_unused[i] = 1
         if monitor.output.is_reading_unused[i] and i < AX:
-            readings[i] = estimate_reading(monitor, acceleration_prediction, readings, i)
+            readings[i] = estimate_reading(monitor, prediction_record, readings, i)
             any_reading_replaced = True
             slipstream_input_replaced = slipstream_input_replaced or i in (
                 AIRSPEED,
@@ -1057,11 +1064,11 @@ def replace_isolated_and_missing_readings(monitor, acceleration_prediction, meas
 
 
 @kernel
-def estimate_reading(monitor, acceleration_prediction, readings, sensor_index):
+def estimate_reading(monitor, prediction_record, readings, sensor_index):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
     memory = monitor.redundancy.memory
     if sensor_index < 3:
-        return estimate_rate_and_mark_replaced(monitor, acceleration_prediction, sensor_index)
+        return estimate_rate_and_mark_replaced(monitor, prediction_record, sensor_index)
     if sensor_index in (ALPHA, BETA):
         return memory.predicted_reading[
             sensor_index
@@ -1079,7 +1086,7 @@ def estimate_reading(monitor, acceleration_prediction, readings, sensor_index):
 
 
 @kernel
-def estimate_rate_and_mark_replaced(monitor, acceleration_prediction, axis):
+def estimate_rate_and_mark_replaced(monitor, prediction_record, axis):
     """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
     change since.
 
@@ -1088,17 +1095,17 @@ def estimate_rate_and_mark_replaced(monitor, acceleration_prediction, axis):
     config = monitor.redundancy.config
     memory = monitor.redundancy.memory
     test = monitor.redundancy.test[FIRST_TURN_TEST + axis]
-    u = acceleration_prediction.u_before if monitor.memory.substep == 0 else acceleration_prediction.u
-    predicted_acceleration = acceleration_prediction.f[axis]
+    u = prediction_record.u_before if monitor.memory.substep == 0 else prediction_record.u
+    predicted_acceleration = prediction_record.f[axis]
     for s in range(u.size):
-        predicted_acceleration += acceleration_prediction.G[axis, s] * u[s]
-    angle_correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
+        predicted_acceleration += prediction_record.G[axis, s] * u[s]
+    angle_correction_rad = monitor.config.replaced_rate_correction_share * test.residual
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
-        angle_correction = (
+        angle_correction_rad = (
             config.sample_time_s
             * FILTER_POLES_PER_S[INITIAL_RATE_ESTIMATE_POLE_INDEX]
             * test.filtered_residual[INITIAL_RATE_ESTIMATE_POLE_INDEX]
         )
     monitor.memory.is_rate_replaced[axis] = 1
-    corrected_previous_rate = memory.previous_reading[axis] + angle_correction / config.sample_time_s
+    corrected_previous_rate = memory.previous_reading[axis] + angle_correction_rad / config.sample_time_s
     return corrected_previous_rate + config.sample_time_s * predicted_acceleration

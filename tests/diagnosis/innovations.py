@@ -152,7 +152,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regr
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
-            likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(first + k))
+            likelihood.reset_onset_slot(block, likelihood.onset_slot_restarting_at_frame(first + k))
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = innovations[k]
         likelihood.advance_whitening_filter(

@@ -130,7 +130,7 @@ class Across:
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["test_config"]
-        parity.prepare_views_for_frame(views, record["forces"], record["gust"], bound, G, Gu)
+        parity.set_view_use_directions_signatures(views, record["forces"], record["gust"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
         parity.fill_view_innovations_noise_regressors(
             views, int(tests["uses_regressors"]), *parts, innovation, y[2]

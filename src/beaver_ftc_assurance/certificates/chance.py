@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis.detection import (
     NOISE_SHARE_OF_ALARM_LEVEL,
     advance_block,
     new_filter_block,
-    onset_slot_to_reset,
+    onset_slot_restarting_at_frame,
     response_of_block,
     whiten_frame,
 )
@@ -49,7 +49,9 @@ def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: in
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     diagnosis = tape.alarm.diagnosis
     b, h, slot = _largest_score(diagnosis.statistical_blocks)
-    first = next((r for r in range(k, tape.first, -1) if onset_slot_to_reset(r - tape.since) == slot), None)
+    first = next(
+        (r for r in range(k, tape.first, -1) if onset_slot_restarting_at_frame(r - tape.since) == slot), None
+    )
     if first is None or k - first > MAX_WRITTEN_FRAMES:
         return None
     hypothesis = diagnosis.statistical_blocks[b].hypotheses[h]
@@ -314,7 +316,7 @@ def _run_filter(said: Document, frames: _FilterInputs, P: np.ndarray, R: np.ndar
 def add_whitened_frames(blocks, inputs, drift, frame_parameters, states, sums, room, dt):
     """Run a filter, blocks (1,), over `_FilterInputs`, and add w.g of each frame to `sums` (columns,): g, the
     whitened innovation of each column, w = S^-1 g of the second, the signature. See
-    `likelihood.accumulate_correlations_and_bounds`.
+    `likelihood.whiten_signatures_and_accumulate_sums`.
 
     states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
     pace, in the last frame, as it stays; and of the first of `sums` the prediction for calm air.

@@ -218,7 +218,9 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
     e = fdi["bound"]["surface_term_error_bound_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(size - max(abs(along @ c) for c in corners), parity.COLUMN_NORM_SHARE_FLOOR * size)
+    least = max(
+        size - max(abs(along @ c) for c in corners), parity.MIN_ERROR_REDUCED_COLUMN_NORM_SHARE * size
+    )
     shown = has_surface_term_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
@@ -292,7 +294,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, uses_regressor
         Across.sign(fdi, own, Gu)
         block["frame_innovation"][0] = own["direction"][:3] @ innovation
         if not latched:
-            likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(frame))
+            likelihood.reset_onset_slot(block, likelihood.onset_slot_restarting_at_frame(frame))
         likelihood.update_block(block, own["uncertainty_bound"], uses_regressors, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name

@@ -19,7 +19,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
         fdi["bound"]["changing_gyro_error_bound"] = noise[k + 1]
-        on(filters.update_innovation_residuals_and_thresholds, fdi, x[k + 1], x[k], believed[k])
+        on(filters.update_innovation_and_filter_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame_innovation_bound"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
@@ -78,7 +78,7 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
     fdi["isolation"]["config"]["n_estimators"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(filters.set_parity_directions, fdi, G)
+    on(filters.set_estimator_parity_directions, fdi, G)
     assert fdi["isolation"]["estimator"]["parity_direction"][0] == pytest.approx([-0.8, 0.0, -0.6])
     assert fdi["isolation"]["estimator"]["parity_direction"][0] @ G[:, 2] == pytest.approx(0.0)
     assert not fdi["isolation"]["estimator"]["parity_direction"][1].any()
@@ -180,9 +180,9 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
     fie = estimator(fdi)
     G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(filters.set_parity_directions, fdi, G)
+    on(filters.set_estimator_parity_directions, fdi, G)
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(filters.set_parity_directions, fdi, np.zeros((3, 4)))
+    on(filters.set_estimator_parity_directions, fdi, np.zeros((3, 4)))
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
 
 

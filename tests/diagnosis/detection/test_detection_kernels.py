@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
     BETA_CENTRES_RAD,
     FDAE_NETWORK_RECORD,
-    N_BASIS_FUNCTIONS,
+    N_ALPHA_PLUS_BETA_CENTRES,
 )
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.schema import Scenario
@@ -23,7 +23,7 @@ def new_network(**fields):
 @pytest.mark.parametrize("alpha", [-0.3, -0.1, 0.0, 0.13, 0.5, 0.9])
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
-    out = np.zeros(N_BASIS_FUNCTIONS)
+    out = np.zeros(N_ALPHA_PLUS_BETA_CENTRES)
     detection_filters.fill_normalised_gaussians(alpha, beta, out)
     parts = []
     for place, centres in ((alpha, ALPHA_CENTRES_RAD), (beta, BETA_CENTRES_RAD)):
@@ -42,7 +42,7 @@ def test_the_dead_zone_leaves_the_excess(residual, left):
 
 def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
-    record = new_network(weights=rng.normal(size=(3, N_BASIS_FUNCTIONS)))
+    record = new_network(weights=rng.normal(size=(3, N_ALPHA_PLUS_BETA_CENTRES)))
     detection_filters.evaluate_network(record, 0.1, -0.05)
     assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["basis_values"])
 
@@ -50,13 +50,13 @@ def test_the_output_is_the_weights_on_the_basis():
 @pytest.mark.parametrize("leaking", [False, True])
 def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     rng = np.random.default_rng(2)
-    before = 0.1 * rng.normal(size=(3, N_BASIS_FUNCTIONS))
+    before = 0.1 * rng.normal(size=(3, N_ALPHA_PLUS_BETA_CENTRES))
     record = new_network(
         learning_gain=30.0,
         leak_per_s=2.0,
         weight_limit=9.0,
         weights=before,
-        basis_values=rng.uniform(0, 1, N_BASIS_FUNCTIONS),
+        basis_values=rng.uniform(0, 1, N_ALPHA_PLUS_BETA_CENTRES),
     )
     detection_filters.train_network(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0

@@ -466,7 +466,7 @@ def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     changed = np.abs(component["predicted_chord_scaled_force"] - then)
     assert changed[SIDE_INDEX_AMONG_FORCES] > 0.01
     assert component["force_flow_lag_error_bound"] == pytest.approx(
-        forces.MAX_FORCE_FLOW_LAG_S * changed / DT
+        forces.MAX_LAG_BETWEEN_FORCE_AND_FLOW_S * changed / DT
     )
 
 

@@ -206,7 +206,7 @@ def test_there_is_always_an_onset_of_about_every_age():
     frames, oldest = 3000, 2 ** (N_ONSET_SLOTS - 1)
     onset = np.zeros(N_ONSET_SLOTS, int)
     for k in range(frames):
-        onset[likelihood.onset_slot_to_reset(k)] = k
+        onset[likelihood.onset_slot_restarting_at_frame(k)] = k
         ages = k - onset
         age = np.arange(1, min(k, oldest) + 1)[:, None]
         assert np.any((ages >= age / 2) & (ages <= 2 * age), axis=1).all(), k
@@ -253,7 +253,7 @@ def _largest_share(block, innovations, moments, shown=None):
     block["alarm_level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
         block["coarse_gust_response"][0] = 0.0 if shown is None else shown[k]
-        likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(k))
+        likelihood.reset_onset_slot(block, likelihood.onset_slot_restarting_at_frame(k))
         block["frame_innovation"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["no_gust_filter"]["n_axes"]:
             likelihood.whiten_by_no_gust_filter(block, FRAME_S)

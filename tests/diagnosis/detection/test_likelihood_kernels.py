@@ -42,8 +42,8 @@ def through(block, accelerations):
 
 def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
     expected = [min((k & -k).bit_length() - 1, N_ONSET_SLOTS - 1) for k in range(1, 2**11)]
-    assert [likelihood.onset_slot_to_reset(k) for k in range(1, 2**11)] == expected
-    assert likelihood.onset_slot_to_reset(0) == N_ONSET_SLOTS - 1
+    assert [likelihood.onset_slot_restarting_at_frame(k) for k in range(1, 2**11)] == expected
+    assert likelihood.onset_slot_restarting_at_frame(0) == N_ONSET_SLOTS - 1
 
 
 def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
@@ -112,7 +112,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     onset_tests, lane = block["onset_tests"][0], 2
     for each in w:
         onset_tests["signature_for_onset"][:, lane] = each
-        likelihood.accumulate_correlations_and_bounds(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
+        likelihood.whiten_signatures_and_accumulate_sums(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
     max_correlation_by_constant_uncertainty, swings = (
@@ -171,7 +171,9 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     )
     before = {name: onset_tests_of(block, name) for name in kept_by_name}
     for onset_tests, overlap in zip(block["onset_tests"], block["regressor_correlation"], strict=True):
-        likelihood.accumulate_correlations_and_bounds(block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep)
+        likelihood.whiten_signatures_and_accumulate_sums(
+            block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep
+        )
         likelihood.accumulate_regressor_correlation(
             block, onset_tests, overlap, N_ONSET_TESTS_PER_GROUP, keep
         )
@@ -229,7 +231,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     block["calm_air_cross_correlation"], block["calm_air_information"] = calm_air_cross_correlation, size
     inverse, g = block["S_inverse"].copy(), block["unscaled_white_innovation_rad_s"].copy()
     likelihood.whiten_by_no_gust_filter(block, DT)
-    likelihood.fill_predictable_innovation(block, DT)
+    likelihood.update_predictable_innovation(block, DT)
     likelihood.advance_covariance(alone, DT)
     likelihood.advance_whitening_filter(
         alone, alone["state"], np.array([0.4, -0.2]), DT, alone["unscaled_white_innovation_rad_s"]
@@ -388,11 +390,11 @@ def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_with
 
 
 def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
-    assert likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
-    assert likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(
+    assert likelihood.evidence_over_noise_and_uncertainty(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
+    assert likelihood.evidence_over_noise_and_uncertainty(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(
         12.0 / (4.0 + 1.5)
     )
-    against_chance_alone = likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 0.6, 9.0)
+    against_chance_alone = likelihood.evidence_over_noise_and_uncertainty(6.0, 0.5, 12.0, 0.6, 9.0)
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 

@@ -67,7 +67,7 @@ def residual_interval(
     theta_max,
     filtered_positive_Z,
     filtered_negative_Z,
-    filtered_regressor,
+    filtered_Z,
     theta_estimate,
     uncertainty_bound,
 ):
@@ -81,26 +81,25 @@ def residual_interval(
     residual_low = (
         theta_min * filtered_positive_Z
         + theta_max * filtered_negative_Z
-        - filtered_regressor * theta_estimate
+        - filtered_Z * theta_estimate
         - uncertainty_bound
     )
     residual_high = (
         theta_max * filtered_positive_Z
         + theta_min * filtered_negative_Z
-        - filtered_regressor * theta_estimate
+        - filtered_Z * theta_estimate
         + uncertainty_bound
     )
     return residual_low, residual_high
 
 
 @kernel
-def published_threshold_interval(theta_min, theta_max, filtered_regressor, theta_estimate, uncertainty_bound):
+def published_threshold_interval(theta_min, theta_max, filtered_Z, theta_estimate, uncertainty_bound):
     """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
     Zhang2002].
     """
     published_threshold = (
-        max(theta_estimate - theta_min, theta_max - theta_estimate) * abs(filtered_regressor)
-        + uncertainty_bound
+        max(theta_estimate - theta_min, theta_max - theta_estimate) * abs(filtered_Z) + uncertainty_bound
     )
     return -published_threshold, published_threshold
 
@@ -153,7 +152,7 @@ def set_constant_published_filter_threshold(filter_bank, threshold):
 
 
 @kernel
-def set_parity_directions(isolation, G):
+def set_estimator_parity_directions(isolation, G):
     """Fix, once, the direction along which each fault has least effect; G (3, n) at the start of the flight.
 
     Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
@@ -169,9 +168,7 @@ def set_parity_directions(isolation, G):
 
 
 @kernel
-def update_innovation_residuals_and_thresholds(
-    filter_bank, bound_record, x, x_before, predicted_acceleration, dt
-):
+def update_innovation_and_filter_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
     x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the
@@ -269,16 +266,16 @@ def fault_acceleration_range(fie, i):
 def fault_acceleration_range_along_parity(fie):
     """Least and greatest acceleration, rad/s2, along `fie.parity_direction` (3,); else as
     `fault_acceleration_range`."""
-    frame_mean_effect = fie.frame_mean_effect
+    frame_mean_effect_record = fie.frame_mean_effect
     acceleration_at_zero_theta = 0.0
     acceleration_per_theta = 0.0
     error_bound = 0.0
     for i in range(3):
-        error_bound += abs(fie.parity_direction[i]) * frame_mean_effect.error_bound[i]
+        error_bound += abs(fie.parity_direction[i]) * frame_mean_effect_record.error_bound[i]
         acceleration_at_zero_theta += (
-            fie.parity_direction[i] * frame_mean_effect.acceleration_at_zero_theta[i]
+            fie.parity_direction[i] * frame_mean_effect_record.acceleration_at_zero_theta[i]
         )
-        acceleration_per_theta += fie.parity_direction[i] * frame_mean_effect.regressor[i]
+        acceleration_per_theta += fie.parity_direction[i] * frame_mean_effect_record.regressor[i]
     acceleration_at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
     acceleration_at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
     acceleration_low = min(0.0, acceleration_at_theta_min, acceleration_at_theta_max) - error_bound
@@ -338,10 +335,10 @@ def are_residuals_reachable(filter_bank, fie, axes_share_theta):
 # output: fhat, rad/s2.
 ALPHA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES_RAD = np.linspace(-0.3, 0.3, 5)
-N_BASIS_FUNCTIONS = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
+N_ALPHA_PLUS_BETA_CENTRES = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
 FDAE_NETWORK_RECORD = record(
     config=record(learning_gain=float, leak_per_s=float, weight_limit=float),
-    memory=record(weights=(3, N_BASIS_FUNCTIONS), basis_values=N_BASIS_FUNCTIONS),
+    memory=record(weights=(3, N_ALPHA_PLUS_BETA_CENTRES), basis_values=N_ALPHA_PLUS_BETA_CENTRES),
     output=3,
 )
 
@@ -395,7 +392,7 @@ def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out)
 
 @kernel
 def fill_normalised_gaussians(alpha, beta, out):
-    """Fill out (N_BASIS_FUNCTIONS,) with the normalised radial basis functions at (alpha, beta), rad.
+    """Fill out (N_ALPHA_PLUS_BETA_CENTRES,) with the normalised radial basis functions at (alpha, beta), rad.
 
     Each width equals the spacing of its centres; outside the grid the nearest edge answers.
     """
@@ -405,12 +402,12 @@ def fill_normalised_gaussians(alpha, beta, out):
     beta_grid_position = min(
         max((beta - _FIRST_BETA_CENTRE_RAD) / _BETA_CENTRE_SPACING_RAD, 0.0), _N_BETA_CENTRES - 1.0
     )
-    basis_norm = np.sqrt(
+    concatenated_gaussian_norm = np.sqrt(
         fill_gaussians_and_sum_squares(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
         + fill_gaussians_and_sum_squares(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
     )
-    for j in range(N_BASIS_FUNCTIONS):
-        out[j] /= basis_norm
+    for j in range(N_ALPHA_PLUS_BETA_CENTRES):
+        out[j] /= concatenated_gaussian_norm
 
 
 @kernel
@@ -429,7 +426,7 @@ def evaluate_network(network, alpha, beta):
     fill_normalised_gaussians(alpha, beta, network.memory.basis_values)
     for i in range(3):
         fhat_i = 0.0
-        for j in range(N_BASIS_FUNCTIONS):
+        for j in range(N_ALPHA_PLUS_BETA_CENTRES):
             fhat_i += network.memory.weights[i, j] * network.memory.basis_values[j]
         network.output[i] = fhat_i
 
@@ -443,12 +440,13 @@ def train_network(network, residual, threshold, do_weights_leak, dt):
     leak_factor = np.exp(-network.config.leak_per_s * dt) if do_weights_leak else 1.0
     weight_limit = network.config.weight_limit
     for i in range(3):
-        learning_step = (
+        learning_step_beyond_threshold = (
             dt * network.config.learning_gain * signed_excess_over_threshold(residual[i], threshold[i])
         )
-        for j in range(N_BASIS_FUNCTIONS):
+        for j in range(N_ALPHA_PLUS_BETA_CENTRES):
             weight = (
-                leak_factor * network.memory.weights[i, j] + learning_step * network.memory.basis_values[j]
+                leak_factor * network.memory.weights[i, j]
+                + learning_step_beyond_threshold * network.memory.basis_values[j]
             )
             network.memory.weights[i, j] = min(max(weight, -weight_limit), weight_limit)
 

@@ -34,7 +34,7 @@ SIDE_FORCE_INDEX_IN_TABLE = FORCES.index("CY")
 TYPICAL_BODY_RATE_RAD_S, TYPICAL_PATH_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
 MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
-MAX_FORCE_FLOW_LAG_S = 0.002
+MAX_LAG_BETWEEN_FORCE_AND_FLOW_S = 0.002
 FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
 SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES = {
     False: 0.05,
@@ -81,28 +81,28 @@ MEASURED_FORCES_RECORD = record(
 
 
 @kernel
-def update_all_force_innovations(forces, gust, measured, u, dt):
+def update_all_force_innovations(forces, gust, measured_signals, u, dt):
     """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
     if forces.n_updates_capped_at_minimum == 0:
-        fill_flow_angle_rates(forces, measured)
-    evaluate(gust.memory.force_table, measured.x, measured.y)
-    forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
+        fill_flow_angle_rates(forces, measured_signals)
+    evaluate(gust.memory.force_table, measured_signals.x, measured_signals.y)
+    forces.dynamic_pressure_over_trim = measured_signals.y[QDYN] / forces.trim_dynamic_pressure
     for force_index in range(2):
         previous_predicted_chord_scaled_force = forces.component[force_index].predicted_chord_scaled_force
-        update_force_innovation_and_regressors(forces, gust, force_index, measured, u)
+        update_force_innovation_and_regressors(forces, gust, force_index, measured_signals, u)
         fill_force_flow_lag_error_bound(
             forces.component[force_index],
             previous_predicted_chord_scaled_force,
             forces.n_updates_capped_at_minimum,
             dt,
         )
-        integrate_flow_angle_and_fill_innovation(
-            forces, forces.component[force_index], force_index, measured.y, dt
+        update_inertial_flow_angle_and_force_innovation(
+            forces, forces.component[force_index], force_index, measured_signals.y, dt
         )
-    fill_flow_angle_rates(forces, measured)
+    fill_flow_angle_rates(forces, measured_signals)
     forces.n_updates_capped_at_minimum = min(forces.n_updates_capped_at_minimum + 1, MIN_FORCE_UPDATES)
 
 
@@ -113,7 +113,7 @@ def fill_force_flow_lag_error_bound(
     """Fill `force_flow_lag_error_bound` from the change of the model's e since
     `previous_predicted_chord_scaled_force`: force and flow differ in time."""
     force_record.force_flow_lag_error_bound = (
-        MAX_FORCE_FLOW_LAG_S
+        MAX_LAG_BETWEEN_FORCE_AND_FLOW_S
         * abs(force_record.predicted_chord_scaled_force - previous_predicted_chord_scaled_force)
         / dt
         if has_earlier_update
@@ -130,11 +130,11 @@ def fill_y_without_vanes(forces, air_rotation, y):
     forces.y_without_vanes[:] = y
     for force_index in range(2):
         force_record = forces.component[force_index]
-        vane_index = BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA
+        vane_index_in_y = BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA
         air_rotation_part_of_innovation = 0.0
         for k in range(3):
             air_rotation_part_of_innovation += force_record.innovation_per_air_rotation[k] * air_rotation[k]
-        forces.y_without_vanes[vane_index] -= (
+        forces.y_without_vanes[vane_index_in_y] -= (
             force_record.innovation / forces.dynamic_pressure_over_trim + air_rotation_part_of_innovation
         ) / force_record.axis_and_force_innovation_per_vane_error[1]
 
@@ -148,7 +148,7 @@ def stop_using_forces_and_accelerometers(forces, gust, inertial_gust):
 
 
 @kernel
-def integrate_flow_angle_and_fill_innovation(forces, force_record, force_index, y, dt):
+def update_inertial_flow_angle_and_force_innovation(forces, force_record, force_index, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     vane_angle = y[BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA]
     innovation_per_vane_rad = (
@@ -166,13 +166,13 @@ def integrate_flow_angle_and_fill_innovation(forces, force_record, force_index, 
 
 
 @kernel
-def update_force_innovation_and_regressors(forces, gust, force_index, measured, u):
+def update_force_innovation_and_regressors(forces, gust, force_index, measured_signals, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
-    force_table, force_record = gust.memory.force_table, forces.component[force_index]
-    first_term_index = force_table.free_from[SIDE_FORCE_INDEX_IN_TABLE + force_index]
-    end_term_index = force_table.surface_to[SIDE_FORCE_INDEX_IN_TABLE + force_index]
+    all_forces_term_table, force_record = gust.memory.force_table, forces.component[force_index]
+    first_term_index = all_forces_term_table.free_from[SIDE_FORCE_INDEX_IN_TABLE + force_index]
+    end_term_index = all_forces_term_table.surface_to[SIDE_FORCE_INDEX_IN_TABLE + force_index]
     chord_scaled_force_per_coefficient = (
-        measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
+        measured_signals.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
     predicted_chord_scaled_force = 0.0
     force_record.previous_chord_scaled_force_per_surface_rad[:] = (
@@ -181,23 +181,29 @@ def update_force_innovation_and_regressors(forces, gust, force_index, measured, 
     force_record.chord_scaled_force_per_surface_rad[:] = 0.0
     force_record.chord_scaled_force_per_surface_rad_error_bound[:] = 0.0
     for k in range(first_term_index, end_term_index):
-        s = force_table.surface[k]
-        term_regressor = chord_scaled_force_per_coefficient * force_table.power[force_table.monomial[k]]
+        s = all_forces_term_table.surface[k]
+        term_regressor_per_unit_coefficient = (
+            chord_scaled_force_per_coefficient
+            * all_forces_term_table.power[all_forces_term_table.monomial[k]]
+        )
         if s >= 0:
-            force_record.chord_scaled_force_per_surface_rad[s] += force_table.value[k] * term_regressor
-            force_record.chord_scaled_force_per_surface_rad_error_bound[s] += (
-                force_record.regressor_tolerance[k - first_term_index] * abs(term_regressor)
+            force_record.chord_scaled_force_per_surface_rad[s] += (
+                all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
             )
-            term_regressor *= u[s]
-        force_record.regressor[k - first_term_index] = term_regressor
-        predicted_chord_scaled_force += force_table.value[k] * term_regressor
+            force_record.chord_scaled_force_per_surface_rad_error_bound[s] += (
+                force_record.regressor_tolerance[k - first_term_index]
+                * abs(term_regressor_per_unit_coefficient)
+            )
+            term_regressor_per_unit_coefficient *= u[s]
+        force_record.regressor[k - first_term_index] = term_regressor_per_unit_coefficient
+        predicted_chord_scaled_force += all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
     if force_index == SIDE_INDEX_AMONG_FORCES:
         sideslip_rate_chord_scaled_force = (
             chord_scaled_force_per_coefficient
             * forces.sideslip_rate_coefficient
             * forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES]
             * forces.wing_span
-            / (2.0 * measured.y[AIRSPEED])
+            / (2.0 * measured_signals.y[AIRSPEED])
         )
         force_record.regressor[end_term_index - first_term_index] = sideslip_rate_chord_scaled_force
         predicted_chord_scaled_force += sideslip_rate_chord_scaled_force
@@ -212,10 +218,10 @@ def update_force_innovation_and_regressors(forces, gust, force_index, measured, 
             force_record.previous_chord_scaled_force_per_surface_rad[s] * u[s]
         )
     force_record.innovation = (
-        measured.force[1 + force_index] * forces.inverse_chord_per_m - predicted_chord_scaled_force
+        measured_signals.force[1 + force_index] * forces.inverse_chord_per_m - predicted_chord_scaled_force
     )
     pressure_noise_innovation_std = (
-        predicted_chord_scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
+        predicted_chord_scaled_force * forces.dynamic_pressure_noise_std / measured_signals.y[QDYN]
     )
     for k in range(2):
         force_record.noise_variance_with_without_vane[k] = (
@@ -226,14 +232,14 @@ def update_force_innovation_and_regressors(forces, gust, force_index, measured, 
 
 
 @kernel
-def fill_flow_angle_rates(forces, measured):
+def fill_flow_angle_rates(forces, measured_signals):
     """Fill `flow_angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
     They follow from accelerometers, rates, attitude and flow.
     """
-    gravity, x, specific_force = forces.gravity, measured.x, measured.force
-    phi, theta = measured.attitude[0], measured.attitude[1]
-    alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
+    gravity, x, specific_force = forces.gravity, measured_signals.x, measured_signals.force
+    phi, theta = measured_signals.attitude[0], measured_signals.attitude[1]
+    alpha, beta, V = measured_signals.y[ALPHA], measured_signals.y[BETA], measured_signals.y[AIRSPEED]
     unit_velocity_forward, unit_velocity_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
     unit_velocity_down = np.sin(alpha) * np.cos(beta)
     forward_acceleration = specific_force[0] - gravity * np.sin(theta)
@@ -298,7 +304,7 @@ def configure_forces(
     slipstream_per_airspeed, slipstream_variance_from_other_readings = _slipstream_slope_and_noise_variance(
         y, fdi["bound"]["declared_errors"], sensor_errors
     )
-    for force_index, (vane_index, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
+    for force_index, (vane_index_in_y, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
         chord_scaled_force_slopes_with_slipstream = (
             chord_scaled_force_per_coefficient
@@ -307,42 +313,42 @@ def configure_forces(
         chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1]
         chord_scaled_force_per_slipstream = chord_scaled_force_slopes_with_slipstream[-1]
         force_record["axis_and_force_innovation_per_vane_error"] = (
-            -acceleration_slopes_by_air_data[axis, vane_index],
-            -chord_scaled_force_slopes[vane_index],
+            -acceleration_slopes_by_air_data[axis, vane_index_in_y],
+            -chord_scaled_force_slopes[vane_index_in_y],
         )
-        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index]
+        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index_in_y]
         force_record["innovation_per_air_rotation"] = chord_scaled_force_slopes[3:]
         total_chord_scaled_force_slopes = chord_scaled_force_slopes.copy()
         total_chord_scaled_force_slopes[AIRSPEED] += (
             chord_scaled_force_per_slipstream * slipstream_per_airspeed
         )
         innovation_variance_by_reading = (total_chord_scaled_force_slopes * reading_noise_std) ** 2
-        innovation_noise_variance = (
+        force_prediction_noise_variance = (
             innovation_variance_by_reading.sum()
             + chord_scaled_force_per_slipstream**2 * slipstream_variance_from_other_readings
         )
         force_record["trim_noise_variance_with_without_vane"] = (
-            innovation_noise_variance,
-            innovation_noise_variance - innovation_variance_by_reading[vane_index],
+            force_prediction_noise_variance,
+            force_prediction_noise_variance - innovation_variance_by_reading[vane_index_in_y],
         )
         accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
         force_record["accelerometer_innovation_variance"] = (
             forces["inverse_chord_per_m"] * accelerometer_noise_std
         ) ** 2
-        _configure_force_tolerances(
+        _configure_force_regressors_and_tolerances(
             force_record,
             declared,
             terms,
             y,
-            chord_scaled_force_slopes[vane_index] / chord_scaled_force_per_coefficient,
+            chord_scaled_force_slopes[vane_index_in_y] / chord_scaled_force_per_coefficient,
             force_index,
             forces["inverse_chord_per_m"],
         )
-        chord_scaled_force_magnitude_sum_per_rad = chord_scaled_force_per_coefficient * sum(
+        max_chord_scaled_force_per_deflection_rad = chord_scaled_force_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
         force_record["deflection_error_effect_bound"] = (
-            chord_scaled_force_magnitude_sum_per_rad * declared.actuators.deflection_rad
+            max_chord_scaled_force_per_deflection_rad * declared.actuators.deflection_rad
         )
         force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
             sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
@@ -350,9 +356,9 @@ def configure_forces(
         flow_angle_drift_intensity = (
             FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[vane_index] ** 2 * (
-            flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
-        )
+        force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[
+            vane_index_in_y
+        ] ** 2 * (flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED]))
 
 
 def _slipstream_slope_and_noise_variance(
@@ -399,7 +405,7 @@ def _flow_angle_drift_bound(
     return float(EARTH_RATE_RAD_S + gyro_error_bound + acceleration_error_bound / airspeed_mps)
 
 
-def _configure_force_tolerances(
+def _configure_force_regressors_and_tolerances(
     force_record: np.void,
     declared: Declared,
     terms: list[Term],
@@ -422,19 +428,19 @@ def _configure_force_tolerances(
             force_record["regressor_tolerance"][k] += declared_errors_of_vane.steady * abs(
                 coefficient_per_vane_rad
             )
-    n_regressors = len(terms)
+    n_regressors_so_far = len(terms)
     if force_index == SIDE_INDEX_AMONG_FORCES:
-        force_record["regressor_tolerance"][n_regressors] = (
+        force_record["regressor_tolerance"][n_regressors_so_far] = (
             relative_coefficient_tolerance
             + SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES[declared.air.moves]
         )
-        n_regressors = n_regressors + 1
+        n_regressors_so_far = n_regressors_so_far + 1
     if accelerometer_errors.steady:
-        force_record["regressor_tolerance"][n_regressors] = accelerometer_errors.steady
-        force_record["regressor"][n_regressors] = inverse_chord_per_m
-        n_regressors = n_regressors + 1
-    force_record["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer_errors.slope
-    force_record["n_regressors"] = n_regressors + 1
+        force_record["regressor_tolerance"][n_regressors_so_far] = accelerometer_errors.steady
+        force_record["regressor"][n_regressors_so_far] = inverse_chord_per_m
+        n_regressors_so_far = n_regressors_so_far + 1
+    force_record["regressor_tolerance"][n_regressors_so_far] = MASS_TOLERANCE + accelerometer_errors.slope
+    force_record["n_regressors"] = n_regressors_so_far + 1
 
 
 def _force_coefficient(

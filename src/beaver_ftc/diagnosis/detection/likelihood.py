@@ -97,7 +97,7 @@ TRANSIENT_RINGING_SUM_FACTOR = 1.2
 # changes of the weather.
 CALM_AIR_SHARE_MEMORY_S = 2.0
 CALM_AIR_SHARE_PRIOR_INFORMATION = 4.0  # prior information for lambda = 1 (calm air), units of sum p' S^-1 p
-CALM_AIR_SHARE_MARGIN_STD = 2.0  # standard deviations by which lambda is taken larger than estimated
+STDS_ADDED_TO_CALM_AIR_SHARE = 2.0  # standard deviations by which lambda is taken larger than estimated
 
 HYPOTHESIS_RECORD = record(
     kind=int, surface=int, axis=int, raises_alarm=int, score_column_index=int,
@@ -145,12 +145,12 @@ ONSET_TESTS_RECORD = record(
 )  # fmt: skip
 
 
-_FILTER_FIELDS = {
+_FILTER_FIELD_TYPE_BY_NAME = {
     "n_axes": int, "drift_decay_factor": float, "state": 4, "unscaled_white_innovation_rad_s": 2,
     "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2,
     "gyro_noise_variance": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
-FILTER_RECORD = record(**_FILTER_FIELDS)
+FILTER_RECORD = record(**_FILTER_FIELD_TYPE_BY_NAME)
 
 
 def set_supporting_correlation_signs(block: np.void, hypothesis_kinds: Sequence[int]) -> None:
@@ -173,7 +173,7 @@ def block_dtype(capacity: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
-        **_FILTER_FIELDS,
+        **_FILTER_FIELD_TYPE_BY_NAME,
         drift_correlation_length_m=float, gust_drift_intensity_factor=float,
         filter_state_after_known_faults=4,
         frame_innovation=2,  # rad/s2
@@ -199,8 +199,8 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
-    one_block, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
-    block, rate_slice, drift_slice = one_block[0], slice(0, n), slice(n, 2 * n)
+    array_of_one_block, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
+    block, rate_slice, drift_slice = array_of_one_block[0], slice(0, n), slice(n, 2 * n)
     block["n_axes"], block["axes"], block["gyro_noise_variance"][:n] = n, (0, 1), R
     for covariance_name, row_slice, column_slice in (
         ("P_xx", rate_slice, rate_slice),
@@ -208,11 +208,11 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
         ("P_dd", drift_slice, drift_slice),
     ):
         block[covariance_name][:n, :n] = P[row_slice, column_slice]
-    return one_block
+    return array_of_one_block
 
 
 @kernel
-def invert_symmetric(n, S):
+def invert_symmetric_in_place(n, S):
     """Replace the leading n x n part of a symmetric S (2, 2), n at most 2, by its inverse."""
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
@@ -271,20 +271,20 @@ def update_covariance(block):
 def advance_covariance(block, dt):
     """Predict the covariances, fill the gains, update the covariances for the frame just measured; dt s."""
     predict_covariance(block, dt)
-    invert_symmetric(block.n_axes, block.S_inverse)
+    invert_symmetric_in_place(block.n_axes, block.S_inverse)
     fill_kalman_gains(block)
     update_covariance(block)
 
 
 @kernel
-def advance_whitening_filter(block, filter_state, acceleration, dt, out):
-    """Advance the filter by one frame of an acceleration (2,) rad/s2; dt s.
+def advance_whitening_filter(block, filter_state, input_acceleration, dt, out):
+    """Advance the filter by one frame of input_acceleration (2,) rad/s2; dt s.
 
     filter_state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g;
     that of the innovation has covariance S.
     """
     for i in range(block.n_axes):
-        out[i] = filter_state[i] + dt * (acceleration[i] - filter_state[2 + i])
+        out[i] = filter_state[i] + dt * (input_acceleration[i] - filter_state[2 + i])
     for i in range(block.n_axes):
         remaining_rate_error, drift_correction = out[i], 0.0
         for j in range(block.n_axes):
@@ -336,7 +336,7 @@ def whiten_by_no_gust_filter(block, dt):
 
 
 @kernel
-def fill_predictable_innovation(block, dt):
+def update_predictable_innovation(block, dt):
     """Fill `predictable_innovation_in_calm_air` (2,) rad/s with lambda p, the part of g that calm air makes
     predictable.
 
@@ -362,18 +362,18 @@ def fill_predictable_innovation(block, dt):
                 predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
             )
     calm_air_share_denominator = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
-    calm_air_share_numerator = (
+    upper_calm_air_share_numerator = (
         block.calm_air_cross_correlation
         + CALM_AIR_SHARE_PRIOR_INFORMATION
-        + CALM_AIR_SHARE_MARGIN_STD * sqrt(calm_air_share_denominator)
+        + STDS_ADDED_TO_CALM_AIR_SHARE * sqrt(calm_air_share_denominator)
     )
-    calm_air_share = min(max(calm_air_share_numerator / calm_air_share_denominator, 0.0), 1.0)
+    upper_calm_air_share = min(max(upper_calm_air_share_numerator / calm_air_share_denominator, 0.0), 1.0)
     for i in range(block.n_axes):
-        predictable_innovation[i] *= calm_air_share
+        predictable_innovation[i] *= upper_calm_air_share
 
 
 @kernel
-def onset_slot_to_reset(frame_index):
+def onset_slot_restarting_at_frame(frame_index):
     """The slot that restarts at a frame: slot j at odd multiples of 2^j, the last at all other frames."""
     onset_slot = 0
     while frame_index % 2 == 0 and onset_slot < N_ONSET_SLOTS - 1:
@@ -442,13 +442,13 @@ def fill_uncertainty_response_bounds(block, uncertainty_bound, dt):
                 * uncertainty_bound[block.axes[j]]
             )
         if drift_share_lost_per_frame > 0.0:
-            axis_settled_response_per_uncertainty = (
+            axis_settled_response_per_constant_uncertainty = (
                 dt
                 * drift_share_lost_per_frame
                 / (block.K_x[i, i] * drift_share_lost_per_frame + dt * drift_gain[i, i])
             )
             block.settled_uncertainty_response_bound[i] = (
-                axis_settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
+                axis_settled_response_per_constant_uncertainty * uncertainty_bound[block.axes[i]]
             )
 
 
@@ -479,7 +479,7 @@ def update_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
 
 
 @kernel
-def accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence_decay_factor):
+def whiten_signatures_and_accumulate_sums(block, onset_tests, n_tests, dt, evidence_decay_factor):
     """Whiten `signature_for_onset` of the first n_tests tests, and add the frame to N, D and the bounds on N.
 
     evidence_decay_factor: factor by which earlier sums decay. In a block of one axis all values of a second
@@ -494,8 +494,8 @@ def accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence
     drift_decay_factor = block.drift_decay_factor
     unscaled_white_innovation_0 = block.unscaled_white_innovation_rad_s[0]
     unscaled_white_innovation_1 = block.unscaled_white_innovation_rad_s[1]
-    predictable_0 = block.predictable_innovation_in_calm_air[0]
-    predictable_1 = block.predictable_innovation_in_calm_air[1]
+    predictable_innovation_0 = block.predictable_innovation_in_calm_air[0]
+    predictable_innovation_1 = block.predictable_innovation_in_calm_air[1]
     transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
     transient_response_sum_bound_1 = block.transient_response_sum_bound[1]
     settled_response_bound_0 = block.settled_uncertainty_response_bound[0]
@@ -535,7 +535,7 @@ def accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence
         )
         onset_tests.correlation_by_calm_air[k] = (
             evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
-        ) + (weight_0 * predictable_0 + weight_1 * predictable_1)
+        ) + (weight_0 * predictable_innovation_0 + weight_1 * predictable_innovation_1)
         varying_uncertainty_bound_increment = transient_response_sum_bound_0 * abs(
             weight_0 - correlation_weight[0, k]
         ) + transient_response_sum_bound_1 * abs(weight_1 - correlation_weight[1, k])
@@ -574,7 +574,7 @@ def accumulate_regressor_correlation(
     """
     correlation_weight = onset_tests.correlation_weight
     max_correlation_by_coefficient_errors = onset_tests.max_correlation_by_coefficient_errors
-    regressor_response, regressor_tolerance = block.regressor_response, block.regressor_tolerance
+    regressor_response, coefficient_error_bounds = block.regressor_response, block.regressor_tolerance
     n_regressors = block.n_regressors
     max_correlation_by_coefficient_errors[:n_tests] = 0.0
     for j in range(0, n_regressors - 1, 2):
@@ -583,7 +583,7 @@ def accumulate_regressor_correlation(
         response_b0 = regressor_response[j + 1, 0]
         response_b1 = regressor_response[j + 1, 1]
         correlations_a, correlations_b = regressor_correlation[j], regressor_correlation[j + 1]
-        tolerance_a, tolerance_b = regressor_tolerance[j], regressor_tolerance[j + 1]
+        error_bound_a, error_bound_b = coefficient_error_bounds[j], coefficient_error_bounds[j + 1]
         for k in range(n_tests):
             weight_0, weight_1 = correlation_weight[0, k], correlation_weight[1, k]
             R_a = evidence_decay_factor * correlations_a[k] + (
@@ -594,7 +594,7 @@ def accumulate_regressor_correlation(
             )
             correlations_a[k], correlations_b[k] = R_a, R_b
             max_correlation_by_coefficient_errors[k] = (
-                max_correlation_by_coefficient_errors[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+                max_correlation_by_coefficient_errors[k] + error_bound_a * abs(R_a) + error_bound_b * abs(R_b)
             )
     for j in range(n_regressors - n_regressors % 2, n_regressors):
         response_0, response_1 = regressor_response[j, 0], regressor_response[j, 1]
@@ -602,7 +602,7 @@ def accumulate_regressor_correlation(
             regressor_correlation[j, k] = evidence_decay_factor * regressor_correlation[j, k] + (
                 correlation_weight[0, k] * response_0 + correlation_weight[1, k] * response_1
             )
-            max_correlation_by_coefficient_errors[k] += regressor_tolerance[j] * abs(
+            max_correlation_by_coefficient_errors[k] += coefficient_error_bounds[j] * abs(
                 regressor_correlation[j, k]
             )
 
@@ -611,7 +611,7 @@ def accumulate_regressor_correlation(
 def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
     """Add the frame to the share of N that a roughly visible gust contributes.
 
-    `accumulate_correlations_and_bounds` must have filled the weights of the frame.
+    `whiten_signatures_and_accumulate_sums` must have filled the weights of the frame.
     """
     gust_response_0, gust_response_1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
     for k in range(n_tests):
@@ -636,7 +636,7 @@ def accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor):
         )
     for group_index in range(n_test_groups(block)):
         onset_tests, n_tests = block.onset_tests[group_index], n_onset_tests_in_group(block, group_index)
-        accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence_decay_factor)
+        whiten_signatures_and_accumulate_sums(block, onset_tests, n_tests, dt, evidence_decay_factor)
         if block.has_coarse_gust_estimate:
             accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
         if uses_regressors:
@@ -669,20 +669,21 @@ def is_one_sided(kind):
 
 
 @kernel
-def max_log_likelihood_ratio(is_loss_or_its_end, evidence, information):
-    """Largest log-likelihood ratio of a fault against none, for evidence N and information D.
+def max_log_likelihood_ratio(is_loss_or_its_end, supporting_evidence, information):
+    """Largest log-likelihood ratio of a fault against none, for supporting_evidence N and information D.
 
     It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
     """
-    llr = 0.5 * evidence * evidence / information
-    if is_loss_or_its_end and evidence > information:
-        llr = evidence - 0.5 * information
-    return llr if evidence > 0.0 else 0.0  # not earlier: each way out would be a division of its own
+    llr = 0.5 * supporting_evidence * supporting_evidence / information
+    if is_loss_or_its_end and supporting_evidence > information:
+        llr = supporting_evidence - 0.5 * information
+    # The zero is not returned earlier: each way out would be a division of its own.
+    return llr if supporting_evidence > 0.0 else 0.0
 
 
 @kernel
-def evidence_over_effective_std(
-    alarm_level, noise_share_of_alarm_level, evidence, max_evidence_from_uncertainty, information
+def evidence_over_noise_and_uncertainty(
+    alarm_level, noise_share_of_alarm_level, supporting_evidence, max_evidence_from_uncertainty, information
 ):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
@@ -691,7 +692,7 @@ def evidence_over_effective_std(
     result is compared with the level.
     """
     evidence_std = sqrt(information)
-    return evidence / (
+    return supporting_evidence / (
         evidence_std
         if max_evidence_from_uncertainty <= 0.0
         else max(
@@ -727,7 +728,7 @@ def evaluate_onset_tests(
             supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0
         )
         is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
-        evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
+        supporting_evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
         max_evidence_from_uncertainty = max_correlation_by_uncertainty(
             onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
         )
@@ -736,16 +737,20 @@ def evaluate_onset_tests(
             if non_loss_llr_bounds_include_uncertainty and not is_loss_or_its_end
             else uncertainty_weight_in_llr_bounds * max_evidence_from_uncertainty
         )
-        score_in_standard_deviations = evidence_over_effective_std(
+        score_in_standard_deviations = evidence_over_noise_and_uncertainty(
             alarm_level,
             noise_share_of_alarm_level,
-            evidence - evidence_from_errors_and_air,
+            supporting_evidence - evidence_from_errors_and_air,
             max_evidence_from_uncertainty,
             D,
         )
-        llr = max_log_likelihood_ratio(is_loss_or_its_end, evidence, D)
-        llr_lower_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence - evidence_error_bound, D)
-        llr_upper_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence + evidence_error_bound, D)
+        llr = max_log_likelihood_ratio(is_loss_or_its_end, supporting_evidence, D)
+        llr_lower_bound = max_log_likelihood_ratio(
+            is_loss_or_its_end, supporting_evidence - evidence_error_bound, D
+        )
+        llr_upper_bound = max_log_likelihood_ratio(
+            is_loss_or_its_end, supporting_evidence + evidence_error_bound, D
+        )
         onset_tests.score[k] = score_in_standard_deviations if has_information else 0.0
         onset_tests.llr_lower_bound[k] = llr_lower_bound if has_information else 0.0
         onset_tests.llr_upper_bound[k] = llr_upper_bound if has_information else 0.0
@@ -818,7 +823,7 @@ def update_block(
         block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
     )
     if block.no_gust_filter.n_axes > 0:
-        fill_predictable_innovation(block, dt)
+        update_predictable_innovation(block, dt)
     if block.has_coarse_gust_estimate:
         advance_whitening_filter(
             block, block.coarse_gust_filter_state, block.coarse_gust_response, dt, block.coarse_gust_response
@@ -839,10 +844,10 @@ def estimate_theta_with_loss_prior(kind, N, D):
 
 
 @kernel
-def set_coarse_gust_effect_of_block(block, acceleration):
-    """Store the effect of the coarsely estimated gust, acceleration (3,) rad/s2, in `coarse_gust_response`.
+def set_coarse_gust_effect_of_block(block, gust_acceleration):
+    """Store gust_acceleration (3,) rad/s2, of the coarsely estimated gust, in `coarse_gust_response`.
 
     `update_block` whitens it in place.
     """
     for i, axis in enumerate(block.axes[: block.n_axes]):
-        block.coarse_gust_response[i] = acceleration[axis]
+        block.coarse_gust_response[i] = gust_acceleration[axis]

@@ -78,7 +78,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     STEP_FAULT,
     USUAL_MAX_HYPOTHESES_PER_BLOCK,
     BlockCapacity,
-    evidence_over_effective_std,
+    evidence_over_noise_and_uncertainty,
 )
 from beaver_ftc.diagnosis.gusts import (
     full_gust_drift_intensity,
@@ -225,20 +225,22 @@ def whitened_unit_tone_amplitude(
 
 
 @kernel
-def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normalised_uncertainty_bound, dt):
+def update_max_correlation_by_uncertainty(
+    tone_tests, tone_config, block, uncertainty_bound_over_innovation_std, dt
+):
     """Update `max_correlation_by_uncertainty`: the most that a bounded uncertainty adds to |N|.
 
-    normalised_uncertainty_bound: eta_bar, the bound on |d|, over the standard deviation of g.
+    uncertainty_bound_over_innovation_std: eta_bar, the bound on |d|, over the standard deviation of g.
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
     decayed_double_rotation = tone_config.decayed_double_rotation_per_update
     sum_decay_factor = tone_config.sum_decay_factor_per_update
-    normalised_bound_sum_since_update = normalised_uncertainty_bound * tone_tests.frames_since_update
+    normalised_bound_sum_since_update = uncertainty_bound_over_innovation_std * tone_tests.frames_since_update
     for frequency_index in range(tone_tests.max_correlation_by_uncertainty.size):
         cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
         sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
-        filtered_bound_since_update = normalised_bound_sum_since_update * whitened_unit_tone_amplitude(
+        whitened_bound_sum_since_update = normalised_bound_sum_since_update * whitened_unit_tone_amplitude(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
         previous_double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
@@ -248,14 +250,15 @@ def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normal
         tone_tests.filtered_bound_double_frequency_sum[0, frequency_index] = (
             decayed_double_rotation[0, frequency_index] * previous_double_frequency_real
             - decayed_double_rotation[1, frequency_index] * previous_double_frequency_imaginary
-            + filtered_bound_since_update
+            + whitened_bound_sum_since_update
         )
         tone_tests.filtered_bound_double_frequency_sum[1, frequency_index] = (
             decayed_double_rotation[1, frequency_index] * previous_double_frequency_real
             + decayed_double_rotation[0, frequency_index] * previous_double_frequency_imaginary
         )
         tone_tests.filtered_bound_sum[frequency_index] = (
-            sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound_since_update
+            sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index]
+            + whitened_bound_sum_since_update
         )
         tone_tests.max_correlation_by_uncertainty[frequency_index] = (
             tone_config.max_tone_mean_of_unit_uncertainty[frequency_index]
@@ -270,7 +273,7 @@ def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normal
 
 
 @kernel
-def fill_max_correlation_by_coefficient_errors(tone_tests, regressor_tolerance, n_regressors):
+def fill_max_correlation_by_coefficient_errors(tone_tests, coefficient_error_bounds, n_regressors):
     """Fill `max_correlation_by_coefficient_errors`: the most that the declared errors of the first n
     coefficients add to |N|.
 
@@ -279,14 +282,14 @@ def fill_max_correlation_by_coefficient_errors(tone_tests, regressor_tolerance, 
     tone_tests.max_correlation_by_coefficient_errors[:] = 0.0
     for j in range(n_regressors):
         regressor_correlation = tone_tests.regressor_correlation[j]
-        coefficient_tolerance = regressor_tolerance[j]
+        coefficient_error_bound = coefficient_error_bounds[j]
         for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
-            correlation_real_part_magnitude = abs(regressor_correlation[0, frequency_index])
-            correlation_imaginary_part_magnitude = abs(regressor_correlation[1, frequency_index])
-            tone_tests.max_correlation_by_coefficient_errors[frequency_index] += coefficient_tolerance * (
-                max(correlation_real_part_magnitude, correlation_imaginary_part_magnitude)
+            abs_real_regressor_correlation = abs(regressor_correlation[0, frequency_index])
+            abs_imaginary_regressor_correlation = abs(regressor_correlation[1, frequency_index])
+            tone_tests.max_correlation_by_coefficient_errors[frequency_index] += coefficient_error_bound * (
+                max(abs_real_regressor_correlation, abs_imaginary_regressor_correlation)
                 + 0.41421356237309515
-                * min(correlation_real_part_magnitude, correlation_imaginary_part_magnitude)
+                * min(abs_real_regressor_correlation, abs_imaginary_regressor_correlation)
             )
 
 
@@ -304,7 +307,7 @@ def fill_max_tone_score(tone_tests, tone_config, detector_alarm_level):
         )
         max_score = max(
             max_score,
-            evidence_over_effective_std(
+            evidence_over_noise_and_uncertainty(
                 tone_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
@@ -381,7 +384,9 @@ PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO = (
 MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
     0.9  # component of a direction of length 1, above which a view counts as one of the force
 )
-COLUMN_NORM_SHARE_FLOOR = 0.1  # least length that the errors leave of a column, as a share of its length
+MIN_ERROR_REDUCED_COLUMN_NORM_SHARE = (
+    0.1  # least length that the errors leave of a column, as a share of its length
+)
 PITCH_AND_NORMAL_FORCE = (PITCH, NORMAL_FORCE)
 ROLL_AND_YAW = (ROLL, YAW)
 YAW_AND_SIDE_FORCE = (YAW, SIDE_FORCE)
@@ -450,18 +455,18 @@ def innovation_component_for_view(
 
 
 @kernel
-def column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index):
+def cancelled_column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index):
     """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     component, s = view.plane_axes[plane_axis_index], view.orthogonal_to_surface
     if s == ORTHOGONAL_TO_VANE_ERROR:
-        column_entry = forces.component[
+        cancelled_column_entry = forces.component[
             view.plane_axes[1] - SIDE_FORCE
         ].axis_and_force_innovation_per_vane_error[plane_axis_index]
-        return column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(column_entry)
+        return cancelled_column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(cancelled_column_entry)
     if component >= SIDE_FORCE:
         force_record = forces.component[component - SIDE_FORCE]
-        column_entry = force_record.previous_chord_scaled_force_per_surface_rad[s]
-        return column_entry, force_record.chord_scaled_force_per_surface_rad_error_bound[s]
+        cancelled_column_entry = force_record.previous_chord_scaled_force_per_surface_rad[s]
+        return cancelled_column_entry, force_record.chord_scaled_force_per_surface_rad_error_bound[s]
     error_bound = (
         bound_record.surface_term_error_bound_per_rad[component, s]
         if bound_record.has_surface_term_errors
@@ -477,10 +482,12 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
     if view.is_orthogonal_to_rolling_gust:
-        return set_direction_orthogonal_to_vane_and_rolling_gust(view, forces, gust)
+        return set_vane_gust_free_direction_and_return_leak_share(view, forces, gust)
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
-    first_entry, first_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 0)
-    second_entry, second_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 1)
+    first_entry, first_error_bound = cancelled_column_entry_and_error_bound(view, forces, bound_record, G, 0)
+    second_entry, second_error_bound = cancelled_column_entry_and_error_bound(
+        view, forces, bound_record, G, 1
+    )
     column_norm = np.sqrt(first_entry * first_entry + second_entry * second_entry)
     if column_norm == 0.0:
         return 0.0
@@ -497,12 +504,12 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
         + abs(view.direction[first_component]) * second_error_bound
     )
     return error_bound_along_direction / max(
-        column_norm - column_norm_error_bound, COLUMN_NORM_SHARE_FLOOR * column_norm
+        column_norm - column_norm_error_bound, MIN_ERROR_REDUCED_COLUMN_NORM_SHARE * column_norm
     )
 
 
 @kernel
-def set_direction_orthogonal_to_vane_and_rolling_gust(view, forces, gust):
+def set_vane_gust_free_direction_and_return_leak_share(view, forces, gust):
     """Fill `direction`, orthogonal to two vectors, and `unit_column`; return the share that leaks.
 
     The direction is the vector product of the two in (roll, yaw, side force).
@@ -537,12 +544,12 @@ def set_direction_orthogonal_to_vane_and_rolling_gust(view, forces, gust):
         + vane_side_force_effect * vane_side_force_effect
     )
     error_bound_along_direction = 0.0
-    for i, vane_effect, direction_entry in (
+    for i, vane_effect, unnormalised_direction_entry in (
         (ROLL, vane_roll_effect, direction_roll),
         (YAW, vane_yaw_effect, direction_yaw),
         (SIDE_FORCE, vane_side_force_effect, direction_side_force),
     ):
-        view.direction[i] = direction_entry / direction_norm
+        view.direction[i] = unnormalised_direction_entry / direction_norm
         view.unit_column[i] = vane_effect / vane_column_norm
         error_bound_along_direction += VANE_EFFECT_RELATIVE_TOLERANCE * abs(view.direction[i] * vane_effect)
     return error_bound_along_direction / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_norm)
@@ -575,13 +582,13 @@ def fill_gust_sensitivity(view, forces, rate_damping):
     """
     m = view.direction
     for k in range(3):
-        projected_roll_acceleration_per_rotation = m[ROLL] * rate_damping[ROLL, k]
-        projected_pitch_acceleration_per_rotation = m[PITCH] * rate_damping[PITCH, k]
-        projected_yaw_acceleration_per_rotation = m[YAW] * rate_damping[YAW, k]
+        sensitivity_part_of_roll_acceleration = m[ROLL] * rate_damping[ROLL, k]
+        sensitivity_part_of_pitch_acceleration = m[PITCH] * rate_damping[PITCH, k]
+        sensitivity_part_of_yaw_acceleration = m[YAW] * rate_damping[YAW, k]
         view.rate_gust_sensitivity[k] = (
-            projected_roll_acceleration_per_rotation
-            + projected_pitch_acceleration_per_rotation
-            + projected_yaw_acceleration_per_rotation
+            sensitivity_part_of_roll_acceleration
+            + sensitivity_part_of_pitch_acceleration
+            + sensitivity_part_of_yaw_acceleration
         )
         view.force_gust_sensitivity[k] = 0.0
         for force_index in range(2):
@@ -688,7 +695,7 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, angular_acce
 
 
 @kernel
-def prepare_views_for_frame(views, forces, gust, bound_record, G, Gu):
+def set_view_use_directions_signatures(views, forces, gust, bound_record, G, Gu):
     """Bring the direction and the signatures of each view to this frame.
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
@@ -742,7 +749,7 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_al
     """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
     is_inside_envelope = is_within_envelope(tone_config, y)
     evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
-    onset_slot = likelihood.onset_slot_to_reset(frame_index)
+    onset_slot = likelihood.onset_slot_restarting_at_frame(frame_index)
     for view in views:
         if not view.is_used:
             view.decaying_peak_score = 0.0

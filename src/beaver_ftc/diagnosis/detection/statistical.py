@@ -697,7 +697,7 @@ def update_blocks(
     is_alarm_latched: the detector has raised its alarm; losses_may_end: a loss may end.
     """
     evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
-    onset_slot_index_to_reset = likelihood.onset_slot_to_reset(frame_index)
+    onset_slot_index_to_reset = likelihood.onset_slot_restarting_at_frame(frame_index)
     for block_index, block in enumerate(blocks):
         if not is_alarm_latched:
             likelihood.reset_onset_slot(block, onset_slot_index_to_reset)

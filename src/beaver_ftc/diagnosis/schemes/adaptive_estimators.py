@@ -83,7 +83,7 @@ def start_detection_filters(fdi, x):
 @kernel
 def update_detection_filters(fdi, prediction, measured):
     """Bring the detection filters from the frame before to this one: innovation, residuals and thresholds."""
-    filters.update_innovation_residuals_and_thresholds(
+    filters.update_innovation_and_filter_bank(
         fdi.bank,
         fdi.bound,
         measured.x,
@@ -398,7 +398,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         has_statistical_alarm_been_raised,
         may_loss_end,
     )
-    parity.prepare_views_for_frame(
+    parity.set_view_use_directions_signatures(
         parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
     )
     parity.fill_view_innovations_noise_regressors(
@@ -521,7 +521,7 @@ def update_force_innovations_and_inertial_gust(
 def begin_scheme(fdi, prediction, measured):
     """Begin the filters, and fix the parity direction of each fault (CompiledScheme)."""
     start_detection_filters(fdi, measured.x)
-    filters.set_parity_directions(fdi.isolation, prediction.G)
+    filters.set_estimator_parity_directions(fdi.isolation, prediction.G)
 
 
 @apart

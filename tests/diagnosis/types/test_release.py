@@ -113,7 +113,7 @@ def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earli
     held["return_position_high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
     jam["feasible_low_before_release"], jam["feasible_high_before_release"] = (0.01, 0.02), (0.05, 0.06)
     surface["feasible_sets"]["low"][kind], surface["feasible_sets"]["high"][kind] = -0.4, 0.4
-    held_surface.replace_earlier_release_if_impossible(surface, kind)
+    held_surface.replace_impossible_release_and_store_set(surface, kind)
     low, high = list(held["return_position_low"][:, kind]), list(held["return_position_high"][:, kind])
     if earlier:
         assert (low, high) == ([0.1, 0.2], [0.15, 0.3])

@@ -726,7 +726,7 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
     restore_sets(surface)
     assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.replace_earlier_release_if_impossible(
+    held_surface.replace_impossible_release_and_store_set(
         surface, STUCK
     )  # no earlier release: the later are the earlier ones now
     held = surface["release"]

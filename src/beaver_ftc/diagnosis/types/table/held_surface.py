@@ -361,7 +361,7 @@ def update_stuck_and_consistent_interval(config, surface, type_index, k):
 @kernel
 def add_stuck_release(config, surface, type_index, k):
     """Add a release from the interval of the jammed position."""
-    replace_earlier_release_if_impossible(surface, type_index)
+    replace_impossible_release_and_store_set(surface, type_index)
     frame_start_position_low, frame_start_position_high, _ = start_position_interval_and_frame(
         config, surface, k
     )
@@ -374,7 +374,7 @@ def add_stuck_release(config, surface, type_index, k):
 
 
 @kernel
-def replace_earlier_release_if_impossible(surface, type_index):
+def replace_impossible_release_and_store_set(surface, type_index):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
     memory = surface.stuck
     if not is_release_possible(surface, EARLIER_RELEASES_SLOT, type_index):

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds import (
-    add_declared_error_bound,
-    detection_poles_for_noise,
+    detection_poles_for_delays,
     fill_acceleration_error_bound_per_rad,
+    fill_magnitudes_and_add_declared_bound,
     max_inertia_coefficient_errors,
 )
 from beaver_ftc.diagnosis.detection.filters import advance_gyro_error_bound
@@ -46,7 +46,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
-    add_declared_error_bound(
+    fill_magnitudes_and_add_declared_bound(
         frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, out
     )
     return out
@@ -141,11 +141,11 @@ def test_poles_for_noise_give_the_greatest_excess():
         return (nbar * pole + eta) / (1 - np.exp(-pole * delay_s))
 
     for delay_s, pole in zip(
-        (0.1, 0.5, 2.0), detection_poles_for_noise(SensorErrors(sensors), eta), strict=True
+        (0.1, 0.5, 2.0), detection_poles_for_delays(SensorErrors(sensors), eta), strict=True
     ):
         least = min(smallest_fault(other, delay_s) for other in np.geomspace(0.05, 200, 4000))
         assert smallest_fault(pole, delay_s) == pytest.approx(least, rel=1e-5)
-    assert detection_poles_for_noise(SensorErrors(Sensors()), eta) == ()
+    assert detection_poles_for_delays(SensorErrors(Sensors()), eta) == ()
 
 
 def test_errors_that_have_no_bound_cannot_be_declared():
@@ -167,7 +167,7 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
     frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
-    add_declared_error_bound(
+    fill_magnitudes_and_add_declared_bound(
         frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, np.zeros(3)
     )
     fill_acceleration_error_bound_per_rad(

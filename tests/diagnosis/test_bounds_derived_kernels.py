@@ -100,7 +100,7 @@ def by_terms(declared_errors, design, u):
 def test_the_bound_is_the_sum_of_what_each_product_can_grow_by(seed):
     declared_errors, design = records(seed)
     out = np.array([0.1, 0.2, 0.3])
-    bounds.add_declared_error_bound(declared_errors, design, X, Y, U, out)
+    bounds.fill_magnitudes_and_add_declared_bound(declared_errors, design, X, Y, U, out)
     bound, slopes = by_terms(declared_errors, design, U)
     assert out == pytest.approx(bound + np.array([0.1, 0.2, 0.3]), rel=1e-9)
     for s in range(4):

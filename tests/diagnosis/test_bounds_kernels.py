@@ -103,11 +103,11 @@ def test_a_reading_is_off_by_four_sigma_its_bias_and_half_a_step():
 def test_the_poles_find_the_smallest_fault_there_is_to_be_found(noise, eta_bar):
     """phi (1 - exp(-lam T)) / lam > eta_bar / lam + 2 nbar, by trying every pole."""
     nothing = scenario({"name": "x"}).sensors
-    assert bound_kernels.detection_poles_for_noise(SensorErrors(nothing), eta_bar) == ()
+    assert bound_kernels.detection_poles_for_delays(SensorErrors(nothing), eta_bar) == ()
     sensors = scenario({"name": "x", "sensors": {"r": {"noise_std_deg_s": float(np.degrees(noise))}}}).sensors
     nbar = 4.0 * noise
     poles = np.geomspace(1e-3, 1e4, 200_001)
-    found = bound_kernels.detection_poles_for_noise(SensorErrors(sensors), eta_bar)
+    found = bound_kernels.detection_poles_for_delays(SensorErrors(sensors), eta_bar)
     assert len(found) == len(bound_kernels.POLE_DESIGN_DELAYS_S)
     for T, pole in zip(bound_kernels.POLE_DESIGN_DELAYS_S, found, strict=True):
         smallest = (eta_bar + 2.0 * nbar * poles) / (1.0 - np.exp(-poles * T))

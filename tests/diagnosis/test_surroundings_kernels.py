@@ -269,7 +269,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record, out = new_map(time_s=time_s), np.full(3, 0.5)
     y = Y.copy()
     y[2] = airspeed
-    bounds.add_mapped_error_bound(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.look_up_and_add_mapped_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
     expected = record["error_bound"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert out == pytest.approx(0.5 + expected)

@@ -232,7 +232,7 @@ def slipstream_error_bound(declared_errors, y):
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + AIRSPEED, y[AIRSPEED])
         / y[AIRSPEED]
     )
-    max_qdyn_airspeed_reading_over_truth = 1.0 / (
+    max_measured_over_true_qdyn_times_V = 1.0 / (
         (1.0 - min(relative_qdyn_error_bound, 0.9)) * (1.0 - min(relative_airspeed_error_bound, 0.9))
     )
     relative_density_error_bound = (1.0 + relative_qdyn_error_bound) / (
@@ -242,9 +242,9 @@ def slipstream_error_bound(declared_errors, y):
         declared_errors.power_error_kw_by_instruments
         + declared_errors.power_error_kw_per_density_ratio * relative_density_error_bound * density_ratio(y)
     )
-    return max_qdyn_airspeed_reading_over_truth * KW_TO_DPT * power_error_bound_kw / (
+    return max_measured_over_true_qdyn_times_V * KW_TO_DPT * power_error_bound_kw / (
         y[QDYN] * y[AIRSPEED]
-    ) + (max_qdyn_airspeed_reading_over_truth - 1.0) * abs(y[DPT] - DPT_0)
+    ) + (max_measured_over_true_qdyn_times_V - 1.0) * abs(y[DPT] - DPT_0)
 
 
 @kernel
@@ -307,30 +307,32 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
 
 
 @kernel
-def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_magnitude):
-    """Bound the error of a coefficient times a signal; tolerance: error of the coefficient."""
-    return (abs(coefficient) + tolerance) * max_signal_magnitude - abs(coefficient) * signal_magnitude
+def product_error_bound(coefficient, coefficient_error_bound, signal_magnitude, max_signal_magnitude):
+    """Bound the error of a coefficient times a signal; coefficient_error_bound: absolute."""
+    return (abs(coefficient) + coefficient_error_bound) * max_signal_magnitude - abs(
+        coefficient
+    ) * signal_magnitude
 
 
 @kernel
-def acceleration_error_bound_by_moment(declared_errors, axis, coefficient, tolerance):
+def acceleration_error_bound_from_moment(declared_errors, axis, coefficient, coefficient_error_bound):
     """Bound the error of an inertia coefficient times the moment about an axis, rad/s2."""
     moment_term_magnitude_sum = declared_errors.moment_term_magnitude_sum[axis]
     return product_error_bound(
         coefficient,
-        tolerance,
+        coefficient_error_bound,
         moment_term_magnitude_sum,
         moment_term_magnitude_sum + declared_errors.moment_error_bound[axis],
     )
 
 
 @kernel
-def acceleration_error_bound_by_rate_product(declared_errors, i, j, coefficient, tolerance):
+def acceleration_error_bound_from_rate_product(declared_errors, i, j, coefficient, coefficient_error_bound):
     """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
     rate_magnitudes, max_rate_magnitudes = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
         coefficient,
-        tolerance,
+        coefficient_error_bound,
         rate_magnitudes[i] * rate_magnitudes[j],
         max_rate_magnitudes[i] * max_rate_magnitudes[j],
     )
@@ -364,10 +366,10 @@ def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
 def fill_acceleration_error_bound_per_rad(declared_errors, design, s):
     """Fill acceleration_error_bound_per_rad[:, s], rad/s2 per rad: on the error of the effect of surface s.
 
-    The declared bound is affine in |u_s|; this is its slope. Call `add_declared_error_bound` first: it fills
-    the scratch fields.
+    The declared bound is affine in |u_s|; this is its slope. Call
+    `fill_magnitudes_and_add_declared_bound` first: it fills the scratch fields.
     """
-    inertia_coefficient_tolerance = declared_errors.inertia_coefficient_tolerance
+    inertia_coefficient_error_bounds = declared_errors.inertia_coefficient_tolerance
     error_bounds_per_rad = declared_errors.acceleration_error_bound_per_rad
     roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 0, s
@@ -380,38 +382,38 @@ def fill_acceleration_error_bound_per_rad(declared_errors, design, s):
     )
     error_bounds_per_rad[0, s] = product_error_bound(
         design.Pl,
-        inertia_coefficient_tolerance[2],
+        inertia_coefficient_error_bounds[2],
         roll_moment_magnitude_per_rad,
         max_roll_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[0, s] += product_error_bound(
         design.Pn,
-        inertia_coefficient_tolerance[3],
+        inertia_coefficient_error_bounds[3],
         yaw_moment_magnitude_per_rad,
         max_yaw_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[1, s] = product_error_bound(
         design.Qm,
-        inertia_coefficient_tolerance[7],
+        inertia_coefficient_error_bounds[7],
         pitch_moment_magnitude_per_rad,
         max_pitch_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[2, s] = product_error_bound(
         design.Rl,
-        inertia_coefficient_tolerance[10],
+        inertia_coefficient_error_bounds[10],
         roll_moment_magnitude_per_rad,
         max_roll_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[2, s] += product_error_bound(
         design.Rn,
-        inertia_coefficient_tolerance[11],
+        inertia_coefficient_error_bounds[11],
         yaw_moment_magnitude_per_rad,
         max_yaw_moment_magnitude_per_rad,
     )
 
 
 @kernel
-def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
+def fill_magnitudes_and_add_declared_bound(declared_errors, design, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the bound by the declared errors; x (3,), y, u (surfaces,) as measured."""
     fill_signal_magnitudes(declared_errors, x, y, u)
     signals(
@@ -429,32 +431,36 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
     )
     monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
     fill_moment_magnitudes_and_error_bounds(declared_errors, design)
-    inertia_coefficient_tolerance = declared_errors.inertia_coefficient_tolerance
-    eta_bar[0] += acceleration_error_bound_by_moment(
-        declared_errors, 0, design.Pl, inertia_coefficient_tolerance[2]
-    ) + acceleration_error_bound_by_moment(declared_errors, 2, design.Pn, inertia_coefficient_tolerance[3])
-    eta_bar[0] += acceleration_error_bound_by_rate_product(
-        declared_errors, 0, 1, design.Ppq, inertia_coefficient_tolerance[0]
-    ) + acceleration_error_bound_by_rate_product(
-        declared_errors, 1, 2, design.Pqr, inertia_coefficient_tolerance[1]
+    inertia_coefficient_error_bounds = declared_errors.inertia_coefficient_tolerance
+    eta_bar[0] += acceleration_error_bound_from_moment(
+        declared_errors, 0, design.Pl, inertia_coefficient_error_bounds[2]
+    ) + acceleration_error_bound_from_moment(
+        declared_errors, 2, design.Pn, inertia_coefficient_error_bounds[3]
     )
-    eta_bar[1] += acceleration_error_bound_by_moment(
-        declared_errors, 1, design.Qm, inertia_coefficient_tolerance[7]
-    ) + acceleration_error_bound_by_rate_product(
-        declared_errors, 0, 2, design.Qpr, inertia_coefficient_tolerance[5]
+    eta_bar[0] += acceleration_error_bound_from_rate_product(
+        declared_errors, 0, 1, design.Ppq, inertia_coefficient_error_bounds[0]
+    ) + acceleration_error_bound_from_rate_product(
+        declared_errors, 1, 2, design.Pqr, inertia_coefficient_error_bounds[1]
     )
-    eta_bar[1] += acceleration_error_bound_by_rate_product(
-        declared_errors, 0, 0, design.Qpp, inertia_coefficient_tolerance[4]
-    ) + acceleration_error_bound_by_rate_product(
-        declared_errors, 2, 2, design.Qrr, inertia_coefficient_tolerance[6]
+    eta_bar[1] += acceleration_error_bound_from_moment(
+        declared_errors, 1, design.Qm, inertia_coefficient_error_bounds[7]
+    ) + acceleration_error_bound_from_rate_product(
+        declared_errors, 0, 2, design.Qpr, inertia_coefficient_error_bounds[5]
     )
-    eta_bar[2] += acceleration_error_bound_by_moment(
-        declared_errors, 0, design.Rl, inertia_coefficient_tolerance[10]
-    ) + acceleration_error_bound_by_moment(declared_errors, 2, design.Rn, inertia_coefficient_tolerance[11])
-    eta_bar[2] += acceleration_error_bound_by_rate_product(
-        declared_errors, 0, 1, design.Rpq, inertia_coefficient_tolerance[8]
-    ) + acceleration_error_bound_by_rate_product(
-        declared_errors, 1, 2, design.Rqr, inertia_coefficient_tolerance[9]
+    eta_bar[1] += acceleration_error_bound_from_rate_product(
+        declared_errors, 0, 0, design.Qpp, inertia_coefficient_error_bounds[4]
+    ) + acceleration_error_bound_from_rate_product(
+        declared_errors, 2, 2, design.Qrr, inertia_coefficient_error_bounds[6]
+    )
+    eta_bar[2] += acceleration_error_bound_from_moment(
+        declared_errors, 0, design.Rl, inertia_coefficient_error_bounds[10]
+    ) + acceleration_error_bound_from_moment(
+        declared_errors, 2, design.Rn, inertia_coefficient_error_bounds[11]
+    )
+    eta_bar[2] += acceleration_error_bound_from_rate_product(
+        declared_errors, 0, 1, design.Rpq, inertia_coefficient_error_bounds[8]
+    ) + acceleration_error_bound_from_rate_product(
+        declared_errors, 1, 2, design.Rqr, inertia_coefficient_error_bounds[9]
     )
 
 
@@ -590,7 +596,7 @@ def additional_error_bound_at_travel_level(error_map, travel_level_index, axis):
 
 
 @kernel
-def add_mapped_error_bound(error_map, x, y, u, eta_bar):
+def look_up_and_add_mapped_error(error_map, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
     look_up_error_map(error_map, x, y, u)
     for i in range(3):
@@ -605,45 +611,56 @@ def add_published_bound(
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by `inertia_coupling_factors`.
+    earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by
+    `max_inertia_coupling_factors`.
     """
     p, q, r = x[0], x[1], x[2]
     sum_of_rate_magnitudes = abs(p) + abs(q) + abs(r)
-    roll_coupling_factor, pitch_coupling_factor, yaw_coupling_factor = inertia_coupling_factors(design)
+    max_roll_coupling_factor, max_pitch_coupling_factor, max_yaw_coupling_factor = (
+        max_inertia_coupling_factors(design)
+    )
     eta_bar[0] += (
         inertia_coupling_error_share[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, roll_coupling_factor)
+        + earth_rotation_and_rounding_bound(
+            earth_rate_rad_s, sum_of_rate_magnitudes, max_roll_coupling_factor
+        )
     )
     eta_bar[1] += (
         inertia_coupling_error_share[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, pitch_coupling_factor)
+        + earth_rotation_and_rounding_bound(
+            earth_rate_rad_s, sum_of_rate_magnitudes, max_pitch_coupling_factor
+        )
     )
     eta_bar[2] += (
         inertia_coupling_error_share[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, yaw_coupling_factor)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_yaw_coupling_factor)
     )
 
 
 @kernel
-def inertia_coupling_factors(design):
+def max_inertia_coupling_factors(design):
     """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
     least 1."""
-    roll_coupling_factor = abs(design.Ppq) + abs(design.Pqr)
-    yaw_coupling_factor = abs(design.Rpq) + abs(design.Rqr)
-    pitch_coupling_factor = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
-    return max(roll_coupling_factor, 1.0), max(pitch_coupling_factor, 1.0), max(yaw_coupling_factor, 1.0)
+    max_roll_coupling_factor = abs(design.Ppq) + abs(design.Pqr)
+    max_yaw_coupling_factor = abs(design.Rpq) + abs(design.Rqr)
+    max_pitch_coupling_factor = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
+    return (
+        max(max_roll_coupling_factor, 1.0),
+        max(max_pitch_coupling_factor, 1.0),
+        max(max_yaw_coupling_factor, 1.0),
+    )
 
 
 @kernel
-def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, coupling_factor):
+def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_coupling_factor):
     """Bound the angular acceleration on an axis by the Earth's rotation and by rounding, rad/s2;
     sum_of_rate_magnitudes: |p| + |q| + |r|, rad/s."""
     return (
         earth_rate_rad_s
-        * ((1.0 + coupling_factor) * sum_of_rate_magnitudes + coupling_factor * earth_rate_rad_s)
+        * ((1.0 + max_coupling_factor) * sum_of_rate_magnitudes + max_coupling_factor * earth_rate_rad_s)
         + ROUNDING_RAD_S2
     )
 
@@ -682,12 +699,14 @@ def fill_uncertainty_bound_now(bound_record, design, measured, u):
     bound_record.eta_bar_now[:] = 0.0
     if bound_record.declared_errors.has_declared_errors:
         set_air_rotation_bound(bound_record.declared_errors, measured.altitude)
-        add_declared_error_bound(bound_record.declared_errors, design, x, y, u, bound_record.eta_bar_now)
+        fill_magnitudes_and_add_declared_bound(
+            bound_record.declared_errors, design, x, y, u, bound_record.eta_bar_now
+        )
         if bound_record.has_surface_term_errors:
             for s in range(u.size):
                 fill_acceleration_error_bound_per_rad(bound_record.declared_errors, design, s)
     if bound_record.error_map.n_boxes > 0:
-        add_mapped_error_bound(bound_record.error_map, x, y, u, bound_record.eta_bar_now)
+        look_up_and_add_mapped_error(bound_record.error_map, x, y, u, bound_record.eta_bar_now)
     rates_for_published_bound = (
         bound_record.declared_errors.max_magnitude_x
         if bound_record.declared_errors.has_declared_errors
@@ -737,18 +756,18 @@ def configure_uncertainty_bound(
 ) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. design: record of the design model."""
-    config, aircraft = scenario.fdi, declared.aircraft
+    fdi_config, aircraft = scenario.fdi, declared.aircraft
     bound_record["inertia_coupling_error_share"], bound_record["earth_rate_rad_s"] = (
         declared.coupling,
         EARTH_RATE_RAD_S,
     )
     bound_record["constant_error_bound"] = declared.constant_rad_s2
-    diagnoses_all_types = config.fault_class == "all"
+    diagnoses_all_types = fdi_config.fault_class == "all"
     fill_error_map(
         bound_record["error_map"],
         aircraft,
         diagnoses_all_types,
-        diagnoses_all_types and config.pairs,
+        diagnoses_all_types and fdi_config.pairs,
     )
     if aircraft.file.model_error_map is None:
         bound_record["constant_error_bound"] += aircraft.model_error_rad_s2
@@ -762,10 +781,10 @@ def fill_declared_errors(
     declared_errors: np.void, declared: Declared, design: np.void, mass_properties: MassProperties
 ) -> None:
     """Fill the declared errors; design, mass_properties: record and mass properties of the design model."""
-    coefficient_tolerances = declared.coefficients.absolute(
+    coefficient_error_bounds = declared.coefficients.absolute(
         declared.aircraft.moments, design["moments"]["value"]
     )
-    declared_errors["coefficient_tolerance"][: coefficient_tolerances.size] = coefficient_tolerances
+    declared_errors["coefficient_tolerance"][: coefficient_error_bounds.size] = coefficient_error_bounds
     declared_errors["inertia_coefficient_tolerance"] = max_inertia_coefficient_errors(
         declared.inertia, mass_properties
     )
@@ -788,7 +807,8 @@ def fill_declared_errors(
         declared_errors["air_rotation_bound"],
     )
     declared_errors["has_declared_errors"] = (
-        any(np.any(error_bounds) for error_bounds in non_sensor_error_bounds) or not sensor_errors.is_ideal
+        any(np.any(bounds_of_one_source) for bounds_of_one_source in non_sensor_error_bounds)
+        or not sensor_errors.is_ideal
     )
 
 
@@ -818,8 +838,8 @@ def fill_declared_engine_instrument_errors(
     )
 
 
-def detection_poles_for_noise(
-    sensor_errors: SensorErrors, constant_error_bound_rad_s2: float
+def detection_poles_for_delays(
+    sensor_errors: SensorErrors, max_constant_error_bound_rad_s2: float
 ) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of POLE_DESIGN_DELAYS_S, despite gyro
     noise.
@@ -830,7 +850,7 @@ def detection_poles_for_noise(
     gyro_error_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensor_errors.each("noise", AXES).max())
     return (
         tuple(
-            _detection_pole_per_s(delay_s, gyro_error_change_bound, constant_error_bound_rad_s2)
+            _detection_pole_per_s(delay_s, gyro_error_change_bound, max_constant_error_bound_rad_s2)
             for delay_s in POLE_DESIGN_DELAYS_S
         )
         if gyro_error_change_bound > 0
@@ -850,7 +870,7 @@ def _detection_pole_per_s(delay_s: float, gyro_error_change_bound: float, eta_ba
     return pole_per_s
 
 
-_AXIS_OF_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
+_GYRO_NAME_BY_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
 def declared_errors_for_plugin(
@@ -862,7 +882,7 @@ def declared_errors_for_plugin(
 
     aircraft, sensor_errors = declared.aircraft, declared.sensors
     reading_noise_std, reading_bias, reading_resolution = (
-        sensor_errors.each(error_kind) for error_kind in ("noise", "steady", "resolution")
+        sensor_errors.each(error_attribute_name) for error_attribute_name in ("noise", "steady", "resolution")
     )
     coefficient_errors = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
     gust_rotation_std_rad_s, gust_correlation_time_s = declared.air.rotation(
@@ -963,10 +983,11 @@ def angular_acceleration_by_gust_noise_std(
     pitching_gust_noise_std, yawing_gust_noise_std = (
         flow_angle_noise_std * pi * V / (np.array([4.0, 3.0]) * span_m)
     )
-    rate_damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
+    # without rates all of it is aerodynamic
+    acceleration_per_body_rate = jacobian(design, np.zeros(3), y, u)[2]
     return np.sqrt(
-        (rate_damping[:, 1] * pitching_gust_noise_std) ** 2
-        + (rate_damping[:, 2] * yawing_gust_noise_std) ** 2
+        (acceleration_per_body_rate[:, 1] * pitching_gust_noise_std) ** 2
+        + (acceleration_per_body_rate[:, 2] * yawing_gust_noise_std) ** 2
     )
 
 
@@ -975,7 +996,7 @@ def moment_axis_of_term(term: Term) -> int:
     return MOMENTS.index(term.coefficient)
 
 
-def moment_term_tolerances(
+def equivalent_coefficient_error_bounds(
     declared: Declared, design: np.void, mass_properties: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
@@ -983,21 +1004,21 @@ def moment_term_tolerances(
     aircraft, sensor_errors = declared.aircraft, declared.sensors
     coefficient_magnitudes = np.abs(design["moments"]["value"][: len(aircraft.moments)])
     inertia_coefficient_errors = max_inertia_coefficient_errors(declared.inertia, mass_properties)
-    nominal_inertia_coefficients = np.abs(inertia_coefficients(mass_properties))
+    nominal_inertia_coefficient_magnitudes = np.abs(inertia_coefficients(mass_properties))
     own_axis_inertia_coefficient_indices = (2, 7, 11)  # what multiplies a moment there
-    relative_term_tolerances = np.full(
+    relative_errors_except_coefficient = np.full(
         coefficient_magnitudes.shape,
         max(
-            inertia_coefficient_errors[i] / nominal_inertia_coefficients[i]
+            inertia_coefficient_errors[i] / nominal_inertia_coefficient_magnitudes[i]
             for i in own_axis_inertia_coefficient_indices
         ),
     )
-    relative_term_tolerances += [
+    relative_errors_except_coefficient += [
         _relative_signal_error_of_term(sensor_errors, term) for term in aircraft.moments
     ]
-    tolerances_covering_constant_errors = (
+    equivalent_error_bounds = (
         declared.coefficients.absolute(aircraft.moments, coefficient_magnitudes)
-        + relative_term_tolerances * coefficient_magnitudes
+        + relative_errors_except_coefficient * coefficient_magnitudes
     )
     coefficient_slope_magnitudes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
     span_m, chord_m = aircraft.geometry.span_m, aircraft.geometry.chord_m
@@ -1007,11 +1028,11 @@ def moment_term_tolerances(
         normalised_rate_error = sensor_errors[gyro_name].steady * rate_normalisation_length_m / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                tolerances_covering_constant_errors[k] += (
+                equivalent_error_bounds[k] += (
                     normalised_rate_error
                     * coefficient_slope_magnitudes[moment_axis_of_term(term), signal_index]
                 )
-    return tolerances_covering_constant_errors
+    return equivalent_error_bounds
 
 
 def _relative_signal_error_of_term(sensor_errors: SensorErrors, term: Term) -> float:
@@ -1020,9 +1041,9 @@ def _relative_signal_error_of_term(sensor_errors: SensorErrors, term: Term) -> f
     own_gyro_name = AXES[moment_axis_of_term(term)]  # a slope of it is counted once for all terms of the axis
     relative_error = sensor_errors[own_gyro_name].slope + sensor_errors["qdyn"].slope
     for signal_name, exponent in term.of:
-        if signal_name in _AXIS_OF_RATE_SIGNAL:
+        if signal_name in _GYRO_NAME_BY_RATE_SIGNAL:
             relative_error += exponent * sensor_errors["V"].slope
-        signal_errors = sensor_errors.get(_AXIS_OF_RATE_SIGNAL.get(signal_name, signal_name))
-        if signal_errors is not None and _AXIS_OF_RATE_SIGNAL.get(signal_name) != own_gyro_name:
+        signal_errors = sensor_errors.get(_GYRO_NAME_BY_RATE_SIGNAL.get(signal_name, signal_name))
+        if signal_errors is not None and _GYRO_NAME_BY_RATE_SIGNAL.get(signal_name) != own_gyro_name:
             relative_error += exponent * signal_errors.slope
     return relative_error

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds import detection_poles_for_noise
+from beaver_ftc.diagnosis.bounds import detection_poles_for_delays
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -198,7 +198,7 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     fdi["bank"]["config"]["decay_factor"] = 0.0
     filters.fill_bank_decay_factors(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = detection_poles_for_noise(SensorErrors(config.bounds.sensors), bound)
+    for_noise = detection_poles_for_delays(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy
     poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
     apart(poles=poles)

@@ -214,7 +214,9 @@ def test_where_nothing_diagnoses_nothing_is_enabled():
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
-    return bound_kernels.moment_term_tolerances(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
+    return bound_kernels.equivalent_coefficient_error_bounds(
+        declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4)
+    )
 
 
 SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
@@ -362,7 +364,9 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     statistical.configure_statistical_detector(
         alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0
     )
-    total = bound_kernels.moment_term_tolerances(declared_in(config, AIRCRAFT), design, MASS, Y, u)
+    total = bound_kernels.equivalent_coefficient_error_bounds(
+        declared_in(config, AIRCRAFT), design, MASS, Y, u
+    )
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
         assert block["regressor_tolerance"][: of_it.size] == pytest.approx(of_it)

@@ -146,7 +146,7 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
     aircraft, table = load(), design["moments"]
-    tolerance = bound_kernels.moment_term_tolerances(
+    tolerance = bound_kernels.equivalent_coefficient_error_bounds(
         declared_in(bounds, aircraft), design, MASS, y, np.zeros(4)
     )
     axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
@@ -170,10 +170,10 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
     aircraft, design = load(), design_record()[0]
-    tolerance = bound_kernels.moment_term_tolerances(
+    tolerance = bound_kernels.equivalent_coefficient_error_bounds(
         declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
-    inertia = bound_kernels.moment_term_tolerances(
+    inertia = bound_kernels.equivalent_coefficient_error_bounds(
         declared_in(Bounds.model_validate({"inertia": 0.05}), aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)

@@ -35,7 +35,7 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bounds import detection_poles_for_noise
+from beaver_ftc.diagnosis.bounds import detection_poles_for_delays
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
@@ -122,7 +122,7 @@ BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, outpu
 
 def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
     """The filters' poles, 1/s, the published one first."""
-    poles_for_noise_per_s = detection_poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
+    poles_for_noise_per_s = detection_poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
     poles_after_published_per_s = (
         (*config.pole_bank_per_s, *poles_for_noise_per_s) if config.sharpen.pole_bank else ()
     )

@@ -42,8 +42,8 @@ from beaver_ftc.diagnosis.bounds import (
     UNMAPPED_ERROR_IN_FILTERS_RAD_S2,
     add_published_bound,
     additional_error_bound_at_travel_level,
+    equivalent_coefficient_error_bounds,
     moment_axis_of_term,
-    moment_term_tolerances,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.forces import (
@@ -263,7 +263,9 @@ def configure_statistical_detector(
         trim,
         dt_s,
     )
-    absolute_term_tolerances = moment_term_tolerances(declared, design_model, mass_properties, *trim[1:])
+    absolute_term_tolerances = equivalent_coefficient_error_bounds(
+        declared, design_model, mass_properties, *trim[1:]
+    )
     _configure_regressor_tolerances(statistical, aircraft, absolute_term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:

@@ -209,7 +209,7 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi["verdict"]["isolated_estimator"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
     assert on(isolation.decide_isolation, fdi, 4.0) == isolated
     for t in (4.0, 5.0):
-        on(conclusion.replace_isolated_estimator, fdi, isolated, t)
+        on(conclusion.set_isolated_estimator_and_time, fdi, isolated, t)
         assert fdi["verdict"]["isolated_estimator"] == isolated
         assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
 

@@ -474,7 +474,7 @@ def unknown_acceleration(fdi):
     """What the assessment explains by no known fault, rad/s2."""
     assessed = np.zeros(1, conclusion.assessment_dtype(4)).view(np.recarray)[0]
     stages = (fdi[name] for name in ("config", "verdict", "types", "layout", "statistical", "fdae", "bound"))
-    conclusion.assess_unknown_acceleration(assessed, *stages)
+    conclusion.assess_unknown_acceleration_and_pitch(assessed, *stages)
     return assessed["unknown_acceleration"].tolist()
 
 

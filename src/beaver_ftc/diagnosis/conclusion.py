@@ -63,21 +63,31 @@ def latch_alarm(conclusion, axis, t):
 
 
 @kernel
-def replace_isolated_estimator(conclusion, isolated_estimator, t):
+def set_isolated_estimator_and_time(conclusion, isolated_estimator, t):
     """Replace the isolated fault; if it is another one, its time of isolation becomes t s."""
     if isolated_estimator != conclusion.isolated_estimator:
         conclusion.isolated_estimator, conclusion.isolated_at_s = isolated_estimator, t
 
 
 @kernel
-def record_fault_type_finding(conclusion, finding):
-    """Replace isolated fault, type and accommodation by the finding of the fault types.
+def record_isolation_and_accommodation(conclusion, isolation_and_accommodation):
+    """Replace isolated fault, type and accommodation by those that the fault types found.
 
-    finding: (isolated, isolated_at_s, type, type_at_s, accommodated_surface, accommodation_mode).
+    isolation_and_accommodation: (isolated, isolated_at_s, type, type_at_s, accommodated_surface,
+    accommodation_mode).
     """
-    conclusion.isolated_estimator, conclusion.isolated_at_s = finding[0], finding[1]
-    conclusion.fault_type, conclusion.type_decided_at_s = finding[2], finding[3]
-    conclusion.accommodated_surface, conclusion.accommodation_mode = finding[4], finding[5]
+    conclusion.isolated_estimator, conclusion.isolated_at_s = (
+        isolation_and_accommodation[0],
+        isolation_and_accommodation[1],
+    )
+    conclusion.fault_type, conclusion.type_decided_at_s = (
+        isolation_and_accommodation[2],
+        isolation_and_accommodation[3],
+    )
+    conclusion.accommodated_surface, conclusion.accommodation_mode = (
+        isolation_and_accommodation[4],
+        isolation_and_accommodation[5],
+    )
 
 
 @kernel
@@ -85,7 +95,7 @@ def record_plugin_verdict(conclusion, plugin_verdict, t):
     """Replace the built-in conclusion at t s by the verdict of a plug-in."""
     if plugin_verdict.detected:
         latch_alarm(conclusion, plugin_verdict.axis, t)
-    replace_isolated_estimator(
+    set_isolated_estimator_and_time(
         conclusion, plugin_verdict.isolated if conclusion.detected else NOT_ISOLATED, t
     )
     conclusion.has_effectiveness = plugin_verdict.has_effectiveness
@@ -128,7 +138,7 @@ def isolated_surface(conclusion, estimators):
 
 
 @kernel
-def no_surface_to_accommodate(conclusion):
+def has_no_surface_to_accommodate(conclusion):
     """True if the law has no surface to accommodate: none is isolated or accommodated, and no plug-in
     estimates effectiveness."""
     return (
@@ -174,7 +184,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
     assessment.isolated_surface, assessment.any_surface_lags, assessment.no_surface_to_accommodate = (
         isolated_surface_index,
         0,
-        no_surface_to_accommodate(conclusion),
+        has_no_surface_to_accommodate(conclusion),
     )
     for s in range(assessment.accommodation_mode.size):
         assessment.accommodation_mode[s] = types.surface[s].accommodation.mode if diagnoses_all_types else -1
@@ -183,7 +193,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
         if conclusion.has_effectiveness and conclusion.detected:
             assessment.effectiveness[s] = conclusion.effectiveness[s]
         elif assessment.accommodation_mode[s] >= 0:
-            assess_surface_at_fault(assessment, types, layout, estimators, s)
+            assess_accommodated_surface(assessment, types, layout, estimators, s)
         elif s == isolated_surface_index and not diagnoses_all_types:
             uses_statistics = uses_statistical_estimates(
                 statistical_detector.test_config, config.alarm_authority
@@ -203,24 +213,25 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
 
 
 @kernel
-def assess_surface_at_fault(assessment, types, layout, estimators, s):
+def assess_accommodated_surface(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
-    surface = types.surface[s]
+    type_diagnosis = types.surface[s]
     can_be_at_fault, accommodation_mode = (
-        verdict.estimator_or_deduction_allows_fault(surface),
-        surface.accommodation.mode,
+        verdict.estimator_or_deduction_allows_fault(type_diagnosis),
+        type_diagnosis.accommodation.mode,
     )
     if accommodation_mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
     elif accommodation_mode == GIVE_UP:
         assessment.effectiveness[s], assessment.apply_immediately[s] = 0.0, 1
         assessment.deflection_offset[s] = (
-            surface.last_observation.healthy_position + verdict.deflection_error(surface, can_be_at_fault)
+            type_diagnosis.last_observation.healthy_position
+            + verdict.deflection_error(type_diagnosis, can_be_at_fault)
         )
     elif accommodation_mode == SUBTRACT_OFFSET:
-        assessment.deflection_offset[s] = verdict.deflection_error(surface, can_be_at_fault)
+        assessment.deflection_offset[s] = verdict.deflection_error(type_diagnosis, can_be_at_fault)
     elif accommodation_mode == WAIT_FOR_SURFACE:
-        assessment.deflection_lag[s] = last_midpoint_deflection_error(surface)
+        assessment.deflection_lag[s] = last_midpoint_deflection_error(type_diagnosis)
         assessment.any_surface_lags = 1
 
 
@@ -239,36 +250,43 @@ def uses_statistical_estimates(test_config, alarm_authority):
 
 
 @kernel
-def assess_unknown_acceleration(
-    assessment, config, conclusion, types, layout, statistical_detector, fdae, bound_record
+def assess_unknown_acceleration_and_pitch(
+    assessment,
+    config,
+    conclusion,
+    types,
+    layout,
+    statistical_detector,
+    fault_approximation_estimator,
+    bound_record,
 ):
-    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound_record: what
-    is declared.
+    """Fill unknown_acceleration and pitch_undecided; fault_approximation_estimator: of `FDAE_RECORD`;
+    bound_record: what is declared.
 
     The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
     unknown_acceleration, diagnoses_all_types = assessment.unknown_acceleration, config.diagnoses_all_types
     unknown_acceleration[:] = 0.0
-    accommodates_lag = (
+    waits_for_lagging_surface = (
         conclusion.accommodated_surface >= 0 and conclusion.accommodation_mode == WAIT_FOR_SURFACE
     )
     if (
         conclusion.detected
-        and not accommodates_lag
+        and not waits_for_lagging_surface
         and uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority)
     ):
         statistical.fill_statistical_unmodelled_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration
         )
-    elif conclusion.detected and not accommodates_lag:
+    elif conclusion.detected and not waits_for_lagging_surface:
         filters.fill_fdae_unmodelled_acceleration_estimate(
-            fdae, bound_record.changing_gyro_error_bound, unknown_acceleration
+            fault_approximation_estimator, bound_record.changing_gyro_error_bound, unknown_acceleration
         )
-    fault_is_undecided = (
+    fault_is_not_isolated = (
         diagnoses_all_types and conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED
     )
     pitch_anomaly_spans_half_cycle = (
         types.surface[layout.main[PITCH]].evidence.n_anomalous_frames
         >= types.config.slowest_half_cycle_frames
     )
-    assessment.pitch_undecided = fault_is_undecided and pitch_anomaly_spans_half_cycle
+    assessment.pitch_undecided = fault_is_not_isolated and pitch_anomaly_spans_half_cycle

@@ -33,7 +33,7 @@ from beaver_ftc.diagnosis.bounds import (
     error_map_time_row_index,
     is_coordinate_outside_span_of_boxes,
 )
-from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
+from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration_and_pitch
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
 from beaver_ftc.diagnosis.model_prediction import (
@@ -436,7 +436,9 @@ def assess_faults(frame):
     fdi, assessment = frame.fdi, frame.assessment
     config, found, types, layout, detector = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
     assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
-    assess_unknown_acceleration(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
+    assess_unknown_acceleration_and_pitch(
+        assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound
+    )
 
 
 @kernel

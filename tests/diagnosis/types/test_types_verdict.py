@@ -367,7 +367,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
 
 def conclude(fdi, kernel, *given, lead=()):
     """Hand a finding of the types to the conclusion."""
-    conclusion.record_fault_type_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+    conclusion.record_isolation_and_accommodation(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
 
 
 def take_lead(fdi, kernel, *given):

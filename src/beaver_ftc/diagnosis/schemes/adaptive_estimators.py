@@ -228,7 +228,7 @@ def update_and_exclude_by_worst_case(fdi, x, t, isolation_started_earlier):
 @kernel
 def decide_isolated_loss(fdi, t):
     """Isolate the loss of effectiveness whose estimator is the only one left."""
-    conclusion.replace_isolated_estimator(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
+    conclusion.set_isolated_estimator_and_time(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
 
 
 @apart
@@ -287,7 +287,7 @@ def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
         pairs.observe_pairs_and_judge_previous(
             types, layout, estimators, filter_bank, bound_record.frame_innovation_bound
         )
-        conclusion.record_fault_type_finding(
+        conclusion.record_isolation_and_accommodation(
             conclusion_record,
             pairs.decide_pair_isolation_and_accommodation(types, conclusion_record, layout, t),
         )
@@ -296,7 +296,7 @@ def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
         registry.observe_frame_and_judge_previous(
             types, layout, estimators, filter_bank.output.innovation, bound_record
         )
-    conclusion.record_fault_type_finding(
+    conclusion.record_isolation_and_accommodation(
         conclusion_record,
         verdict.decide_isolation_and_accommodation(types, conclusion_record, layout, estimators, t),
     )
@@ -569,7 +569,7 @@ def record_engine_failure_or_find_alarm_axis(fdi, y, t):
     if not conclusion_record.detected and monitors.detect_engine_failure(
         fdi.engine_monitor, engine_yawing_moment_coefficient_bound, y
     ):
-        conclusion.replace_isolated_estimator(conclusion_record, UNANTICIPATED, t)
+        conclusion.set_isolated_estimator_and_time(conclusion_record, UNANTICIPATED, t)
         return YAW
     return filters.alarm_axis(fdi.bank, fdi.config.alarm_authority, fdi.statistical.alarm)
 

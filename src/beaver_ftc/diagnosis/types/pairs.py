@@ -395,8 +395,8 @@ def find_and_store_sole_pitch_fault(types, layout):
 @kernel
 def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_fault_type_finding`: its isolated estimator is of the one named first, the law acts on
-    all. previous_conclusion: that of the frame before."""
+    `conclusion.record_isolation_and_accommodation`: its isolated estimator is of the one named first, the law
+    acts on all. previous_conclusion: that of the frame before."""
     lateral_fault_outside_class = isolate_lateral_or_find_unanticipated(types, layout, t)
     decide_pitch_isolation(types, layout, t)
     first_isolated_surface_index = NO_SURFACE

@@ -317,7 +317,7 @@ def sole_remaining_varying_parameter_type(surface, among_types_that_must_show):
 @kernel
 def decide_isolation_and_accommodation(types, previous_conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, for
-    `conclusion.record_fault_type_finding`.
+    `conclusion.record_isolation_and_accommodation`.
 
     previous_conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """

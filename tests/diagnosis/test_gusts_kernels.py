@@ -85,7 +85,7 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
         psi_then = flight.attitude[2]
         record["memory"]["specific_force"] = flight.step()
         y, attitude = flight.reading()
-        gusts.update_gust_rotation_rates(record, y, attitude, DT)
+        gusts.advance_gust_estimate(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
@@ -106,7 +106,7 @@ def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(tur
         record["memory"]["specific_force"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
-        gusts.update_gust_rotation_rates(record, y, attitude, DT)
+        gusts.advance_gust_estimate(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
     assert (
@@ -128,7 +128,7 @@ def test_the_fastest_swing_decides(share):
     record["memory"]["gust_axes_rate"] = np.eye(3)
     record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
     record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT
-    gusts.fill_turn_rate_of_gust_axes(record, DT, 45.0)
+    gusts.fill_axes_rate_and_fast_turn(record, DT, 45.0)
     assert record["memory"]["gust_axes_rate"][1, 2] == pytest.approx(-share * most)
     assert record["memory"]["has_fast_axes_turn"] == (share > 1.0)
 
@@ -151,12 +151,12 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**3, lag),
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
-        gusts.update_gust_rotation_rates(record, y, np.array(attitude), DT)
+        gusts.advance_gust_estimate(record, y, np.array(attitude), DT)
         assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(gust)
         assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(turning)
         record["memory"]["specific_force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
-    gusts.update_gust_rotation_rates(record, y, np.array([0, 0, turn + part]), DT)
+    gusts.advance_gust_estimate(record, y, np.array([0, 0, turn + part]), DT)
     assert record["memory"]["unmeasured_yawing_share_by_turn_now"] == pytest.approx(0.25)
     assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
@@ -183,9 +183,9 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
     record["memory"]["air_rotation_in_level_axes"][2] = 0.05
     if late:  # the wind turns a step after the heading
         y, force = look(over, [-1, -1, 1])
-        gusts.update_gust_rotation_rates(record, y, over, DT)
+        gusts.advance_gust_estimate(record, y, over, DT)
         record["memory"]["specific_force"] = force
-    gusts.update_gust_rotation_rates(record, look(over, 1)[0], over, DT)
+    gusts.advance_gust_estimate(record, look(over, 1)[0], over, DT)
     assert abs(record["memory"]["air_rotation_in_level_axes"][2]) <= 0.05
     unseen, record["memory"]["unmeasured_intensity_share"] = (
         np.array(record["memory"]["unmeasured_intensity_share"]),
@@ -297,7 +297,7 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
         record["memory"]["specific_force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
-        gusts.update_gust_rotation_rates(record, y, blurred, DT)
+        gusts.advance_gust_estimate(record, y, blurred, DT)
         seen.append(record["memory"]["air_rotation_in_level_axes"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
     counted, reckoned = (

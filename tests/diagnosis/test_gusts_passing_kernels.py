@@ -125,7 +125,7 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
         0.02,
     )
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    gusts.set_gust_rotation_intensity(record, reading)
+    gusts.set_gust_intensity_at_altitude(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))

@@ -69,7 +69,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
         level.apply(record["memory"]["specific_force"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    gusts.update_gust_rotation_rates(record, y_now, now, dt)
+    gusts.advance_gust_estimate(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
@@ -144,7 +144,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
             gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
-        gusts.fill_frame_mean_and_variance_by_gust(record, 1.0)
+        gusts.finish_gust_mean_and_turn_variance(record, 1.0)
         assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
@@ -152,7 +152,7 @@ def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
     record, rate = new_air(turbulence_scale_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert gusts.unmeasured_yawing_share_by_heading_rate(record, V, rate) == pytest.approx(
+    assert gusts.unmeasured_yawing_share_from_heading_rate(record, V, rate) == pytest.approx(
         rate**2 * lag / (3.0 * V / 500.0)
     )
 
@@ -518,7 +518,7 @@ def test_the_estimate_is_that_of_whoever_counts():
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(angular_acceleration_by_gust_sum=(0.4, -0.8, 1.2))
-    gusts.fill_frame_mean_and_variance_by_gust(record, share)
+    gusts.finish_gust_mean_and_turn_variance(record, share)
     assert record["output"]["mean_angular_acceleration_by_gust"] == pytest.approx(
         share * np.array([0.4, -0.8, 1.2])
     )

@@ -60,7 +60,7 @@ from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
 MIN_UNMEASURED_GUST_INTENSITY_SHARES = (1.0, 0.003, 0.03)
-UNMEASURED_SHARE_BY_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
+UNMEASURED_SHARE_FROM_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
 ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
 MAX_GUST_VELOCITY_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
@@ -170,7 +170,7 @@ def level_component(level_to_body, body_vector, level_axis):
 
 
 @kernel
-def measure_air_relative_velocity(gust, y, attitude):
+def fill_attitude_and_air_relative_velocity(gust, y, attitude):
     """Fill attitude, heading and velocity relative to the air, m/s in level axes, of this instant.
 
     y (5,) and attitude (3,) rad as measured.
@@ -195,8 +195,8 @@ def start_gust_estimate(gust, y, attitude):
 
     If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
     """
-    measure_air_relative_velocity(gust, y, attitude)
-    update_gust_axes(gust, 0.0, 1.0)
+    fill_attitude_and_air_relative_velocity(gust, y, attitude)
+    update_gust_axes_keeping_previous(gust, 0.0, 1.0)
     gust.memory.air_rotation_in_level_axes[:] = 0.0
     gust.memory.has_acceleration_before, gust.memory.unmeasured_yawing_share_by_turn_now = 0, 0.0
     gust.memory.unmeasured_yawing_share_by_past_turns = gust.memory.unmeasured_pitching_share_by_start = (
@@ -210,26 +210,26 @@ def start_gust_estimate(gust, y, attitude):
 
 
 @kernel
-def update_gust_axes(gust, sin_heading_change, cos_heading_change):
+def update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change):
     """Fill `gust_axes_in_body` for this instant, and keep those of the instant before in `gust_axes_rate`.
 
     sin, cos_heading_change: of the change of heading. JSBSim's gusts have the heading of the step before.
     """
     gust.memory.gust_axes_rate[:] = gust.output.gust_axes_in_body
     for i in range(3):
-        level_ahead_component = gust.memory.level_to_body[i, 0]
-        level_right_component = gust.memory.level_to_body[i, 1]
+        level_ahead_on_body_axis = gust.memory.level_to_body[i, 0]
+        level_right_on_body_axis = gust.memory.level_to_body[i, 1]
         gust.output.gust_axes_in_body[i, 0] = (
-            level_ahead_component * cos_heading_change - level_right_component * sin_heading_change
+            level_ahead_on_body_axis * cos_heading_change - level_right_on_body_axis * sin_heading_change
         )
         gust.output.gust_axes_in_body[i, 1] = (
-            level_ahead_component * sin_heading_change + level_right_component * cos_heading_change
+            level_ahead_on_body_axis * sin_heading_change + level_right_on_body_axis * cos_heading_change
         )
         gust.output.gust_axes_in_body[i, 2] = gust.memory.level_to_body[i, 2]
 
 
 @kernel
-def fill_turn_rate_of_gust_axes(gust, dt, V):
+def fill_axes_rate_and_fast_turn(gust, dt, V):
     """Fill `gust_axes_rate`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant
     before.
 
@@ -237,23 +237,23 @@ def fill_turn_rate_of_gust_axes(gust, dt, V):
     rate sigma gust_axes_rate. Over its lag this equals a random walk of (gust_axes_rate lag)^2 / 2 times its
     intensity.
     """
-    max_turn_rate_component = 0.0
+    largest_turn_rate_magnitude_so_far = 0.0
     for i in range(3):
         for gust_axis in range(3):
             gust.memory.gust_axes_rate[i, gust_axis] = (
                 gust.output.gust_axes_in_body[i, gust_axis] - gust.memory.gust_axes_rate[i, gust_axis]
             ) / dt
-            max_turn_rate_component = max(
-                max_turn_rate_component, abs(gust.memory.gust_axes_rate[i, gust_axis])
+            largest_turn_rate_magnitude_so_far = max(
+                largest_turn_rate_magnitude_so_far, abs(gust.memory.gust_axes_rate[i, gust_axis])
             )
     gust.memory.has_fast_axes_turn = (
-        0.5 * (max_turn_rate_component * gust.config.rolling_gust_correlation_length / V) ** 2
+        0.5 * (largest_turn_rate_magnitude_so_far * gust.config.rolling_gust_correlation_length / V) ** 2
         > MIN_GUST_AXES_TURN_INTENSITY_SHARE
     )
 
 
 @kernel
-def unmeasured_yawing_share_by_heading_rate(gust, V, heading_rate):
+def unmeasured_yawing_share_from_heading_rate(gust, V, heading_rate):
     """Share of the yawing gust's intensity that is unmeasured while the heading turns at `heading_rate`
     rad/s.
 
@@ -271,7 +271,7 @@ def unmeasured_yawing_share_by_heading_rate(gust, V, heading_rate):
 
 
 @kernel
-def update_gust_rotation_rates(gust, y, attitude, dt):
+def advance_gust_estimate(gust, y, attitude, dt):
     """Update `air_rotation_in_level_axes` (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
     y (5,) and attitude (3,) rad as measured now; `specific_force` and attitude in memory are those dt s ago.
@@ -312,7 +312,7 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
         - acceleration_in_level_axes[0] * sin_heading_change
     )
     gust.memory.acceleration_in_level_axes_before[2] = acceleration_in_level_axes[2]
-    measure_air_relative_velocity(gust, y, attitude)
+    fill_attitude_and_air_relative_velocity(gust, y, attitude)
     update_gust_velocity_and_speed(
         gust,
         predicted_horizontal_velocity_ahead,
@@ -322,20 +322,20 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
         dt,
     )
     V = gust.output.speed_relative_to_mean_air
-    update_gust_axes(gust, sin_heading_change, cos_heading_change)
-    fill_turn_rate_of_gust_axes(gust, dt, V)
+    update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change)
+    fill_axes_rate_and_fast_turn(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    unmeasured_yawing_share_by_turn_before = gust.memory.unmeasured_yawing_share_by_turn_now
-    gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(
+    previous_unmeasured_yawing_share = gust.memory.unmeasured_yawing_share_by_turn_now
+    gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_from_heading_rate(
         gust, V, heading_change / dt
     )
-    unmeasured_yawing_share_by_turn = max(
-        unmeasured_yawing_share_by_turn_before, gust.memory.unmeasured_yawing_share_by_turn_now
+    larger_unmeasured_yawing_share = max(
+        previous_unmeasured_yawing_share, gust.memory.unmeasured_yawing_share_by_turn_now
     )
     gust.memory.unmeasured_yawing_share_by_past_turns = min(
         max(
             np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns,
-            unmeasured_yawing_share_by_turn,
+            larger_unmeasured_yawing_share,
         ),
         1.0,
     )
@@ -348,7 +348,7 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
-    if unmeasured_yawing_share_by_turn < 1.0:
+    if larger_unmeasured_yawing_share < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
             predicted_horizontal_velocity_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
@@ -406,7 +406,7 @@ def update_gust_velocity_and_speed(
 
 
 @kernel
-def set_gust_rotation_intensity(gust, measured_altitude_m):
+def set_gust_intensity_at_altitude(gust, measured_altitude_m):
     """Fill the intensity of turbulence at this altitude."""
     min_height_m = min_true_height_m(
         measured_altitude_m,
@@ -425,10 +425,10 @@ def set_gust_rotation_intensity(gust, measured_altitude_m):
 
 
 @kernel
-def update_gust_estimate(gust, y, attitude, dt, frame_index):
-    """Start at frame 0, and update the gust at later frames; arguments as in `update_gust_rotation_rates`."""
+def start_or_advance_gust_estimate(gust, y, attitude, dt, frame_index):
+    """Start at frame 0, and update the gust at later frames; arguments as in `advance_gust_estimate`."""
     if frame_index > 0:
-        update_gust_rotation_rates(gust, y, attitude, dt)
+        advance_gust_estimate(gust, y, attitude, dt)
     else:
         start_gust_estimate(gust, y, attitude)
 
@@ -461,11 +461,13 @@ def fill_gust_effect_and_specific_force(gust, design, x, y, u):
             else 0.0
         )
     for i in range(3):
-        acceleration_by_gust = 0.0
+        acceleration_from_gust = 0.0
         for j in range(3):
-            acceleration_by_gust -= gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
+            acceleration_from_gust -= (
+                gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
+            )
         gust.output.angular_acceleration_by_gust[i], gust.output.angular_acceleration_by_coarse_gust[i] = (
-            (acceleration_by_gust, 0.0) if gust.output.is_gust_measured else (0.0, acceleration_by_gust)
+            (acceleration_from_gust, 0.0) if gust.output.is_gust_measured else (0.0, acceleration_from_gust)
         )
 
 
@@ -482,7 +484,7 @@ def update_gust_and_sums(gust, design, x, y, u, attitude, dt):
 
     Arguments as in `fill_gust_effect_and_specific_force`; attitude (3,) rad.
     """
-    update_gust_rotation_rates(gust, y, attitude, dt)
+    advance_gust_estimate(gust, y, attitude, dt)
     fill_gust_effect_and_specific_force(gust, design, x, y, u)
     for i in range(3):
         gust.memory.angular_acceleration_by_gust_sum[i] += gust.output.angular_acceleration_by_gust[i]
@@ -532,7 +534,7 @@ def unmeasured_gust_intensity_share(gust, gust_axis):
     """Share of the intensity of the gust about a gust axis that is unmeasured in this frame."""
     if gust_axis == 0:
         return min(gust.memory.unmeasured_intensity_share[gust_axis], 1.0)
-    unmeasured_share_by_speed_error = (
+    unmeasured_share_from_speed_error = (
         gust.config.unmeasured_share_per_speed_error_variance
         * (
             gust.config.speed_error_variance
@@ -544,7 +546,7 @@ def unmeasured_gust_intensity_share(gust, gust_axis):
     )
     return min(
         gust.memory.unmeasured_intensity_share[gust_axis]
-        + unmeasured_share_by_speed_error
+        + unmeasured_share_from_speed_error
         + (
             gust.memory.unmeasured_pitching_share_by_start
             if gust_axis == 1
@@ -635,7 +637,7 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
 
 
 @kernel
-def fill_frame_mean_and_variance_by_gust(gust, frame_share_per_instant):
+def finish_gust_mean_and_turn_variance(gust, frame_share_per_instant):
     """Fill `mean_angular_acceleration_by_gust` and `acceleration_variance_by_axes_turn` for the elapsed
     frame.
 
@@ -661,19 +663,19 @@ def fill_frame_mean_and_variance_by_gust(gust, frame_share_per_instant):
 
 
 @kernel
-def full_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensitivity):
+def full_gust_drift_intensity(gust, V, body_axes_rate_sensitivity, body_axes_force_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    rate_gust_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces,
-    about the body axes.
+    body_axes_rate_sensitivity, body_axes_force_sensitivity (3,) 1/s: gust sensitivity of the rates and of
+    the forces, about the body axes.
     """
     drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
     for gust_axis in range(3):
-        sensitivity_magnitude_sum = abs(
-            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis)
-        ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis))
+        rate_plus_force_sensitivity = abs(
+            project_on_gust_axis(body_axes_rate_sensitivity, gust.output.gust_axes_in_body, gust_axis)
+        ) + abs(project_on_gust_axis(body_axes_force_sensitivity, gust.output.gust_axes_in_body, gust_axis))
         drift_intensity_per_airspeed += (
-            sensitivity_magnitude_sum**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
+            rate_plus_force_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
         )
         if gust.memory.has_fast_axes_turn:
             drift_intensity_per_airspeed += (
@@ -681,50 +683,50 @@ def full_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensiti
                 * rolling_lag_s
                 * rolling_lag_s
                 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-                * project_on_gust_axis(rate_gust_sensitivity, gust.memory.gust_axes_rate, gust_axis) ** 2
+                * project_on_gust_axis(body_axes_rate_sensitivity, gust.memory.gust_axes_rate, gust_axis) ** 2
             )
     return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def remaining_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensitivity):
+def remaining_gust_drift_intensity(gust, V, body_axes_rate_sensitivity, body_axes_force_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
 
-    rate_gust_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivities about the body axes. On the
-    forces the whole rotation acts.
+    body_axes_rate_sensitivity, body_axes_force_sensitivity (3,) 1/s: gust sensitivities about the body axes.
+    On the forces the whole rotation acts.
     """
     drift_intensity_per_airspeed = 0.0
     for gust_axis in range(3):
         unmeasured_sensitivity = np.sqrt(unmeasured_gust_intensity_share(gust, gust_axis)) * abs(
-            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis)
+            project_on_gust_axis(body_axes_rate_sensitivity, gust.output.gust_axes_in_body, gust_axis)
         )
         drift_intensity_per_airspeed += (
             unmeasured_sensitivity
-            + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis))
+            + abs(project_on_gust_axis(body_axes_force_sensitivity, gust.output.gust_axes_in_body, gust_axis))
         ) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
     return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def project_on_gust_axis(body_axes_sensitivity, gust_axes, gust_axis):
+def project_on_gust_axis(body_axes_sensitivity, gust_axes_or_their_rate, gust_axis):
     """Sensitivity to the gust about a gust axis, from that (3,) to rotation about the body axes."""
     return (
-        body_axes_sensitivity[0] * gust_axes[0, gust_axis]
-        + body_axes_sensitivity[1] * gust_axes[1, gust_axis]
-        + body_axes_sensitivity[2] * gust_axes[2, gust_axis]
+        body_axes_sensitivity[0] * gust_axes_or_their_rate[0, gust_axis]
+        + body_axes_sensitivity[1] * gust_axes_or_their_rate[1, gust_axis]
+        + body_axes_sensitivity[2] * gust_axes_or_their_rate[2, gust_axis]
     )
 
 
 @kernel
-def gust_effect_product(gust, gust_axes, axis_i, axis_j, gust_axis):
+def gust_effect_product(gust, gust_axes_or_their_rate, axis_i, axis_j, gust_axis):
     """Product of the effects of the gust about a gust axis on two accelerations, per (rad/s)2.
 
-    gust_axes (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
+    gust_axes_or_their_rate (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
     effect_on_i, effect_on_j = 0.0, 0.0
     for k in range(3):
-        effect_on_i += gust.output.rate_damping[axis_i, k] * gust_axes[k, gust_axis]
-        effect_on_j += gust.output.rate_damping[axis_j, k] * gust_axes[k, gust_axis]
+        effect_on_i += gust.output.rate_damping[axis_i, k] * gust_axes_or_their_rate[k, gust_axis]
+        effect_on_j += gust.output.rate_damping[axis_j, k] * gust_axes_or_their_rate[k, gust_axis]
     return effect_on_i * effect_on_j
 
 
@@ -782,11 +784,11 @@ def add_gust_estimate_noise(
         force_records_normal_first = statistical_detector["forces"]["component"][
             ::-1
         ]  # normal to the body, and across
-        flow_angle_noise_std_by_forces = np.sqrt(
+        flow_angle_noise_std_from_forces = np.sqrt(
             force_records_normal_first["accelerometer_innovation_variance"]
         ) / np.abs(force_records_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
         statistical_detector["forces"]["angular_acceleration_by_gust_noise_std"] = (
-            angular_acceleration_by_gust_noise_std(flow_angle_noise_std_by_forces, design, y, u, span_m)
+            angular_acceleration_by_gust_noise_std(flow_angle_noise_std_from_forces, design, y, u, span_m)
         )
     for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
         statistical_detector["noise"][field_name] += (

@@ -77,7 +77,7 @@ from beaver_ftc.diagnosis.detection.parity import (
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
     MIN_UNMEASURED_GUST_INTENSITY_SHARES,
-    UNMEASURED_SHARE_BY_FORCE_ERROR,
+    UNMEASURED_SHARE_FROM_FORCE_ERROR,
     add_gust_estimate_noise,
     configure_gust_estimate,
     configure_gust_velocity_and_speed_error,
@@ -290,7 +290,7 @@ def configure_statistical_detector(
                 "uses_accelerometers"
             ]
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
-                np.add(MIN_UNMEASURED_GUST_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
+                np.add(MIN_UNMEASURED_GUST_INTENSITY_SHARES, UNMEASURED_SHARE_FROM_FORCE_ERROR), 1.0
             )
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]

@@ -376,9 +376,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     inertial_gust = statistical_detector.inertial_gust
     frame_means = prediction.frame_means
     acceleration_innovation, dt = fdi.bank.output.innovation, fdi.config.dt
-    gusts.fill_frame_mean_and_variance_by_gust(gust, prediction.frame_share_per_instant)
+    gusts.finish_gust_mean_and_turn_variance(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
-        gusts.fill_frame_mean_and_variance_by_gust(inertial_gust, prediction.frame_share_per_instant)
+        gusts.finish_gust_mean_and_turn_variance(inertial_gust, prediction.frame_share_per_instant)
     fill_surface_effects_with_previous_G(frame_means)
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
@@ -486,8 +486,8 @@ def add_instant_to_gusts_and_tests(fdi, prediction, measured):
 def update_gusts_and_force_innovations(gust, inertial_gust, forces_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.accounts_for_gusts:
-        gusts.set_gust_rotation_intensity(gust, measured.altitude)
-        gusts.update_gust_estimate(
+        gusts.set_gust_intensity_at_altitude(gust, measured.altitude)
+        gusts.start_or_advance_gust_estimate(
             gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
         )
     if (forces_record.in_use or gust.output.uses_accelerometers) and not measured.inertial:
@@ -509,8 +509,10 @@ def update_force_innovations_and_inertial_gust(
     if inertial_gust.output.accounts_for_gusts:
         forces.fill_y_without_vanes(forces_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y)
         gusts.store_accelerometer_reading(inertial_gust, measured.force)
-        gusts.set_gust_rotation_intensity(inertial_gust, measured.altitude)
-        gusts.update_gust_estimate(inertial_gust, forces_record.y_without_vanes, measured.attitude, dt, k)
+        gusts.set_gust_intensity_at_altitude(inertial_gust, measured.altitude)
+        gusts.start_or_advance_gust_estimate(
+            inertial_gust, forces_record.y_without_vanes, measured.attitude, dt, k
+        )
         gusts.fill_gust_effect_and_specific_force(
             inertial_gust, prediction.design, measured.x, forces_record.y_without_vanes, prediction.u
         )

@@ -78,7 +78,7 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
 
 def test_the_dominant_axis_is_that_of_the_largest_effect():
     effects = np.array([(3.0, 1, 2), (1, -3.0, 2), (1, 2, -3.0), (2, 2, 1)])
-    assert [isolation.axis_of_largest_effect(Z) for Z in effects] == [0, 1, 2, 0]
+    assert [isolation.axis_of_largest_regressor(Z) for Z in effects] == [0, 1, 2, 0]
 
 
 @pytest.mark.parametrize("instants", [1, 4])
@@ -117,7 +117,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     for _ in range(isolation.N_DEFLECTION_BOUND_ITERATIONS):
         room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
         reach = min(reach, (1.0 + room) / 5.0)
-    on(isolation.widen_position_effect_error_bound, fdi, fie)
+    on(isolation.bound_deflection_and_widen_error, fdi, fie)
     assert fie["max_abs_deflection_in_last_frame"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
     assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(0.01 + own)
@@ -137,6 +137,6 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
     )
     fdi["bound"]["surface_term_error_bound_per_rad"][:, 1] = 0.1
     fie["frame_mean_effect"]["regressor"] = 0.1, 5.0, 1.0
-    on(isolation.widen_position_effect_error_bound, fdi, fie)
+    on(isolation.bound_deflection_and_widen_error, fdi, fie)
     assert fie["max_abs_deflection_in_last_frame"] == 0.6
     assert fie["frame_mean_effect"]["error_bound"] == pytest.approx([0.06] * 3)

@@ -398,9 +398,9 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
     mean["predicted_acceleration"] = rng.normal(size=3)
     effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    model_prediction.predict_acceleration(prediction, 0, effectiveness, offset, offsets_count)
+    model_prediction.fill_acceleration_with_known_faults(prediction, 0, effectiveness, offset, offsets_count)
     assert (prediction["acceleration_with_known_faults"] == mean["predicted_acceleration"]).all()
-    model_prediction.predict_acceleration(prediction, 1, effectiveness, offset, offsets_count)
+    model_prediction.fill_acceleration_with_known_faults(prediction, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
     expected = mean["predicted_acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
     assert prediction["acceleration_with_known_faults"] == pytest.approx(expected)

@@ -58,18 +58,18 @@ class WhiteningFilter:
         self.F[range(3, 9), range(3, 9)] = decay_factors
         self.dt = dt
         self.R = np.diag(declared.rate_variance(MIN_GYRO_NOISE_STD_RAD_S))
-        rate_variance_by_model_error = (dt * declared.model_rad_s2) ** 2
+        rate_variance_from_model_error = (dt * declared.model_rad_s2) ** 2
         Q = np.diag(
-            np.concatenate((rate_variance_by_model_error, (1.0 - decay_factors**2) * stationary_std**2))
+            np.concatenate((rate_variance_from_model_error, (1.0 - decay_factors**2) * stationary_std**2))
         )
         P = np.diag(np.concatenate((np.diagonal(self.R), stationary_std**2)))
         for _ in range(_KALMAN_SETTLING_FRAMES):
-            P = self._updated_covariance(P)
+            P = self._covariance_after_measurement(P)
             P = self.F @ P @ self.F.T + Q
         self.S = P[:3, :3] + self.R
         self.K = np.linalg.solve(self.S, P[:3]).T
 
-    def _updated_covariance(self, P: np.ndarray) -> np.ndarray:
+    def _covariance_after_measurement(self, P: np.ndarray) -> np.ndarray:
         K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
         return P - K @ P[:3]
 
@@ -79,12 +79,12 @@ class WhiteningFilter:
         prediction_error_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
         prediction_error_response = np.zeros((9, *added_acceleration.shape[2:]))
-        whitened = np.empty_like(added_acceleration)
+        whitened_innovation_change = np.empty_like(added_acceleration)
         for k, acceleration in enumerate(added_acceleration):
             prediction_error_response = prediction_error_transition @ prediction_error_response
             prediction_error_response[:3] += self.dt * acceleration
-            whitened[k] = whitener @ prediction_error_response[:3]
-        return whitened
+            whitened_innovation_change[k] = whitener @ prediction_error_response[:3]
+        return whitened_innovation_change
 
     def deflection_coefficient_by_frame(self, fault_acceleration: np.ndarray) -> np.ndarray:
         """d after each frame, (n,), of fault_acceleration (n, 3) rad/s2: a fault from its first frame on."""

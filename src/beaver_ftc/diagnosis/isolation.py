@@ -110,7 +110,7 @@ def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, fault_e
 
 
 @kernel
-def axis_of_largest_effect(regressor):
+def axis_of_largest_regressor(regressor):
     """The axis on which a regressor (3,) is largest."""
     axis = 0
     for i in range(1, 3):
@@ -120,7 +120,7 @@ def axis_of_largest_effect(regressor):
 
 
 @kernel
-def widen_position_effect_error_bound(fie, bound_record, innovation, n_substeps):
+def bound_deflection_and_widen_error(fie, bound_record, innovation, n_substeps):
     """Widen the tolerance of a position by the errors of the surface's own terms at that position.
 
     eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
@@ -129,15 +129,15 @@ def widen_position_effect_error_bound(fie, bound_record, innovation, n_substeps)
     before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
     """
     s, fault_effect = fie.surface, fie.frame_mean_effect
-    axis = axis_of_largest_effect(fault_effect.regressor)
-    previous_max_abs_deflection = fie.max_abs_deflection_in_last_frame
+    axis = axis_of_largest_regressor(fault_effect.regressor)
+    last_frame_max_abs_deflection = fie.max_abs_deflection_in_last_frame
     max_abs_deflection = max(abs(fie.theta_min), abs(fie.theta_max))
-    effect_error_bound = fault_effect.error_bound[axis]
+    error_bound_before_widening = fault_effect.error_bound[axis]
     error_map = bound_record.error_map
     mean_position_interval = (fie.theta_min, fie.theta_max)
     travel_level_index = travel_level_index_at_position(error_map, fie, mean_position_interval, n_substeps)
     measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
-    first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
+    first_substep_allowance_rad = 2.0 * last_frame_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         extra_error_bound = max(
             bound_record.surface_term_error_bound_per_rad[axis, s]
@@ -148,7 +148,7 @@ def widen_position_effect_error_bound(fie, bound_record, innovation, n_substeps)
         extra_error_bound += bound_record.additional_error_bound_by_travel_level[travel_level_index, axis]
         mean_position_low, mean_position_high = consistent_theta_interval(
             measured_effect,
-            bound_record.frame_innovation_bound[axis] + effect_error_bound + extra_error_bound,
+            bound_record.frame_innovation_bound[axis] + error_bound_before_widening + extra_error_bound,
             fault_effect.regressor[axis],
             fie.theta_min,
             fie.theta_max,
@@ -224,10 +224,10 @@ def reset_feasible_theta_sets(fie, projection_disabled):
 def intersect_feasible_theta_sets(fie, axis, theta_interval, shared_by_axes):
     """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `theta_interval`."""
     theta_low, theta_high = theta_interval
-    for axis_of_set in range(3):
-        if shared_by_axes or axis_of_set == axis:
-            fie.feasible_theta_min[axis_of_set] = max(fie.feasible_theta_min[axis_of_set], theta_low)
-            fie.feasible_theta_max[axis_of_set] = min(fie.feasible_theta_max[axis_of_set], theta_high)
+    for set_axis in range(3):
+        if shared_by_axes or set_axis == axis:
+            fie.feasible_theta_min[set_axis] = max(fie.feasible_theta_min[set_axis], theta_low)
+            fie.feasible_theta_max[set_axis] = min(fie.feasible_theta_max[set_axis], theta_high)
 
 
 @kernel
@@ -343,12 +343,12 @@ def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[Est
     loss_entries = tuple((name, LOSS, surface_index_by_name[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
         return loss_entries
-    stand_in_loss_entries = tuple(
+    stand_in_surface_loss_entries = tuple(
         (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index_by_name[name]]
     )
     return (
         *loss_entries,
-        *stand_in_loss_entries,
+        *stand_in_surface_loss_entries,
         *((f"{name}_position", POSITION, s) for name, s in surface_index_by_name.items()),
     )
 
@@ -448,7 +448,7 @@ def update_fault_effect_and_reach(
     if (
         bound_record.has_surface_term_errors or bound_record.error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
-        widen_position_effect_error_bound(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
+        bound_deflection_and_widen_error(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
         advance_reachable_residuals(filter_bank, fie, config.dt)
 
@@ -664,7 +664,7 @@ def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, d
             + dt * (predicted_acceleration[i] + acceleration_at_zero_theta + regressor * theta)
             + decay_factor * (fie.xhat[i] - x[i])
         )
-    adapt_estimate(isolation, fie, dt)
+    update_theta_regressor_and_xhat(isolation, fie, dt)
     for i in range(3):
         regressor, decay_factor = fie.frame_mean_effect.regressor[i], isolation.config.filter_decay[i]
         fie.filtered_positive_regressor[i] = decay_factor * fie.filtered_positive_regressor[i] + dt * max(
@@ -690,7 +690,7 @@ def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, d
 
 
 @kernel
-def adapt_estimate(isolation, fie, dt):
+def update_theta_regressor_and_xhat(isolation, fie, dt):
     """Correct the estimate by the residual at the start of the frame, and the predicted rates by Omega[k+1]
     times the step of the estimate."""
     joint_step = (
@@ -727,7 +727,7 @@ def advance_estimators(isolation, bound_record, x, predicted_acceleration, dt):
 
 
 @kernel
-def update_likelihood_exclusion(
+def update_likelihood_confirmation_and_exclusion(
     fie,
     test_config,
     statistical_blocks,
@@ -743,16 +743,16 @@ def update_likelihood_exclusion(
     then be the effect of that error, so all estimators become weakly excluded. loss_estimator_of_surface
     (n,): index of the estimator; fault_is_declared_constant: a fault is declared to stay as it is.
     """
-    all_estimators, s = isolation.estimator, fie.surface
+    all_estimator_records, s = isolation.estimator, fie.surface
     fie.excluded_by_likelihood = 0
     if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not fault_is_declared_constant):
         fie.confirmed_by_likelihood = statistical.confirms_loss(
-            test_config, statistical_blocks, all_estimators, loss_estimator_of_surface, s
+            test_config, statistical_blocks, all_estimator_records, loss_estimator_of_surface, s
         )  # what follows later may be its end
     if fie.confirmed_by_likelihood or not statistical.excludes_loss(
         test_config,
         statistical_blocks,
-        all_estimators,
+        all_estimator_records,
         loss_estimator_of_surface,
         s,
         False,
@@ -762,7 +762,7 @@ def update_likelihood_exclusion(
     fie.excluded_by_likelihood = statistical.excludes_loss(
         test_config,
         statistical_blocks,
-        all_estimators,
+        all_estimator_records,
         loss_estimator_of_surface,
         s,
         True,
@@ -770,5 +770,5 @@ def update_likelihood_exclusion(
     )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
     if fie.excluded_by_likelihood and gust_can_hide_vane_error:
-        for each_estimator in all_estimators[: isolation.config.n_estimators]:
-            each_estimator.weakly_excluded = max(each_estimator.weakly_excluded, 1)
+        for estimator_record in all_estimator_records[: isolation.config.n_estimators]:
+            estimator_record.weakly_excluded = max(estimator_record.weakly_excluded, 1)

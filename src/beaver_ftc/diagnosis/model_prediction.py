@@ -217,7 +217,7 @@ def begin_frame_sums_with_instant(prediction, bound_record, layout, diagnoses_al
 
 
 @kernel
-def repeat_move_of_healthy_surfaces(prediction, command):
+def redo_last_move_to_command(prediction, command):
     """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
     prediction.u[:] = prediction.u_before
     move_healthy_surfaces(prediction, command)
@@ -232,7 +232,9 @@ def add_instant_and_move_healthy_surfaces(prediction, bound_record, layout, diag
 
 
 @kernel
-def predict_acceleration(prediction, include_known_faults, effectiveness, deflection_bias, include_biases):
+def fill_acceleration_with_known_faults(
+    prediction, include_known_faults, effectiveness, deflection_bias, include_biases
+):
     """Fill `acceleration_with_known_faults` (3,) rad/s2: mean of f + G u over the elapsed frame, with the
     faults if `include_known_faults`.
 

@@ -41,8 +41,8 @@ from beaver_ftc.diagnosis.model_prediction import (
     begin_frame_sums_with_instant,
     evaluate_bound_and_frame_means,
     evaluate_design_model,
+    fill_acceleration_with_known_faults,
     move_healthy_surfaces,
-    predict_acceleration,
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
@@ -416,7 +416,7 @@ def diagnose(frame):
     if k == 0:
         schemes.begin_scheme(scheme, fdi, prediction, measured)
     else:
-        predict_acceleration(
+        fill_acceleration_with_known_faults(
             prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
         )
         schemes.advance_estimators_to_frame(scheme, fdi, prediction, measured, k, frame.t)

@@ -21,7 +21,7 @@ from beaver_ftc.compiled.cache import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
 from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
-from beaver_ftc.diagnosis.model_prediction import repeat_move_of_healthy_surfaces
+from beaver_ftc.diagnosis.model_prediction import redo_last_move_to_command
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import built_in_detection_statistic as largest_statistic
@@ -94,7 +94,7 @@ def hold(frames):
     frame = frames[0]
     prediction = frame.prediction
     frame.held = 1
-    repeat_move_of_healthy_surfaces(prediction, frame.held_rad)
+    redo_last_move_to_command(prediction, frame.held_rad)
     hand_over(frame.truth, prediction.commanded, frame.control.power.output)
 
 

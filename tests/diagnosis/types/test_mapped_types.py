@@ -137,6 +137,6 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     )
     fie["frame_mean_effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(isolation.widen_position_effect_error_bound, fdi, fie)
+    on(isolation.bound_deflection_and_widen_error, fdi, fie)
     assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(ERROR[0])
     assert fie["max_travel_share_in_last_frame"] == pytest.approx(1.13 / 20 / 0.5)

@@ -188,7 +188,7 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
     gust_can_hide_vane_error = (
         fdi.sensor_monitor.config.enabled and statistical_detector.gust.output.accounts_for_gusts
     )
-    isolation.update_likelihood_exclusion(
+    isolation.update_likelihood_confirmation_and_exclusion(
         fie,
         statistical_detector.test_config,
         statistical_detector.block,

@@ -12,8 +12,8 @@ from beaver_ftc.diagnosis.detection.filters import (
     fault_acceleration_range_along_parity,
 )
 from beaver_ftc.diagnosis.model_prediction import (
-    add_instant_to_sums,
-    begin_frame_sums_with_instant,
+    add_instant_to_sums_and_extremes,
+    begin_frame_with_instant,
     fill_frame_means,
 )
 from beaver_ftc.loop.assembly import configure_design
@@ -23,7 +23,7 @@ from beaver_ftc.scenario.schema import Scenario
 @kernel
 def first(frames):
     fdi = frames[0].fdi
-    begin_frame_sums_with_instant(
+    begin_frame_with_instant(
         frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frames[0].measured
     )
 
@@ -31,7 +31,9 @@ def first(frames):
 @kernel
 def another(frames):
     fdi = frames[0].fdi
-    add_instant_to_sums(frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types)
+    add_instant_to_sums_and_extremes(
+        frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types
+    )
 
 
 @kernel

@@ -545,10 +545,10 @@ def update_and_test_if_fault_possible(
 
 
 @kernel
-def set_constant_isolation_thresholds(isolation, constant_threshold):
+def set_constant_isolation_thresholds(isolation, constant_threshold_rad_s):
     """Replace the adaptive thresholds by a constant one, rad/s."""
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        fie.filtered_uncertainty_bound[:] = constant_threshold
+        fie.filtered_uncertainty_bound[:] = constant_threshold_rad_s
 
 
 @kernel
@@ -592,9 +592,9 @@ def replace_theta_by_plugin_estimate(isolation, isolated_estimator, theta):
 
 
 @kernel
-def least_squares_step(fie, axis, residual, forgetting_factor, theta_min, theta_max):
-    """One least-squares step of thetahat_i on a residual, projected onto [theta_min, theta_max]; returns the
-    step.
+def least_squares_step(fie, axis, rate_residual, forgetting_factor, theta_min, theta_max):
+    """One least-squares step of thetahat_i on a residual, rad/s, projected onto [theta_min, theta_max];
+    returns the step.
 
     The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
     filtered uncertainty, so the estimate changes no faster than its information allows.
@@ -606,7 +606,8 @@ def least_squares_step(fie, axis, residual, forgetting_factor, theta_min, theta_
         return 0.0
     previous_theta = fie.theta[axis]
     fie.theta[axis] = min(
-        max(previous_theta + variance_times_regressor / residual_variance * residual, theta_min), theta_max
+        max(previous_theta + variance_times_regressor / residual_variance * rate_residual, theta_min),
+        theta_max,
     )
     prior_variance = (fie.theta_max - fie.theta_min) ** 2 / 12.0
     fie.theta_variance[axis] = min(

@@ -90,7 +90,7 @@ def evaluate_design_model(prediction, measured):
 
 
 @kernel
-def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
+def add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types):
     """Add this instant to the sums over the frame and, for faults of `diagnoses_all_types`, to the
     extremes."""
     sums, G, u = prediction.sums, prediction.G, prediction.u
@@ -200,7 +200,7 @@ def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_ind
 
 
 @kernel
-def begin_frame_sums_with_instant(prediction, bound_record, layout, diagnoses_all_types, measured):
+def begin_frame_with_instant(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
     prediction.x_before[:] = measured.x
     bound_record.changing_gyro_error_bound_before[:] = bound_record.changing_gyro_error_bound
@@ -212,7 +212,7 @@ def begin_frame_sums_with_instant(prediction, bound_record, layout, diagnoses_al
     if bound_record.has_surface_term_errors:
         sums.surface_term_error_bound_per_rad[:], sums.surface_term_error_bound_at_command[:] = 0.0, 0.0
     bound_record.additional_error_bound_by_travel_level[:] = 0.0
-    add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
+    add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu
 
 
@@ -227,7 +227,7 @@ def redo_last_move_to_command(prediction, command):
 def add_instant_and_move_healthy_surfaces(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
     fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
-    add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
+    add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types)
     move(prediction.actuators, prediction.commanded, prediction.u)
 
 

@@ -38,7 +38,7 @@ from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
 from beaver_ftc.diagnosis.model_prediction import (
     add_instant_and_move_healthy_surfaces,
-    begin_frame_sums_with_instant,
+    begin_frame_with_instant,
     evaluate_bound_and_frame_means,
     evaluate_design_model,
     fill_acceleration_with_known_faults,
@@ -423,7 +423,7 @@ def diagnose(frame):
     schemes.update_verdict(scheme, fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
     schemes.prepare_next_frame(scheme, fdi, prediction, measured, k)
-    begin_frame_sums_with_instant(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
+    begin_frame_with_instant(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
     follow_guarantee(
         frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.frame_share_per_instant, k, frame.t
     )

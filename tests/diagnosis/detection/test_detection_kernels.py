@@ -193,11 +193,11 @@ def test_means_over_a_frame_are_of_its_instants(count, has_surface_term_errors):
             np.abs(per_rad),
         )
         if k == 0:
-            model_prediction.begin_frame_sums_with_instant(
+            model_prediction.begin_frame_with_instant(
                 record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"], measured
             )
         else:
-            model_prediction.add_instant_to_sums(
+            model_prediction.add_instant_to_sums_and_extremes(
                 record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"]
             )
     model_prediction.fill_frame_means(record, fdi["bound"])

@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document, Metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
-from beaver_ftc_logs.readers.table import check_time, read_numbers
+from beaver_ftc_logs.readers.table import check_row_count_and_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 
 
@@ -55,7 +55,7 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
     missing_names = [name for name in names if name not in log_columns]
     if missing_names:
         raise BadInput(f"{path}: no column {missing_names[0]}, allowed: a log.parquet as `run` writes it")
-    check_time(path, log_columns["t_s"])
+    check_row_count_and_time(path, log_columns["t_s"])
     return log_columns
 
 

@@ -135,22 +135,22 @@ class HypothesisTestsByOnset(NamedTuple):
 
     score: np.ndarray
     supporting_correlation_sign: np.ndarray
-    calm_air_part_of_correlation: np.ndarray
-    coarse_gust_part_of_correlation: np.ndarray
+    correlation_predictable_in_calm_air: np.ndarray
+    correlation_from_coarse_gust: np.ndarray
 
 
 class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
     axis_indices: of its states. drift_correlation_length_m: of the drift, m; 0 for none.
-    factor_on_gust_drift_intensity: on the variance of a gust seen roughly. regressor_coefficient_tolerance
+    factor_on_gust_drift_intensity: on the variance of a gust seen roughly. regressor_coefficient_error_bound
     (regressors,): of the constants that are not known, 0 for one not used.
     """
 
     axis_indices: tuple[int, ...]
     drift_correlation_length_m: float
     factor_on_gust_drift_intensity: float
-    regressor_coefficient_tolerance: np.ndarray
+    regressor_coefficient_error_bound: np.ndarray
     hypotheses: tuple[StatisticalHypothesis, ...]
     hypothesis_tests_by_onset: HypothesisTestsByOnset
 
@@ -314,9 +314,9 @@ class DiagnosisReadout:
         )
 
     @cached_property
-    def acceleration_variance_by_input_noise(self) -> np.ndarray:
+    def acceleration_variance_from_input_noise(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_by_input_noise"])
+        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_from_input_noise"])
 
     @cached_property
     def statistical_alarm_level(self) -> float:
@@ -345,7 +345,7 @@ def switch_statistical_tests(fdi: np.void, is_enabled: bool) -> None:
     fdi["statistical"]["test_config"]["enabled"] = is_enabled
 
 
-def disable_diagnosis(fdi: np.void) -> None:
+def disable_surface_and_sensor_diagnosis(fdi: np.void) -> None:
     """Stop the built-in diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge
     then. A plug-in goes on."""
     if fdi["config"]["enabled"]:

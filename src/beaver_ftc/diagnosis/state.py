@@ -83,10 +83,10 @@ def configure_layout(
         PITCH_SURFACE_GROUP if axis == PITCH else LATERAL_SURFACE_GROUP for axis in aircraft.dominant_axis
     ]
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
-    for group_surface_names in aircraft.groups.values():
-        if len(group_surface_names) == 2:
+    for aircraft_group_surface_names in aircraft.groups.values():
+        if len(aircraft_group_surface_names) == 2:
             index_of_first_surface_in_group, index_of_second_surface_in_group = (
-                surface_index_by_name[name] for name in group_surface_names
+                surface_index_by_name[name] for name in aircraft_group_surface_names
             )
             layout["partner"][index_of_first_surface_in_group] = index_of_second_surface_in_group
             layout["partner"][index_of_second_surface_in_group] = index_of_first_surface_in_group

@@ -193,7 +193,7 @@ def switch_statistical_tests(frame: np.void, enabled: bool) -> None:
 
 def stop_diagnosis(frame: np.void) -> None:
     """Stop the diagnosis of surfaces and sensors from the next frame on."""
-    of_diagnosis.disable_diagnosis(frame["fdi"])
+    of_diagnosis.disable_surface_and_sensor_diagnosis(frame["fdi"])
 
 
 WITHHELD = {"verdict": ("uses_verdict", "reallocates"), "stand-in": ("reallocates",)}

@@ -191,7 +191,7 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
         faults = list(adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values())[
             fdi["config"]["isolation_variant"]
         ]
-        yield from (faults.begin, faults.record_commands, faults.isolate)
+        yield from (faults.begin_at_alarm, faults.record_commands, faults.isolate)
         if fdi["statistical"]["test_config"]["enabled"]:
             yield from (
                 adaptive_estimators.update_statistical_tests,

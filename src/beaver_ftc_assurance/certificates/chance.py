@@ -184,7 +184,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     felt = _affected_axes(of, now["signature"][:, h], len(block.axis_indices))
     n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axis_indices[i] for i in felt]
     square = np.ix_(range(len(rows)), felt, felt)
-    known = [j for j in np.flatnonzero(block.regressor_coefficient_tolerance > 0.0).tolist()
+    known = [j for j in np.flatnonzero(block.regressor_coefficient_error_bound > 0.0).tolist()
              if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
     drift = dt * then["drift_intensity"][square]  # which is felt a frame later
     drift[1:], drift[0] = drift[:-1].copy(), 0.0
@@ -208,8 +208,8 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         )
     tests_by_onset = block.hypothesis_tests_by_onset
     sense, explained = tests_by_onset.supporting_correlation_sign[h, slot], {
-        "predictable_innovation_in_calm_air": tests_by_onset.calm_air_part_of_correlation,
-        "coarse_gust_response": tests_by_onset.coarse_gust_part_of_correlation,
+        "predictable_innovation_in_calm_air": tests_by_onset.correlation_predictable_in_calm_air,
+        "coarse_gust_response": tests_by_onset.correlation_from_coarse_gust,
     }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss
@@ -222,7 +222,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     frames = [dict(zip(its, row, strict=True)) for row in lists]
     return {
         "level": diagnosis.statistical_alarm_level, "axes": axes, "sense": "less" if sense else "either",
-        "tolerance": [float(block.regressor_coefficient_tolerance[j]) for j in known],
+        "tolerance": [float(block.regressor_coefficient_error_bound[j]) for j in known],
         "R": of["gyro_noise_variance"][0, felt].tolist(), "Y": Y.tolist(),
         "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart
         "first": rows[0], "frames": frames,

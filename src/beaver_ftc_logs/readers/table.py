@@ -77,7 +77,7 @@ def read_parts(
         is_row_kept, left_out_row_notes = _timed_row_mask_and_notes(path, time_column, t_s)
         row_selection = slice(None) if is_row_kept is None else is_row_kept
         t_s = t_s[row_selection]
-        check_time(path, t_s, time_column, cells.n_rows_before)
+        check_row_count_and_time(path, t_s, time_column, cells.n_rows_before)
         flight_columns = {
             column_name: Column(t_s, values[row_selection], note_of_column.get(column_name, ""))
             for column_name, values in table.items()
@@ -150,7 +150,9 @@ def _convert_read_errors_to_bad_input(path: Path) -> Iterator[None]:
         raise BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet") from None
 
 
-def check_time(path: Path, t_s: Floats, time_column: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
+def check_row_count_and_time(
+    path: Path, t_s: Floats, time_column: str = TIME_COLUMN, n_rows_before: int = 0
+) -> None:
     """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
@@ -169,7 +171,7 @@ def _column_names_and_parts(
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
     with _convert_read_errors_to_bad_input(path):
         names, readable_columns = (
-            _all_and_number_columns_of_parquet(path, columns)
+            _check_size_and_list_parquet_columns(path, columns)
             if layout is None
             else (list(layout.column_names), list(layout.column_names))
         )
@@ -215,7 +217,7 @@ def _join_blocks_into_parts(
         yield joined_cells, list(text_cell_and_layout_remarks(layout, joined_cells)) if layout else [], False
 
 
-def _all_and_number_columns_of_parquet(
+def _check_size_and_list_parquet_columns(
     path: Path, columns: Collection[str] | None
 ) -> tuple[list[str], list[str]]:
     """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
@@ -224,7 +226,7 @@ def _all_and_number_columns_of_parquet(
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        number_columns = [field.name for field in schema if _is_number_type(field.type)]
+        number_columns = [field.name for field in schema if _is_integer_or_float_type(field.type)]
         _check_parquet_size(
             path, file.metadata, [name for name in number_columns if columns is None or name in columns]
         )
@@ -271,7 +273,7 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
         )
 
 
-def _is_number_type(arrow_type: Any) -> bool:
+def _is_integer_or_float_type(arrow_type: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_integer(arrow_type) or pa.types.is_floating(arrow_type))

@@ -89,10 +89,10 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
     """The table that lines hold if this is what is between cells; None if they hold none."""
     lines_of_cells = [_split_cells(line_text, delimiter) for line_text in lines]
     for line_index, header_cells in enumerate(lines_of_cells):
-        rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
-        if not rows_below and line_index == 0 and len(header_cells) > 1:
+        first_rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
+        if not first_rows_below and line_index == 0 and len(header_cells) > 1:
             return TableLayout(line_index, tuple(header_cells), delimiter, ".")  # a table of no rows
-        has_as_many_cells_as_header = [len(row) == len(header_cells) for row in rows_below]
+        has_as_many_cells_as_header = [len(row) == len(header_cells) for row in first_rows_below]
         if (
             len(header_cells) < 2
             or any(_is_number_cell(name) for name in header_cells)
@@ -101,7 +101,7 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
             continue
         number_cells = [
             cell
-            for row in rows_below
+            for row in first_rows_below
             if len(row) == len(header_cells)
             for cell in row
             if _is_number_cell(cell)

@@ -33,8 +33,8 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     if not data_by_topic:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
     columns, origin_s = columns_and_time_origin(data_by_topic, _TIME_FIELD)
-    notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
-    return RecordedFlight(path.stem, columns, notes=notes)
+    time_origin_notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
+    return RecordedFlight(path.stem, columns, notes=time_origin_notes)
 
 
 def _topic_name(topic: Any) -> str:

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.rivals.kalman import AirRotationModel
+from beaver_ftc.diagnosis.rivals.kalman import TurbulenceModel
 from beaver_ftc.diagnosis.rivals.observer import SurfaceFit, healthy_residual_std
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
@@ -202,8 +202,8 @@ def test_the_observers_threshold_is_the_deviation_of_its_residual(pole_per_s):
 
 
 def test_air_that_is_not_declared_has_no_states():
-    assert AirRotationModel(context()).n_states == 0
-    assert AirRotationModel(context(GUSTY)).n_states == 3
+    assert TurbulenceModel(context()).n_states == 0
+    assert TurbulenceModel(context(GUSTY)).n_states == 3
 
 
 def test_on_a_linear_plant_the_unscented_filter_is_the_extended_one():

@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis.rivals.kalman import (
     log_likelihood,
     normalised_innovation_square,
     sigma_points,
-    update_state,
+    update_state_and_covariance,
 )
 from beaver_ftc.diagnosis.rivals.rls import RecursiveLeastSquaresFit
 
@@ -36,7 +36,7 @@ def test_an_update_is_the_conditional_gaussian():
     S = H @ P @ H.T + R
     mean = z + P @ H.T @ np.linalg.inv(S) @ (y - H @ z)
     covariance = np.linalg.inv(np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H)  # the information form
-    got_z, got_P, got_S = update_state(z, P, y - z[:2], R)
+    got_z, got_P, got_S = update_state_and_covariance(z, P, y - z[:2], R)
     assert got_z == pytest.approx(mean)
     assert got_P == pytest.approx(covariance)
     assert got_S == pytest.approx(S)
@@ -49,7 +49,7 @@ def test_a_filter_run_is_the_batch_posterior():
     z, P = np.zeros(1), np.eye(1)
     for value in y:
         P = P + q
-        z, P, _ = update_state(z, P, np.array([value]) - z, np.array([[r]]))
+        z, P, _ = update_state_and_covariance(z, P, np.array([value]) - z, np.array([[r]]))
     walk = 1.0 + q * (1.0 + np.minimum.outer(np.arange(n), np.arange(n)))
     gain = walk @ np.linalg.inv(walk + r * np.eye(n))
     assert z[0] == pytest.approx((gain @ y)[-1])
@@ -60,16 +60,18 @@ def test_the_variance_settles_at_the_riccati_equations_root():
     q, r = 0.02, 0.5
     P = np.eye(1)
     for _ in range(500):
-        _, P, _ = update_state(np.zeros(1), P + q, np.zeros(1), np.array([[r]]))
+        _, P, _ = update_state_and_covariance(np.zeros(1), P + q, np.zeros(1), np.array([[r]]))
     assert P[0, 0] == pytest.approx((-q + np.sqrt(q * q + 4 * q * r)) / 2)
 
 
 def test_a_stack_of_filters_is_each_filter_alone():
     z, nu, R = RNG.normal(size=(4, 3)), RNG.normal(size=(4, 3)), _covariance(3)
     P = np.array([_covariance(3) for _ in range(4)])
-    together = update_state(z, P, nu, R)
+    together = update_state_and_covariance(z, P, nu, R)
     for i in range(4):
-        for all_of_them, alone in zip(together, update_state(z[i], P[i], nu[i], R), strict=True):
+        for all_of_them, alone in zip(
+            together, update_state_and_covariance(z[i], P[i], nu[i], R), strict=True
+        ):
             assert all_of_them[i] == pytest.approx(alone)
 
 

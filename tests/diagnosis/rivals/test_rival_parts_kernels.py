@@ -14,7 +14,11 @@ from beaver_ftc.diagnosis.rivals.effectiveness import (
     AugmentedUkf,
     EffectivenessFilter,
 )
-from beaver_ftc.diagnosis.rivals.kalman import AirRotationModel, unexplained_acceleration_size, update_state
+from beaver_ftc.diagnosis.rivals.kalman import (
+    TurbulenceModel,
+    unexplained_acceleration_size,
+    update_state_and_covariance,
+)
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest, RecursiveLeastSquaresFit, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
@@ -55,7 +59,7 @@ def started(declared=None, **options):
 
 
 def test_the_air_is_a_first_order_process_of_each_axis():
-    air, none = AirRotationModel(context(GUSTY)), AirRotationModel(context())
+    air, none = TurbulenceModel(context(GUSTY)), TurbulenceModel(context())
     keep = np.exp(-DT / GUSTY.gust_time_s)
     assert (air.n_states, none.n_states, none.decay_factor.size, none.rate_effect.shape) == (3, 0, 0, (3, 0))
     assert air.decay_factor == pytest.approx(keep)
@@ -93,7 +97,7 @@ def test_its_noise_is_the_bounds_the_walks_and_the_airs():
     expected = [
         *(DT * 2.0 * size) ** 2,
         *[0.3**2 * DT] * 3,
-        *detector.air_rotation_model.process_noise_variance,
+        *detector.turbulence_model.process_noise_variance,
     ]
     assert detector.process_noise_variances(seen()) == pytest.approx(expected)
 
@@ -108,7 +112,7 @@ def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
     z, P, square = detector.z.copy(), detector.P.copy(), 3.0
     for x in ((0.3, 0.4, 0.1), (0.2, 0.3, 0.2), (900.0, 0.0, 0.0)):
         nu = np.array(x) - z[:3]
-        z, P, S = update_state(z, P, nu, detector.R)
+        z, P, S = update_state_and_covariance(z, P, nu, detector.R)
         z[3:6] = np.clip(z[3:6], -1.0, 1.0)
         of_it = nu @ np.linalg.inv(S) @ nu
         square = exp(-DT / 0.1) * square + (1.0 - exp(-DT / 0.1)) * min(of_it, 1e6)

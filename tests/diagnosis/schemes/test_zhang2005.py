@@ -28,7 +28,7 @@ def network(gain=60.0, limit=20.0):
 
 
 def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
-    published_scheme.evaluate_state_network(
+    published_scheme.fill_state_network_basis_and_output(
         new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u)
     )
     return new

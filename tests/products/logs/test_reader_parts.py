@@ -186,7 +186,7 @@ def test_what_counts_as_a_number():
         pa.bool_(): False,
         pa.list_(pa.int8()): False,
     }
-    assert {kind: table._is_number_type(kind) for kind in kinds} == kinds
+    assert {kind: table._is_integer_or_float_type(kind) for kind in kinds} == kinds
 
 
 def test_columns_of_topics_count_from_the_first_stamp_of_all():
@@ -256,7 +256,7 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     parquet.write_table(pa.table(columns), path)
     monkeypatch.setattr(table, "_check_parquet_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._all_and_number_columns_of_parquet(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._check_size_and_list_parquet_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
 
 

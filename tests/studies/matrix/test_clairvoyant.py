@@ -98,7 +98,7 @@ def test_the_time_since_the_fault_and_the_air_as_the_vanes_show_it(lost, monkeyp
     )
     clairvoyant._declared(rough)
     frames = Loop(rough).frames
-    variance = FrameReadout(frames[0]).diagnosis.acceleration_variance_by_input_noise
+    variance = FrameReadout(frames[0]).diagnosis.acceleration_variance_from_input_noise
     apart(variance=variance)
     assert seen[-1] ** 2 == pytest.approx(variance)
 

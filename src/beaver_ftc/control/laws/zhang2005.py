@@ -24,7 +24,7 @@ from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.diagnosis.schemes.published import (
     STATE_NETWORK_RECORD,
     configure_state_network,
-    evaluate_state_network,
+    fill_state_network_basis_and_output,
     train_state_network,
 )
 from beaver_ftc.plugins import LAWS, settings
@@ -71,7 +71,7 @@ def accommodate(control, assessment, faults, prediction, measured):
         saturated, reference = control.allocation.output.saturated, control.reference
         error = reference.output.governed_rate - x
         adapt(law, surfaces, main, saturated, error, prediction.G, prediction.u, reference.config.dt)
-    evaluate_state_network(law.network, main, x, measured.y, prediction.u)
+    fill_state_network_basis_and_output(law.network, main, x, measured.y, prediction.u)
 
 
 @kernel

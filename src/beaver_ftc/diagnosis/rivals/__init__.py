@@ -52,12 +52,12 @@ def tuned_values(
     tuned_values_by_grade: TunedValuesByGrade, grade: str, plugin_group: str, method_name: str
 ) -> dict[str, float]:
     """The values chosen for a method on a grade of flights; none if nothing was chosen there."""
-    method_values: dict[str, float] = (
+    tuned_value_by_option: dict[str, float] = (
         tuned_values_by_grade.get(grade, {})
         .get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[plugin_group], {})
         .get(method_name, {})
     )
-    return method_values
+    return tuned_value_by_option
 
 
 def rival_options(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:

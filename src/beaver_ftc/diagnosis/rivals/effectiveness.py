@@ -18,10 +18,10 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 from beaver_ftc.diagnosis.rivals.kalman import (
-    AirRotationModel,
+    TurbulenceModel,
     sigma_points,
     unexplained_acceleration_size,
-    update_state,
+    update_state_and_covariance,
 )
 
 _DIFFERENCE_STEP_RAD_S = (
@@ -47,12 +47,12 @@ class EffectivenessFilter:
         """Start healthy, with theta known to a tenth."""
         self.context, self.options = context, rival_options(self.name, self.defaults, context)
         self.leading_surface_indices = list(context.leading)
-        self.air_rotation_model = AirRotationModel(context)
-        self.n_states = N_STATES_WITHOUT_GUSTS + self.air_rotation_model.n_states
+        self.turbulence_model = TurbulenceModel(context)
+        self.n_states = N_STATES_WITHOUT_GUSTS + self.turbulence_model.n_states
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.z = np.zeros(self.n_states)
         self.P = np.diag(
-            np.concatenate((measured_rate_variance, [0.01] * 3, self.air_rotation_model.initial_variance))
+            np.concatenate((measured_rate_variance, [0.01] * 3, self.turbulence_model.initial_variance))
         )
         self.R = np.diag(measured_rate_variance)
         self.theta_walk_variance = self.options["drift_per_s"] ** 2 * context.dt_s
@@ -67,7 +67,7 @@ class EffectivenessFilter:
             return self.latch_alarm_and_decide_verdict(measured, 0.0)
         self.propagate(measured)
         nu = measured.x - self.z[:3]
-        self.z, self.P, S = update_state(self.z, self.P, nu, self.R)
+        self.z, self.P, S = update_state_and_covariance(self.z, self.P, nu, self.R)
         self.z[3:N_STATES_WITHOUT_GUSTS] = np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 1.0)
         normalised_innovation_square = float(nu @ np.linalg.solve(S, nu))
         self.mean_normalised_innovation_square = (
@@ -96,7 +96,7 @@ class EffectivenessFilter:
             (
                 rate_process_noise_variance,
                 np.full(3, self.theta_walk_variance),
-                self.air_rotation_model.process_noise_variance,
+                self.turbulence_model.process_noise_variance,
             )
         )
 
@@ -110,8 +110,8 @@ class EffectivenessFilter:
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
-        effectiveness_by_surface = np.ones(len(self.context.surfaces))
-        effectiveness_by_surface[self.leading_surface_indices] += np.clip(
+        surface_effectiveness_estimates = np.ones(len(self.context.surfaces))
+        surface_effectiveness_estimates[self.leading_surface_indices] += np.clip(
             self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0
         )
         most_significant_axis = int(np.argmax(self.wald_statistics()))
@@ -122,7 +122,7 @@ class EffectivenessFilter:
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
         surface_index = self.leading_surface_indices[most_significant_axis]
         effectiveness_change, surface_name = (
-            float(effectiveness_by_surface[surface_index] - 1.0),
+            float(surface_effectiveness_estimates[surface_index] - 1.0),
             self.context.surfaces[surface_index],
         )
         return Verdict(
@@ -131,7 +131,7 @@ class EffectivenessFilter:
             surface_name,
             "loss_of_effectiveness",
             effectiveness_change,
-            effectiveness_by_surface,
+            surface_effectiveness_estimates,
             statistic,
         )
 
@@ -151,9 +151,9 @@ class AugmentedEkf(EffectivenessFilter):
             measured.acceleration
             + measured.contribution[:, self.leading_surface_indices] @ self.z[3:N_STATES_WITHOUT_GUSTS]
         )
-        if self.air_rotation_model.n_states:
-            self.z[:3] += self.air_rotation_model.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
-            self.z[N_STATES_WITHOUT_GUSTS:] *= self.air_rotation_model.decay_factor
+        if self.turbulence_model.n_states:
+            self.z[:3] += self.turbulence_model.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
+            self.z[N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.decay_factor
         self.P = F @ self.P @ F.T
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
@@ -165,9 +165,9 @@ class AugmentedEkf(EffectivenessFilter):
         f_at_steps = f(np.concatenate((measured.x + rate_steps, measured.x - rate_steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
         F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surface_indices]
-        F[:3, N_STATES_WITHOUT_GUSTS:] = self.air_rotation_model.rate_effect
+        F[:3, N_STATES_WITHOUT_GUSTS:] = self.turbulence_model.rate_effect
         F[range(N_STATES_WITHOUT_GUSTS, self.n_states), range(N_STATES_WITHOUT_GUSTS, self.n_states)] = (
-            self.air_rotation_model.decay_factor
+            self.turbulence_model.decay_factor
         )
         return F
 
@@ -194,7 +194,7 @@ class AugmentedUkf(EffectivenessFilter):
     def propagate(self, measured: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
         state_points, point_weights = sigma_points(
-            self.z, self.P, self.options["spread"] + self.air_rotation_model.n_states
+            self.z, self.P, self.options["spread"] + self.turbulence_model.n_states
         )
         state_points = self.propagate_points(state_points, measured)
         self.z = point_weights @ state_points
@@ -214,11 +214,11 @@ class AugmentedUkf(EffectivenessFilter):
             ]
         )
         propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_accelerations)
-        if self.air_rotation_model.n_states:
+        if self.turbulence_model.n_states:
             propagated_points[:, :3] += (
-                state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.air_rotation_model.rate_effect.T
+                state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.turbulence_model.rate_effect.T
             )
-            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.air_rotation_model.decay_factor
+            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.decay_factor
         return propagated_points
 
     def update_statistic(self, normalised_innovation_square: float) -> float:

@@ -14,10 +14,10 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 from beaver_ftc.diagnosis.rivals.kalman import (
-    AirRotationModel,
+    TurbulenceModel,
     log_likelihood,
     unexplained_acceleration_size,
-    update_state,
+    update_state_and_covariance,
 )
 
 LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
@@ -82,18 +82,18 @@ class InteractingMultipleModels:
         self.transition_probabilities = transition_matrix(self.options["stay"], N_MODES)
         self.mode_probabilities = np.full(N_MODES, _MIN_MODE_PROBABILITY)
         self.mode_probabilities[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
-        self.air_rotation_model = AirRotationModel(context)
+        self.turbulence_model = TurbulenceModel(context)
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.R = np.diag(measured_rate_variance)
-        self.x = np.zeros((N_MODES, 3 + self.air_rotation_model.n_states))
+        self.x = np.zeros((N_MODES, 3 + self.turbulence_model.n_states))
         self.P = np.tile(
-            np.diag(np.concatenate((measured_rate_variance, self.air_rotation_model.initial_variance))),
+            np.diag(np.concatenate((measured_rate_variance, self.turbulence_model.initial_variance))),
             (N_MODES, 1, 1),
         )
-        self.F = np.eye(3 + self.air_rotation_model.n_states)
+        self.F = np.eye(3 + self.turbulence_model.n_states)
         self.F[:3, 3:], self.F[3:, 3:] = (
-            self.air_rotation_model.rate_effect,
-            np.diag(self.air_rotation_model.decay_factor),
+            self.turbulence_model.rate_effect,
+            np.diag(self.turbulence_model.decay_factor),
         )
         self.acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
         self.acceleration_noise_scale[-1] = self.options["unknown_noise"]
@@ -108,16 +108,16 @@ class InteractingMultipleModels:
         x, P, predicted_probabilities = mix_states(
             self.x, self.P, self.mode_probabilities, self.transition_probabilities
         )
-        if self.air_rotation_model.n_states:
+        if self.turbulence_model.n_states:
             x, P = x @ self.F.T, self.F @ P @ self.F.T
-            P[:, range(3, 6), range(3, 6)] += self.air_rotation_model.process_noise_variance
+            P[:, range(3, 6), range(3, 6)] += self.turbulence_model.process_noise_variance
         x[:, :3] += self.dt * self.accelerations(measured)
         unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
         P[:, :3, :3] += np.einsum(
             "m,ij->mij", (self.dt * self.acceleration_noise_scale) ** 2, np.diag(unexplained_acceleration**2)
         )
         nu = measured.x - x[:, :3]
-        self.x, self.P, S = update_state(x, P, nu, self.R)
+        self.x, self.P, S = update_state_and_covariance(x, P, nu, self.R)
         self.mode_probabilities = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))
         return self.latch_alarm_and_decide_verdict()
 
@@ -138,16 +138,16 @@ class InteractingMultipleModels:
             return Verdict(statistic=statistic)
         unknown_fault_probability = float(self.mode_probabilities[-1])
         loss_mode_probabilities = self.mode_probabilities[1:-1].reshape(3, len(LOSS_THETA_LEVELS))
-        loss_probability_by_main_surface = loss_mode_probabilities.sum(axis=1)
+        main_surface_loss_probabilities = loss_mode_probabilities.sum(axis=1)
         if unknown_fault_probability > self.options["isolate"]:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)
-        most_likely_axis = int(np.argmax(loss_probability_by_main_surface))
-        if loss_probability_by_main_surface[most_likely_axis] < self.options["isolate"]:
+        most_likely_axis = int(np.argmax(main_surface_loss_probabilities))
+        if main_surface_loss_probabilities[most_likely_axis] < self.options["isolate"]:
             min_candidate_probability = 1.0 - self.options["isolate"]
             candidates = tuple(
                 main_surface_name
                 for main_surface_name, loss_probability in zip(
-                    self.context.leaders, loss_probability_by_main_surface, strict=True
+                    self.context.leaders, main_surface_loss_probabilities, strict=True
                 )
                 if loss_probability > min_candidate_probability
             )
@@ -155,7 +155,7 @@ class InteractingMultipleModels:
         effectiveness_change = float(
             loss_mode_probabilities[most_likely_axis]
             @ LOSS_THETA_LEVELS
-            / loss_probability_by_main_surface[most_likely_axis]
+            / main_surface_loss_probabilities[most_likely_axis]
         )
         surface_name = self.context.leaders[most_likely_axis]
         return Verdict(

@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 
 
-class AirRotationModel:
+class TurbulenceModel:
     """The model of turbulence: rotation of the air about n_states axes, 3, or 0 if no turbulence is declared.
 
     decay_factor (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
@@ -46,7 +46,7 @@ def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.n
     )
 
 
-def update_state(
+def update_state_and_covariance(
     state: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Condition (state, P) on the innovation nu (..., m) of the first m states; returns state, P and

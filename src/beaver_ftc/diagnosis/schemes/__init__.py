@@ -73,7 +73,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     conclusions.reset_conclusion(fdi["verdict"])
 
 
-def prepare_takeover_from_previous_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
+def prepare_takeover_with_previous_maxima(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
     """Prepare a configured diagnosis to take over from the one in `previous_fdi`, of the same flight.
 
     Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.

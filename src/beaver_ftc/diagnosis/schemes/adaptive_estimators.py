@@ -132,13 +132,13 @@ NO_DIAGNOSIS = CompiledScheme(
 class IsolationVariant(NamedTuple):
     """Lazy kernels of a row.
 
-    begin(fdi): start, at the alarm, with no knowledge of any fault.
+    begin_at_alarm(fdi): start with no knowledge of any fault.
     record_commands(fdi, prediction): record what each surface was commanded in the elapsed frame.
     isolate(fdi, measured, t, isolation_started_earlier): exclude faults at t s, and decide;
     isolation_started_earlier: it started a frame or more ago.
     """
 
-    begin: Callable[..., None]
+    begin_at_alarm: Callable[..., None]
     record_commands: Callable[..., None]
     isolate: Callable[..., None]
 
@@ -153,7 +153,7 @@ def start_or_continue_isolation(fdi, measured, t, was_detected_before):
     variant_index, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
     if not was_detected_before:
         isolation.start_estimators(fdi.isolation, fdi.bound.changing_gyro_error_bound, measured.x)
-        begin_isolation_variant(variant_index, fdi)
+        begin_isolation_variant_at_alarm(variant_index, fdi)
     alarm_is_not_initial_sensor_error = not sensor_monitor.surface_alarm_may_be_initial_error(
         monitor, fdi.verdict.detected_at_s
     )
@@ -205,10 +205,10 @@ def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
     statistical_detector = fdi.statistical
     position_estimator_index = fdi.layout.position_estimator[fie.surface]
-    parity_views = statistical_detector.views[: statistical_detector.n_views]
+    parity_view_records = statistical_detector.views[: statistical_detector.n_views]
     surface_G_column = fdi.isolation.estimator[position_estimator_index].frame_mean_effect.regressor
     return parity.views_exclude_surface(
-        parity_views,
+        parity_view_records,
         statistical_detector.test_config,
         statistical_detector.forces,
         statistical_detector.gust,
@@ -303,12 +303,12 @@ def judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier):
 
 
 @apart
-def skip_begin_loss_isolation(fdi):
+def skip_begin_at_alarm_for_losses(fdi):
     """The estimators are all that a loss needs (IsolationVariant)."""
 
 
 @apart
-def begin_fault_type_isolation(fdi):
+def begin_fault_type_isolation_at_alarm(fdi):
     """Start the feasible sets of all types (IsolationVariant)."""
     registry.restart_fault_types(fdi.types)
 
@@ -326,25 +326,25 @@ def record_surface_commands(fdi, prediction):
 
 ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY = {
     ("published", "worst-case"): IsolationVariant(
-        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_worst_case
+        skip_begin_at_alarm_for_losses, skip_record_commands_for_losses, isolate_loss_by_worst_case
     ),
     ("published", "either"): IsolationVariant(
-        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_either_detector
+        skip_begin_at_alarm_for_losses, skip_record_commands_for_losses, isolate_loss_by_either_detector
     ),
     ("published", "statistical"): IsolationVariant(
-        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_statistics
+        skip_begin_at_alarm_for_losses, skip_record_commands_for_losses, isolate_loss_by_statistics
     ),
     ("all", "worst-case"): IsolationVariant(
-        begin_fault_type_isolation, record_surface_commands, isolate_fault_type_by_worst_case
+        begin_fault_type_isolation_at_alarm, record_surface_commands, isolate_fault_type_by_worst_case
     ),
     ("all", "either"): IsolationVariant(
-        begin_fault_type_isolation, record_surface_commands, isolate_fault_type_by_either_detector
+        begin_fault_type_isolation_at_alarm, record_surface_commands, isolate_fault_type_by_either_detector
     ),
 }
 PUBLISHED_WORST_CASE_VARIANT_INDEX = 0  # the place of the published class without statistics
 
-begin_isolation_variant = one_of(
-    [variant.begin for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
+begin_isolation_variant_at_alarm = one_of(
+    [variant.begin_at_alarm for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
 )
 record_commands_in_variant = one_of(
     [variant.record_commands for variant in ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values()]
@@ -372,7 +372,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     blocks = statistical_detector.block
     gust = statistical_detector.gust
     forces_record = statistical_detector.forces
-    parity_views = statistical_detector.views[: statistical_detector.n_views]
+    parity_view_records = statistical_detector.views[: statistical_detector.n_views]
     inertial_gust = statistical_detector.inertial_gust
     frame_means = prediction.frame_means
     acceleration_innovation, dt = fdi.bank.output.innovation, fdi.config.dt
@@ -399,10 +399,15 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         may_loss_end,
     )
     parity.set_view_use_directions_signatures(
-        parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
+        parity_view_records,
+        forces_record,
+        gust,
+        fdi.bound,
+        frame_means.previous_G,
+        frame_means.Gu_with_previous_G,
     )
     parity.fill_view_innovations_noise_regressors(
-        parity_views,
+        parity_view_records,
         test_config.uses_regressors,
         statistical_detector.noise,
         blocks,
@@ -413,7 +418,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         y[AIRSPEED],
     )
     parity.update_view_tests(
-        parity_views,
+        parity_view_records,
         test_config,
         statistical_detector.tone_config,
         y,
@@ -426,7 +431,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         statistical_detector.alarm,
         test_config,
         blocks,
-        parity_views,
+        parity_view_records,
         forces_record,
         gust,
         t,
@@ -566,10 +571,10 @@ def update_verdict(fdi, prediction, measured, t):
 def record_engine_failure_or_find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    engine_yawing_moment_coefficient_bound = fdi.bound.error_map.engine_asymmetry_bound_now
+    healthy_engine_asymmetry_bound = fdi.bound.error_map.engine_asymmetry_bound_now
     conclusion_record = fdi.verdict
     if not conclusion_record.detected and monitors.detect_engine_failure(
-        fdi.engine_monitor, engine_yawing_moment_coefficient_bound, y
+        fdi.engine_monitor, healthy_engine_asymmetry_bound, y
     ):
         conclusion.set_isolated_estimator_and_time(conclusion_record, UNANTICIPATED, t)
         return YAW

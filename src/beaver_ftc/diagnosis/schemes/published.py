@@ -130,7 +130,7 @@ def fill_input_basis(network, i, input_index, n_centres, input_value):
 
 
 @kernel
-def evaluate_state_network(network, main_surface_indices, x, y, u):
+def fill_state_network_basis_and_output(network, main_surface_indices, x, y, u):
     """Fill basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
 
     x (3,) rad/s; y: measured signals; u (n,) rad; main_surface_indices (3,): the surface that leads each
@@ -176,17 +176,20 @@ def train_fdae_network_if_due(published_record, fdae, is_detected, dt):
 
     Without the dead zone it learns from the first frame on, with any residual.
     """
-    is_outside_threshold = False
+    is_any_axis_outside_threshold = False
     for i in range(3):
-        is_outside_threshold = is_outside_threshold or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
-    if not published_record.config.uses_dead_zone or (is_detected and is_outside_threshold):
+        is_any_axis_outside_threshold = (
+            is_any_axis_outside_threshold or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
+        )
+    if not published_record.config.uses_dead_zone or (is_detected and is_any_axis_outside_threshold):
         train_state_network(published_record.network, fdae.output.residual, dt)
 
 
 @kernel
 def update_fdae_network_output(published_record, fdae, main_surface_indices, x, y, u):
-    """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
-    evaluate_state_network(published_record.network, main_surface_indices, x, y, u)
+    """Evaluate fhat for this frame, for the FDAE and the log; arguments as of
+    `fill_state_network_basis_and_output`."""
+    fill_state_network_basis_and_output(published_record.network, main_surface_indices, x, y, u)
     replace_network_output(fdae.network, published_record.network.output)
 
 

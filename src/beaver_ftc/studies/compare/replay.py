@@ -128,7 +128,7 @@ def record(scenario: Scenario) -> Recording:
     if scenario.fdi.statistical is not None and diagnosis.gust.subtracts_measured_gust:
         recording.air, recording.air_noise = (
             np.array(air),
-            np.sqrt(diagnosis.acceleration_variance_by_input_noise),
+            np.sqrt(diagnosis.acceleration_variance_from_input_noise),
         )
     return recording
 

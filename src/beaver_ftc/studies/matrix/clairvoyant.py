@@ -70,6 +70,8 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = context_of(loop.frames, exact, loop.start, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.gust.subtracts_measured_gust:
-        context = context_with_measured_gust(context, np.sqrt(diagnosis.acceleration_variance_by_input_noise))
+        context = context_with_measured_gust(
+            context, np.sqrt(diagnosis.acceleration_variance_from_input_noise)
+        )
     loop.release()
     return context, coefficients

@@ -945,10 +945,10 @@ def _sum_of_unit_vectors(component_indices: tuple[int, ...]) -> tuple[float, ...
 
 def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     """The capacities that the records of an aircraft need."""
-    axis_of_term = [moment_axis_of_term(term) for term in aircraft.moments]
+    axes_of_moment_terms = [moment_axis_of_term(term) for term in aircraft.moments]
     parity_directions = list(iterate_parity_directions(aircraft, aircraft.forces_separate_surfaces))
     max_rate_regressors = N_INPUT_READINGS + max(
-        axis_of_term.count(PITCH), axis_of_term.count(ROLL) + axis_of_term.count(YAW)
+        axes_of_moment_terms.count(PITCH), axes_of_moment_terms.count(ROLL) + axes_of_moment_terms.count(YAW)
     )
     max_force_regressors = (
         max(
@@ -958,12 +958,12 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
         + forces.MAX_FORCE_REGRESSORS
         - MAX_TERMS_OF_ONE
     )
-    axis_of_loss = [
+    axes_of_losses = [
         aircraft.dominant_axis[aircraft.surfaces.index(surface_name)]
         for surface_name in aircraft.class_of_losses
     ]
     max_loss_surfaces_per_rate_block = max(
-        axis_of_loss.count(PITCH), axis_of_loss.count(ROLL) + axis_of_loss.count(YAW)
+        axes_of_losses.count(PITCH), axes_of_losses.count(ROLL) + axes_of_losses.count(YAW)
     )
     max_tested_losses_per_view = max(
         len(parity_direction.loss_tested_surface_indices) for parity_direction in parity_directions
@@ -1025,7 +1025,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             [] if is_pitch_view_in_gusts else loss_tested_surface_indices[: len(block["hypothesis"]) - 1]
         )
         hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surface_indices)]
-        n_regressors = int(rate_block["n_regressors"])
+        n_regressors_so_far = int(rate_block["n_regressors"])
         block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(hypothesis_kinds), 1.0
         block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
         block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
@@ -1035,7 +1035,9 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             "uncertainty_change_over_bound_per_frame",
         ):
             block[field_name] = rate_block[field_name]
-        block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
+        block["regressor_tolerance"][:n_regressors_so_far] = rate_block["regressor_tolerance"][
+            :n_regressors_so_far
+        ]
         if may_use_vane_gust_estimate and subtracts_gust_estimate_from_rates:
             view["confirming_force_component"] = (
                 NORMAL_FORCE if plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
@@ -1044,15 +1046,15 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
             view["confirming_force_component"] = plane_axes[1]
             view["always_uses_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
-            block["regressor_tolerance"][n_regressors : n_regressors + n_force_regressors] = force_record[
-                "regressor_tolerance"
-            ][:n_force_regressors]
-            n_regressors += n_force_regressors
+            block["regressor_tolerance"][n_regressors_so_far : n_regressors_so_far + n_force_regressors] = (
+                force_record["regressor_tolerance"][:n_force_regressors]
+            )
+            n_regressors_so_far += n_force_regressors
             if uses_inertial_flow_angle:
-                block["regressor_tolerance"][n_regressors] = force_record["flow_angle_drift_bound"]
-                n_regressors = n_regressors + 1
-        block["n_regressors"] = n_regressors + (orthogonal_to_surface != AXIS_VIEW)
-        block["regressor_tolerance"][n_regressors] = float(
+                block["regressor_tolerance"][n_regressors_so_far] = force_record["flow_angle_drift_bound"]
+                n_regressors_so_far = n_regressors_so_far + 1
+        block["n_regressors"] = n_regressors_so_far + (orthogonal_to_surface != AXIS_VIEW)
+        block["regressor_tolerance"][n_regressors_so_far] = float(
             orthogonal_to_surface != AXIS_VIEW
         )  # of the leak, which is worked out in flight
         hypotheses = block["hypothesis"][: len(hypothesis_kinds)]

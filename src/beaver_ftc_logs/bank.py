@@ -243,10 +243,10 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     )
     initial_covariance[3, 3] = settings.gain_sd**2
     initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
-        settings.group_gain_sd** 2 + _gain_variance_beyond_level_step(model)
+        settings.group_gain_offset_sd** 2 + _gain_variance_beyond_level_step(model)
     )
     return_times_s = np.array(
-        [np.inf] * 3 + [settings.gain_return_time_s] + [settings.group_gain_return_time_s] * n_groups
+        [np.inf] * 3 + [settings.gain_return_time_s] + [settings.group_gain_offset_return_time_s] * n_groups
     )
     deviation_retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
     random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_hypothesis_bank
-from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
+from beaver_ftc_logs.filtering import (
+    any_fault_log_odds_gains,
+    hypothesis_state_and_noise_posterior,
+    page_cusum,
+)
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import expand_group_values_to_surfaces, unexplained_rates_and_responses
@@ -94,7 +98,7 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     check_log_fits_model(samples, model)
     bank = build_hypothesis_bank(model)
     samples_with_bad_rates_unknown = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
-    posterior, _, _ = hypothesis_posterior(samples_with_bad_rates_unknown, model, bank)
+    posterior, _, _ = hypothesis_state_and_noise_posterior(samples_with_bad_rates_unknown, model, bank)
     has_no_response = posterior[:, bank.no_response_hypothesis_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = diagnosis_rows_from_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
@@ -285,7 +289,9 @@ def diagnosis_rows_from_posterior(
         fault_probability >= model.settings.fault_probability_for_alarm, model
     )
     if alarm_evidence_threshold is not None:
-        naming_evidence_threshold = model.settings.isolation_evidence_factor * alarm_evidence_threshold
+        naming_evidence_threshold = (
+            model.settings.isolation_to_alarm_evidence_ratio * alarm_evidence_threshold
+        )
         has_alarm_evidence = (fault_evidence >= alarm_evidence_threshold) & ~is_health_or_no_response_likelier
         has_isolation_evidence = (
             page_cusum(evidence_increments, naming_evidence_threshold) >= naming_evidence_threshold

@@ -42,7 +42,7 @@ BankRunResult = tuple[Floats, Floats, Floats, Floats]
 """As `run_bank` returns it."""
 
 
-def hypothesis_posterior(
+def hypothesis_state_and_noise_posterior(
     samples: Samples, model: Model, bank: HypothesisBank
 ) -> tuple[Floats, Floats, Floats]:
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
@@ -52,7 +52,7 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_noise_covariance = model.with_covariance_of_noise_model(samples.noise_ma_coefficients)
+    model_with_noise_covariance = model.with_inflated_covariance_of_noise_model(samples.noise_ma_coefficients)
     command_delay_offset_candidates_s = model.settings.command_delay_offset_candidates_s
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_covariance, bank)
@@ -74,9 +74,9 @@ def _posterior_averaged_over_noise_models(
     ]
     sample_log_likelihoods_by_model = [
         _noise_model_log_likelihood(
-            flight, model_with_one_noise_model, model_with_one_noise_model.noise_models[0]
+            whitened_flight, model_with_one_noise_model, model_with_one_noise_model.noise_models[0]
         )
-        for flight, model_with_one_noise_model in whitened_flights_and_models
+        for whitened_flight, model_with_one_noise_model in whitened_flights_and_models
     ]
     noise_model_probabilities = _model_probabilities_with_forgetting(
         sample_log_likelihoods_by_model, model.rate_hz
@@ -90,11 +90,13 @@ def _posterior_averaged_over_noise_models(
     ]
     bank_runs = [
         _run_bank_on_flight(
-            first_samples(flight, n_samples),
-            model_with_one_noise_model.with_covariance_of_noise_model(flight.noise_ma_coefficients),
+            first_samples(whitened_flight, n_samples),
+            model_with_one_noise_model.with_inflated_covariance_of_noise_model(
+                whitened_flight.noise_ma_coefficients
+            ),
             bank,
         )
-        for (flight, model_with_one_noise_model), n_samples in zip(
+        for (whitened_flight, model_with_one_noise_model), n_samples in zip(
             whitened_flights_and_models, n_run_samples_by_model, strict=True
         )
         if n_samples
@@ -124,10 +126,12 @@ def _average_bank_runs(
     return averages[0], averages[1], averages[2]
 
 
-def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
+def _noise_model_log_likelihood(whitened_flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
     """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
     the covariance of the fit, without its inflation. The filter multiplied the samples by C(1)."""
-    is_predictable, rates_unexplained_by_past, group_responses = whitened_rates_and_responses(flight, model)
+    is_predictable, rates_unexplained_by_past, group_responses = whitened_rates_and_responses(
+        whitened_flight, model
+    )
     residual = np.nan_to_num(
         rates_unexplained_by_past
         - group_responses.sum(axis=1)
@@ -450,7 +454,7 @@ def _correct_hypotheses(
     noise_covariance = noise.covariance * noise_variance_scale
     t_degrees_of_freedom = noise.t_degrees_of_freedom
     for h in range(n_hypotheses):
-        sensitivity = _rate_sensitivity_to_states(
+        rate_sensitivity_by_state = _rate_sensitivity_by_state(
             bank.effectiveness[h],
             bank.response_share_scaled_by_group_gain[h],
             group_responses,
@@ -462,7 +466,7 @@ def _correct_hypotheses(
                 zero_state_mean,
                 zero_state_covariance,
                 rates_unexplained_by_past,
-                sensitivity,
+                rate_sensitivity_by_state,
                 noise_covariance,
                 noise,
             )
@@ -471,15 +475,15 @@ def _correct_hypotheses(
                 state_means[h],
                 state_covariances[h],
                 rates_unexplained_by_past,
-                sensitivity,
+                rate_sensitivity_by_state,
                 noise_covariance,
                 noise,
             )
-        limited_squared_residual = min(squared_residuals[h], noise.max_squared_residual)
+        squared_residual_for_log_likelihood = min(squared_residuals[h], noise.max_squared_residual)
         log_likelihoods[h] = noise.effective_sample_share * (
             -0.5
             * (t_degrees_of_freedom + 3.0)
-            * np.log(1.0 + limited_squared_residual / t_degrees_of_freedom)
+            * np.log(1.0 + squared_residual_for_log_likelihood / t_degrees_of_freedom)
             - 0.5 * log_determinant
         )
     max_hypothesis_log_likelihood = log_likelihoods.max()
@@ -502,19 +506,19 @@ def _correct_hypotheses(
 
 
 @kernel
-def _rate_sensitivity_to_states(
+def _rate_sensitivity_by_state(
     effectiveness, response_share_scaled_by_group_gain, group_responses, intercept_rad_s, n_states
 ):
     """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
     multiplies the intercept and all group_responses (G, 3) times effectiveness (G,); and to each group's own
     gain, which multiplies the share response_share_scaled_by_group_gain (G,) of its response."""
-    sensitivity = np.zeros((n_states, 3))
-    sensitivity[:3] = np.eye(3)
-    sensitivity[3] = intercept_rad_s
+    rate_sensitivity_by_state = np.zeros((n_states, 3))
+    rate_sensitivity_by_state[:3] = np.eye(3)
+    rate_sensitivity_by_state[3] = intercept_rad_s
     for g in range(len(effectiveness)):
-        sensitivity[4 + g] = response_share_scaled_by_group_gain[g] * group_responses[g]
-        sensitivity[3] += effectiveness[g] * group_responses[g]
-    return sensitivity
+        rate_sensitivity_by_state[4 + g] = response_share_scaled_by_group_gain[g] * group_responses[g]
+        rate_sensitivity_by_state[3] += effectiveness[g] * group_responses[g]
+    return rate_sensitivity_by_state
 
 
 @kernel
@@ -526,10 +530,16 @@ def _limit_states(state_means, min_state, max_state):
 
 @kernel
 def _update_gaussian(
-    state_mean, state_covariance, rates_unexplained_by_past, state_sensitivity, noise_covariance, noise
+    state_mean,
+    state_covariance,
+    rates_unexplained_by_past,
+    rate_sensitivity_by_state,
+    noise_covariance,
+    noise,
 ):
     """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by
-    rates_unexplained_by_past (3,) = state_sensitivity' state_mean + noise, state_sensitivity (N, 3).
+    rates_unexplained_by_past (3,) = rate_sensitivity_by_state' state_mean + noise, with
+    rate_sensitivity_by_state (N, 3).
 
     Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
     The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
@@ -540,13 +550,13 @@ def _update_gaussian(
     residual = rates_unexplained_by_past.copy()
     for i in range(n_states):
         for j in range(3):
-            residual[j] -= state_mean[i] * state_sensitivity[i, j]
+            residual[j] -= state_mean[i] * rate_sensitivity_by_state[i, j]
             for k in range(n_states):
-                cross_covariance[i, j] += state_covariance[i, k] * state_sensitivity[k, j]
+                cross_covariance[i, j] += state_covariance[i, k] * rate_sensitivity_by_state[k, j]
     for i in range(n_states):
         for j in range(3):
             for k in range(3):
-                residual_covariance[j, k] += state_sensitivity[i, j] * cross_covariance[i, k]
+                residual_covariance[j, k] += rate_sensitivity_by_state[i, j] * cross_covariance[i, k]
     inverse_residual_covariance, determinant = _invert_symmetric(residual_covariance)
     kalman_gain = np.zeros((n_states, 3))
     squared_residual = 0.0

@@ -26,7 +26,7 @@ DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
 _MIN_COSINE_OF_PROPORTIONAL_EFFECTS = 0.9
 _MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
-_PROPORTIONAL_COMMANDS_NOTE = (
+_SURFACES_OF_ONE_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
     "together."
@@ -118,7 +118,7 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
         "low": rows.effectiveness_low,
         "high": rows.effectiveness_high,
     }
-    medians = {
+    effectiveness_medians_by_key = {
         key: np.median(effectiveness_column[begin:end], axis=0)
         for key, effectiveness_column in effectiveness_columns_by_key.items()
     }
@@ -129,7 +129,7 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
         "named": main_name,
         "probability": float(rows.fault_probability[begin:end].max()),
         "effectiveness": {
-            name: {key: float(median[i]) for key, median in medians.items()}
+            name: {key: float(median[i]) for key, median in effectiveness_medians_by_key.items()}
             for i, name in enumerate(surfaces)
             if name in reported_surfaces
         },
@@ -209,21 +209,23 @@ def _event_text(event: Document) -> str:
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_hypothesis_bank(model)
-    standardized_responses = _standardized_group_responses(samples, model)
+    standardized_group_responses = _standardized_group_responses(samples, model)
     return {
         "together": [
-            {"surfaces": group, "says": _PROPORTIONAL_COMMANDS_NOTE.format(", ".join(group))}
+            {"surfaces": group, "says": _SURFACES_OF_ONE_GROUP_NOTE.format(", ".join(group))}
             for group in model.groups
             if len(group) > 1
         ],
         "groups": [
             {
                 "surfaces": group,
-                **_group_isolability_entry(standardized_responses, group_index, model, bank, samples.dt_s),
+                **_group_isolability_entry(
+                    standardized_group_responses, group_index, model, bank, samples.dt_s
+                ),
             }
             for group_index, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosine_entries(standardized_responses, model),
+        "alike": _group_pair_cosine_entries(standardized_group_responses, model),
         "columns_held_s": {
             name: round(mean_age_s, 4) for name, mean_age_s in samples.mean_age_s_by_held_column.items()
         },
@@ -235,27 +237,28 @@ def _standardized_group_responses(samples: Samples, model: Model) -> Floats:
     is_predictable, _, group_responses = unexplained_rates_and_responses(samples, model)
     group_responses = group_responses[is_predictable]
     residual_covariance = np.array(model.residual_covariance)
-    standardized_responses = np.linalg.solve(
+    standardized_group_responses = np.linalg.solve(
         np.linalg.cholesky(residual_covariance), group_responses.reshape(-1, 3).T
     ).T
     return np.asarray(
-        standardized_responses.reshape(group_responses.shape) * np.sqrt(model.settings.effective_sample_share)
+        standardized_group_responses.reshape(group_responses.shape)
+        * np.sqrt(model.settings.effective_sample_share)
     )
 
 
 def _group_isolability_entry(
-    standardized_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
+    standardized_group_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     required_log_odds = _log_odds_needed_for_alarm(model, bank, group_index, dt_s)
-    if not len(standardized_responses):
+    if not len(standardized_group_responses):
         return {
             "information_per_s": 0.0,
             "smallest_loss": _smallest_detectable_losses(0.0, required_log_odds),
         }
-    information_per_s = float((standardized_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
+    information_per_s = float((standardized_group_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
     conditional_information_per_s = (
-        _conditional_information_per_sample(standardized_responses, group_index) / dt_s
+        _conditional_information_per_sample(standardized_group_responses, group_index) / dt_s
     )
     return {
         "information_per_s": information_per_s,
@@ -267,17 +270,17 @@ def _group_isolability_entry(
     }
 
 
-def _conditional_information_per_sample(standardized_responses: Floats, group_index: int) -> float:
+def _conditional_information_per_sample(standardized_group_responses: Floats, group_index: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
-    n_samples, n_groups, n_axes = standardized_responses.shape
+    n_samples, n_groups, n_axes = standardized_group_responses.shape
     trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
     other_group_responses = [
-        standardized_responses[:, other_group_index].reshape(-1, 1)
+        standardized_group_responses[:, other_group_index].reshape(-1, 1)
         for other_group_index in range(n_groups)
         if other_group_index != group_index
     ]
     nuisance_regressors = np.column_stack([trim_regressors, *other_group_responses])
-    group_response = standardized_responses[:, group_index].reshape(-1)
+    group_response = standardized_group_responses[:, group_index].reshape(-1)
     unexplained_group_response = (
         group_response
         - nuisance_regressors @ np.linalg.lstsq(nuisance_regressors, group_response, rcond=None)[0]
@@ -287,15 +290,18 @@ def _conditional_information_per_sample(standardized_responses: Floats, group_in
 
 def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group_index)]
-    if not len(transition_shares):
+    settings, transition_shares_of_group = (
+        model.settings,
+        bank.transition_share[bank.is_fault_of_group(group_index)],
+    )
+    if not len(transition_shares_of_group):
         return float("inf")
-    transition_probability_per_sample = (
-        settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(transition_shares))
+    level_transition_probability_per_sample = (
+        settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(transition_shares_of_group))
     )
     return float(
         np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
-        - np.log(transition_probability_per_sample)
+        - np.log(level_transition_probability_per_sample)
     )
 
 
@@ -316,12 +322,12 @@ def _smallest_detectable_losses(
     }
 
 
-def _group_pair_cosine_entries(standardized_responses: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosine_entries(standardized_group_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pair_entries = []
     for first_group_index, second_group_index in combinations(range(len(model.groups)), 2):
-        first_response = standardized_responses[:, first_group_index].ravel()
-        second_response = standardized_responses[:, second_group_index].ravel()
+        first_response = standardized_group_responses[:, first_group_index].ravel()
+        second_response = standardized_group_responses[:, second_group_index].ravel()
         norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
         cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)
         surfaces = [model.groups[first_group_index], model.groups[second_group_index]]

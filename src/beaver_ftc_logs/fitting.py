@@ -19,7 +19,11 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_trim_and_gain_state_model
 from beaver_ftc_logs.diagnose import DiagnosisRows, diagnosis_rows_from_posterior
-from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
+from beaver_ftc_logs.filtering import (
+    any_fault_log_odds_gains,
+    hypothesis_state_and_noise_posterior,
+    page_cusum,
+)
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import Samples, constant_stretches
@@ -86,10 +90,10 @@ _RANK_TOLERANCE = 1e-9
 _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
 """Number of held-out flights that are also read with each mistake in their columns. The largest gain in
 likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
-_MAX_CROSS_VALIDATION_SPLITS, _MAX_GROUP_GAIN_STANDARD_ERROR = 12, 0.33
+_MAX_CROSS_VALIDATION_SPLITS, _GROUP_GAIN_STANDARD_ERROR_CAP = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
-_MAX_COLUMN_GAIN_STANDARD_ERROR = 1e3
-_N_PRIOR_EFFECTIVENESS_CHANGES = 20
+_COLUMN_GAIN_STANDARD_ERROR_CAP = 1e3
+_N_PRIOR_CHANGES_FOR_REPAIR_SHARE = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
 _CREDIBLE_MASS_CANDIDATES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 _CREDIBLE_COVERAGE_GOAL = 0.93
@@ -159,7 +163,7 @@ def fit_model(
     n_rate_lags, n_command_lags = choose_model_order(usable_flights, vehicle)
     model = _fit_model_of_order(usable_flights, vehicle, n_rate_lags, n_command_lags)
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(usable_flights, model)})
-    return _with_inflated_noise(usable_flights, model) if model.noise_models else model
+    return _with_noise_inflated_for_gain_errors(usable_flights, model) if model.noise_models else model
 
 
 def fit_with_same_order(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
@@ -206,13 +210,13 @@ def _fold_models_and_held_out_flights(
             fitted_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
         )
         gain_standard_errors = group_gain_standard_error(rate_regression, model).tolist()
-        fitted_ranges = FittedRanges(
+        partial_fitted_ranges = FittedRanges(
             commands=[],
             rates=[],
             gain_sd=gain_standard_errors,
             tied=effect_share_explained_by_other_regressors,
         )
-        yield fold_model.model_copy(update={"fitted_ranges": fitted_ranges}), held_out_flights
+        yield fold_model.model_copy(update={"fitted_ranges": partial_fitted_ranges}), held_out_flights
 
 
 def choose_model_order(usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle) -> tuple[int, int]:
@@ -492,8 +496,8 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         ),
         **(_FILTER_SETTINGS_FOR_OTHER_DAYS | other_laws_settings),
         delays_s=command_delay_offset_candidates_s,
-        repair_share=(n_repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
-        / (n_effectiveness_changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
+        repair_share=(n_repairs + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE / 2)
+        / (n_effectiveness_changes + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE),
         power=_EFFECTIVE_SAMPLE_SHARE_LABELLED,
     )
 
@@ -511,29 +515,35 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    normalized_squared_gain_error_sum = n_gains = float(len(model.groups))
+    held_out_normalized_error_sum = n_gains_over_flights = float(len(model.groups))
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
         usable_flights,
         model,
         trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
-        group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
+        is_group_effect_separable = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
-            group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
-            group_responses = group_responses.sum(axis=3)[:, :, group_has_known_effect].reshape(
+            group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
+            group_responses = group_responses.sum(axis=3)[:, :, is_group_effect_separable].reshape(
                 residual.size, -1
             )
-            normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
-                group_responses, residual.ravel(), _prior_gain_covariance(fold_model, group_has_known_effect)
+            flight_normalized_squared_gain_error, n_determined_gains_of_flight = (
+                _normalized_squared_gain_error_and_rank(
+                    group_responses,
+                    residual.ravel(),
+                    _prior_total_group_gain_covariance(fold_model, is_group_effect_separable),
+                )
             )
-            normalized_squared_gain_error_sum = (
-                normalized_squared_gain_error_sum + normalized_squared_gain_error
+            held_out_normalized_error_sum = (
+                held_out_normalized_error_sum + flight_normalized_squared_gain_error
             )
-            n_gains = n_gains + n_determined_gains
-    return normalized_squared_gain_error_sum / n_gains
+            n_gains_over_flights = n_gains_over_flights + n_determined_gains_of_flight
+    return held_out_normalized_error_sum / n_gains_over_flights
 
 
-def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
+def _with_noise_inflated_for_gain_errors(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model
+) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
@@ -546,13 +556,16 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
         model,
         trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
-        group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
-        prior_gain_covariance: Floats = np.asarray(
-            np.kron(_prior_gain_covariance(fold_model, group_has_known_effect), np.ones((3, 3))), dtype=float
+        is_group_effect_separable = np.array(trust.is_group_effect_known(fold_model))
+        prior_axis_gain_covariance: Floats = np.asarray(
+            np.kron(
+                _prior_total_group_gain_covariance(fold_model, is_group_effect_separable), np.ones((3, 3))
+            ),
+            dtype=float,
         )
         for held_out in held_out_flights:
-            group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
-            group_responses = group_responses[:, :, group_has_known_effect].reshape(*residual.shape, -1)
+            group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
+            group_responses = group_responses[:, :, is_group_effect_separable].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses = _without_mean(group_responses[window_rows])
@@ -560,7 +573,7 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
                 normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
-                    prior_gain_covariance,
+                    prior_axis_gain_covariance,
                 )
                 window_inflations_by_ma_coefficients.setdefault(
                     held_out.samples.noise_ma_coefficients, []
@@ -592,11 +605,12 @@ def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
     return len(noise_ma_coefficients) > 1 and noise_ma_coefficients[1] < 0.0
 
 
-def _prior_gain_covariance(model: Model, group_has_known_effect: NDArray[np.bool_]) -> Floats:
+def _prior_total_group_gain_covariance(model: Model, is_group_effect_separable: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
     initial_gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
     return np.asarray(
-        initial_gain_covariance[0, 0] + np.diag(np.diag(initial_gain_covariance)[1:][group_has_known_effect])
+        initial_gain_covariance[0, 0]
+        + np.diag(np.diag(initial_gain_covariance)[1:][is_group_effect_separable])
     )
 
 
@@ -622,7 +636,7 @@ def _normalized_squared_gain_error_and_rank(
     )
 
 
-def _standardized_responses_and_residual(
+def _standardized_centred_responses_and_residual(
     model: Model, held_out: FlightWithUsableRows
 ) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
@@ -631,7 +645,7 @@ def _standardized_responses_and_residual(
     whitening_matrix = np.linalg.inv(
         np.linalg.cholesky(
             np.array(
-                model.with_covariance_of_noise_model(
+                model.with_inflated_covariance_of_noise_model(
                     held_out.samples.noise_ma_coefficients
                 ).residual_covariance
             )
@@ -663,7 +677,7 @@ def _estimate_trim_walk_sd_per_sample(
         for held_out in held_out_flights:
             rows, residual, _ = rows_whitened_residual_and_responses(fold_model, held_out)
             noise_covariance = np.array(
-                fold_model.with_covariance_of_noise_model(
+                fold_model.with_inflated_covariance_of_noise_model(
                     held_out.samples.noise_ma_coefficients
                 ).residual_covariance
             )
@@ -783,9 +797,9 @@ def add_fitted_ranges_and_alarm_threshold(
         )
     gain_standard_errors = np.minimum(
         np.sqrt(group_gain_standard_error(rate_regression, model) ** 2 + gain_variance_between_laws),
-        _MAX_GROUP_GAIN_STANDARD_ERROR,
+        _GROUP_GAIN_STANDARD_ERROR_CAP,
     )
-    standard_error_by_rate_or_signal = gain_standard_error_by_column(
+    standard_error_by_rate_or_signal = rate_and_signal_gain_standard_error(
         rate_regression, model, float(gain_variance_between_laws.max())
     )
     fitted_ranges = trust.compute_fitted_ranges(
@@ -844,7 +858,7 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
     """
     if not model.noise_models:
         return np.zeros(len(model.groups))
-    unmodelled_variance_share = 0.0
+    ar_explained_variance_share = 0.0
     for noise_model in model.noise_models:
         residuals_by_flight = [
             rows_and_one_step_residuals(model, usable_flight)[1]
@@ -852,38 +866,40 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
             if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
         ]
         stacked_residuals, n_samples = np.vstack(residuals_by_flight), sum(map(len, residuals_by_flight))
-        variance_share_explained_by_chance = (
+        chance_ar_explained_variance_share = (
             3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
         )
-        log_determinant_ratio = (
+        ar_log_determinant_ratio = (
             np.linalg.slogdet(np.array(noise_model.residual_covariance))[1]
             - np.linalg.slogdet(np.cov(stacked_residuals.T))[1]
         )
-        unmodelled_variance_share = max(
-            unmodelled_variance_share,
-            1.0 - float(np.exp(log_determinant_ratio / 3.0)) - variance_share_explained_by_chance,
+        ar_explained_variance_share = max(
+            ar_explained_variance_share,
+            1.0 - float(np.exp(ar_log_determinant_ratio / 3.0)) - chance_ar_explained_variance_share,
         )
     unexplained_effect_power = trust.effect_power_unexplained_by_other_regressors(
         [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights], model
     )
     return np.minimum(
-        np.sqrt(3.0 * unmodelled_variance_share / np.maximum(unexplained_effect_power, MIN_DIVISOR)),
-        _MAX_GROUP_GAIN_STANDARD_ERROR,
+        np.sqrt(3.0 * ar_explained_variance_share / np.maximum(unexplained_effect_power, MIN_DIVISOR)),
+        _GROUP_GAIN_STANDARD_ERROR_CAP,
     )
 
 
 def _squared_group_gain_deviations_beyond_noise(model: Model, held_out: FlightWithUsableRows) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
-    group_responses, residual = _standardized_responses_and_residual(model, held_out)
+    group_responses, residual = _standardized_centred_responses_and_residual(model, held_out)
     group_responses = group_responses.sum(axis=3).reshape(residual.size, -1)
     squared_deviations_beyond_noise = np.full(group_responses.shape[1], np.nan)
-    group_has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
-    information = group_responses[:, group_has_known_effect].T @ group_responses[:, group_has_known_effect]
+    is_group_effect_separable = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
+    information = (
+        group_responses[:, is_group_effect_separable].T @ group_responses[:, is_group_effect_separable]
+    )
     gain_error_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
-    gain_errors = gain_error_covariance @ (group_responses[:, group_has_known_effect].T @ residual.ravel())
-    if group_has_known_effect.any():  # a part without a residual shows the effect of no group
-        squared_deviations_beyond_noise[group_has_known_effect] = np.maximum(
+    gain_errors = gain_error_covariance @ (group_responses[:, is_group_effect_separable].T @ residual.ravel())
+    if is_group_effect_separable.any():  # a part without a residual shows the effect of no group
+        squared_deviations_beyond_noise[is_group_effect_separable] = np.maximum(
             gain_errors**2 - np.diag(gain_error_covariance) * max(float((residual**2).mean()), 1.0), 0.0
         )
     return squared_deviations_beyond_noise
@@ -968,22 +984,22 @@ def _noise_scale_and_healthy_alarm_peaks(
     """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
-    posterior, _, noise_variance_scales = hypothesis_posterior(held_out.samples, model, bank)
+    posterior, _, noise_variance_scales = hypothesis_state_and_noise_posterior(held_out.samples, model, bank)
     evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
-    is_usable_and_healthy = (
+    is_usable_healthy_and_responding = (
         held_out.is_usable
         & ~(labels < 1.0).any(axis=1)
         & (posterior[:, bank.no_response_hypothesis_index] < 0.5)
     )
-    healthy_rows = np.flatnonzero(is_usable_and_healthy)
+    healthy_responding_rows = np.flatnonzero(is_usable_healthy_and_responding)
     cusum_runs = [
-        page_cusum(evidence_increments[healthy_rows[begin:end]], np.inf)
-        for begin, end in _begins_and_ends_of_consecutive_rows(healthy_rows)
+        page_cusum(evidence_increments[healthy_responding_rows[begin:end]], np.inf)
+        for begin, end in _begins_and_ends_of_consecutive_rows(healthy_responding_rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in cusum_runs])
     return float(noise_variance_scales[held_out.is_usable].max(initial=1.0)), (
         peaks,
-        len(healthy_rows) * held_out.samples.dt_s / 3600.0,
+        len(healthy_responding_rows) * held_out.samples.dt_s / 3600.0,
     )
 
 
@@ -1056,11 +1072,11 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
         1.0 / np.sqrt(response_factor_information)
         if model.vehicle.other_laws
         else relative_error_sd_of_summed_response,
-        _MAX_GROUP_GAIN_STANDARD_ERROR,
+        _GROUP_GAIN_STANDARD_ERROR_CAP,
     )
 
 
-def gain_standard_error_by_column(
+def rate_and_signal_gain_standard_error(
     rate_regression: regression.RateRegression, model: Model, gain_variance_between_laws: float
 ) -> dict[str, float]:
     """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
@@ -1092,7 +1108,7 @@ def gain_standard_error_by_column(
             float(
                 np.sqrt(max_covariance_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)
             ),
-            _MAX_COLUMN_GAIN_STANDARD_ERROR,
+            _COLUMN_GAIN_STANDARD_ERROR_CAP,
         )
     return standard_error_by_rate_or_signal
 
@@ -1146,7 +1162,7 @@ def _diagnosis_rows_by_credible_mass(
     model: Model, held_out: FlightWithUsableRows
 ) -> dict[float, DiagnosisRows]:
     bank = build_hypothesis_bank(model)
-    posterior, _, _ = hypothesis_posterior(held_out.samples, model, bank)
+    posterior, _, _ = hypothesis_state_and_noise_posterior(held_out.samples, model, bank)
     settings_per_mass = [
         model.settings.model_copy(update={"credible_mass": mass})
         for mass in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}

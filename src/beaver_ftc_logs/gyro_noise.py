@@ -24,16 +24,16 @@ def residual_predictor_by_yule_walker(
     covariance (3, 3) of the rest. process_covariance: Q (3, 3), (rad/s)2; gyro_noise_rad_s: standard
     deviation of a gyro."""
     autocovariance = _residual_autocovariance(model, process_covariance, gyro_noise_rad_s, n_lags)
-    past_residual_indices = np.arange(n_lags)
+    lag_indices_from_zero = np.arange(n_lags)
     covariance_blocks = np.array(
         [
-            [_autocovariance_at_lag(autocovariance, int(j - i)) for j in past_residual_indices]
-            for i in past_residual_indices
+            [_autocovariance_at_lag(autocovariance, int(j - i)) for j in lag_indices_from_zero]
+            for i in lag_indices_from_zero
         ]
     )
     past_residual_covariance = covariance_blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
     cross_covariance = np.concatenate(
-        [_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in past_residual_indices]
+        [_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in lag_indices_from_zero]
     )
     predictor_coefficients = np.linalg.solve(past_residual_covariance, cross_covariance)
     return np.asarray(predictor_coefficients), np.asarray(

@@ -55,9 +55,9 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     fold_entries, credible_mass = fitting.score_folds_and_choose_credible_mass(usable_flights, model)
     identification_results = {
         "assumed": assumption_lines,
-        "flights": [_used_samples_entry(usable_flight) for usable_flight in usable_flights],
+        "flights": [_flight_sample_count_entry(usable_flight) for usable_flight in usable_flights],
         "tests": fold_entries,
-        "another_day": expected_performance_on_another_day(fold_entries, model),
+        "another_day": another_day_scores_and_false_alarms(fold_entries, model),
         "collinear": collinear_regressors(usable_flights, model),
         "colour": median_standard_error_inflation_by_axis(usable_flights, model),
         "spectrum": residual_to_white_density_by_band(usable_flights, model),
@@ -128,8 +128,8 @@ def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tu
             assumption_lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
         has_airspeed = any(flight.airspeed is not None for flight in flights)
-        airspeed_text = "explains no more" if has_airspeed else "is not logged"
-        assumption_lines.append(f"reference_airspeed_mps: none, the airspeed {airspeed_text}")
+        no_airspeed_scaling_reason = "explains no more" if has_airspeed else "is not logged"
+        assumption_lines.append(f"reference_airspeed_mps: none, the airspeed {no_airspeed_scaling_reason}")
     return vehicle, assumption_lines
 
 
@@ -234,7 +234,7 @@ def _log_determinant_and_best_ma_coefficients(
     ), best_ma_coefficients
 
 
-def expected_performance_on_another_day(fold_entries: list[Document], model: Model) -> Document:
+def another_day_scores_and_false_alarms(fold_entries: list[Document], model: Model) -> Document:
     """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
     merit, false alarms an hour and how sure that is, and how many minutes would show it."""
     scores = [fold_entry["score"] for fold_entry in fold_entries if "score" in fold_entry]
@@ -328,21 +328,23 @@ def _scale_by_best_airspeed_powers(
         scaled_flights, vehicle
     )  # a criterion believes each sample, as only white noise lets it
 
-    def scale_and_whiten_flights(scaled_vehicle: Vehicle, reuses_whitening: bool = True) -> list[Samples]:
+    def scale_and_optionally_whiten_flights(
+        scaled_vehicle: Vehicle, whitens_if_air_moves: bool = True
+    ) -> list[Samples]:
         rescaled_flights = [
             with_airspeed_effects(
                 flight, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
             for flight in flights
         ]
-        if not (reuses_whitening and vehicle.moving_air):
+        if not (whitens_if_air_moves and vehicle.moving_air):
             return rescaled_flights
         return [
             whiten_samples(rescaled_flight, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
             for rescaled_flight, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
         ]
 
-    bic_to_beat = _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE
+    bic_to_beat = _min_bic(scale_and_optionally_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE
     surface_names = list(vehicle.surfaces)
     for surface_indices in regression.group_surfaces_by_commands(vehicle):
         for airspeed_power in _AIRSPEED_POWER_CANDIDATES:
@@ -351,10 +353,10 @@ def _scale_by_best_airspeed_powers(
             }
             candidate_vehicle = vehicle.model_copy(update={"airspeed_powers": candidate_powers})
             if (
-                bic := _min_bic(scale_and_whiten_flights(candidate_vehicle), candidate_vehicle)
+                bic := _min_bic(scale_and_optionally_whiten_flights(candidate_vehicle), candidate_vehicle)
             ) < bic_to_beat:
                 bic_to_beat, vehicle = bic, candidate_vehicle
-    return scale_and_whiten_flights(vehicle, reuses_whitening=False), vehicle
+    return scale_and_optionally_whiten_flights(vehicle, whitens_if_air_moves=False), vehicle
 
 
 def check_explained_variance(
@@ -394,7 +396,7 @@ def check_explained_variance(
             f"help: more than these {usable_minutes:.1f} min, commands that move more "
             f"({stillest_surface_and_sd[0]} has a standard "
             f"deviation of {stillest_surface_and_sd[1]:.2g}), or the commands that this vehicle follows"
-            f"{_remarks_on_rates(usable_flights, model)}"
+            f"{_rate_mistakes_text(usable_flights, model)}"
         )
 
 
@@ -409,7 +411,7 @@ def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> 
         )
 
 
-def _remarks_on_rates(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> str:
+def _rate_mistakes_text(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> str:
     """Return the mistakes found in the rates when the log was read, each after a semicolon."""
     rate_column_prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
     notes = [
@@ -431,7 +433,7 @@ def _command_sd_by_surface(
     return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
-def _used_samples_entry(usable_flight: fitting.FlightWithUsableRows) -> Document:
+def _flight_sample_count_entry(usable_flight: fitting.FlightWithUsableRows) -> Document:
     samples, is_usable = usable_flight.samples, usable_flight.is_usable
     return {
         "name": samples.name,
@@ -544,7 +546,7 @@ def identification_text(model: Model) -> str:
     output_error = results["output_error"]
     if "delay_s" in output_error:
         lines.append(
-            f"  output error: servo lag {_servo_lag_text(output_error)}, delay "
+            f"  output error: servo lag {_servo_lag_or_too_short_text(output_error)}, delay "
             f"{output_error['delay_s']:.3f} s (sd {output_error['delay_sd_s']:.3f}), explains "
             "of 2 s free runs not fitted "
             f"{_values_by_axis_text(output_error['explained_of_windows_not_fitted'])}"
@@ -573,11 +575,13 @@ def _another_day_sentences(expected_performance: Document, n_flights: int) -> li
     )
     lines = []
     if "classes" in expected_performance:
-        score_texts = [
+        mean_and_worst_score_texts = [
             f"{title} {expected_performance[key]['mean']:.3f} ({expected_performance[key]['worst']:.3f})"
             for key, title in _SCORE_TITLES.items()
         ]
-        lines.append(f"  expect of {left_out_unit_text}, mean (worst): {', '.join(score_texts)}")
+        lines.append(
+            f"  expect of {left_out_unit_text}, mean (worst): {', '.join(mean_and_worst_score_texts)}"
+        )
     if "false_alarms_per_hour" in expected_performance:
         false_alarm_entry = expected_performance["false_alarms_per_hour"]
         missing_minutes = expected_performance["minutes_missing"]
@@ -624,7 +628,7 @@ def _left_out_test_text(fold_entry: Document) -> str:
     )
 
 
-def _servo_lag_text(output_error_fit: Document) -> str:
+def _servo_lag_or_too_short_text(output_error_fit: Document) -> str:
     if output_error_fit["shorter_than_can_be_told"]:
         return "shorter than this rate can tell"
     return f"{output_error_fit['servo_lag_s']:.3f} s (sd {output_error_fit['servo_lag_sd_s']:.3f})"
@@ -656,7 +660,7 @@ def fit_output_error(
         return {"windows": len(window_rates), "says": "too few gap-free windows in which every rate moves"}
     fitted_window_slice, held_out_window_slice = slice(0, None, 2), slice(1, None, 2)
     rate_sd = window_rates.std(axis=(0, 1))
-    initial_parameters, min_parameters, max_parameters = _output_error_first_guess_and_bounds(
+    initial_parameters, min_parameters, max_parameters = _output_error_fixed_guess_and_bounds(
         len(surface_groups), dt_s
     )
 
@@ -678,10 +682,10 @@ def fit_output_error(
     standard_errors = np.sqrt(
         np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
     )
-    held_out_error_rad_s = (
+    held_out_simulation_errors_rad_s = (
         standardized_simulation_error(optimum.x, held_out_window_slice).reshape(-1, 3) * rate_sd
     )
-    explained_rate_variance_share = 1.0 - held_out_error_rad_s.var(axis=0) / window_rates[
+    explained_rate_variance_share = 1.0 - held_out_simulation_errors_rad_s.var(axis=0) / window_rates[
         held_out_window_slice
     ].reshape(-1, 3).var(axis=0)
     return {
@@ -735,7 +739,7 @@ def _cut_free_run_windows(
     )
 
 
-def _output_error_first_guess_and_bounds(n_groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
+def _output_error_fixed_guess_and_bounds(n_groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
     """First guess and bounds of lag, delay, A, B and c."""
     initial_parameters = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n_groups, 0.01), *np.zeros(3)]
     infinite_bounds = np.full(len(initial_parameters) - 2, np.inf)

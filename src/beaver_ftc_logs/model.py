@@ -73,10 +73,10 @@ class FilterSettings(Section):
         description="in which the control gain returns to the model's, s",
         alias="gain_time_s",
     )
-    group_gain_sd: Number = Field(
+    group_gain_offset_sd: Number = Field(
         0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
     )
-    group_gain_return_time_s: Number = Field(
+    group_gain_offset_return_time_s: Number = Field(
         2000.0,
         gt=0,
         le=_MAX_COEFFICIENT,
@@ -148,7 +148,7 @@ class FilterSettings(Section):
         description="evidence for a fault that raises the alarm, instead of both: for that rate",
         alias="threshold",
     )
-    isolation_evidence_factor: Number = Field(
+    isolation_to_alarm_evidence_ratio: Number = Field(
         1.0,
         ge=1,
         le=_MAX_COEFFICIENT,
@@ -309,14 +309,14 @@ class Model(Section):
             f"has {len(self.lagged_rate_and_signal_coefficients)} rows, "
             f"allowed: {n_past_rows}, as `identify` writes them: identify it again"
         )
-        mistakes: list[Conflict] = [(("past",), reason)] * (
+        conflicts: list[Conflict] = [(("past",), reason)] * (
             len(self.lagged_rate_and_signal_coefficients) != n_past_rows
         )
-        mistakes += [
+        conflicts += [
             *self._group_and_settings_mistakes(),
             *self._shape_mistakes(len(self.lagged_rate_and_signal_coefficients)),
         ]
-        refuse(mistakes)  # before any of it is computed with
+        refuse(conflicts)  # before any of it is computed with
         refuse(self._covariance_and_standard_error_mistakes())
         return self
 
@@ -341,7 +341,7 @@ class Model(Section):
     def _shape_mistakes(self, n_past_rows: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         n_groups = len(self.groups)
-        arrays_and_expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
+        key_paths_arrays_and_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
             (("past",), self.lagged_rate_and_signal_coefficients, (n_past_rows, 3)),
             (("response",), self.command_response, (n_groups, self.n_command_lags, 3)),
             (("response_sd",), self.command_response_standard_error, (n_groups, self.n_command_lags, 3)),
@@ -350,14 +350,14 @@ class Model(Section):
         for i, noise_model in enumerate(self.noise_models):
             noise_model_key_path = ("colours", i)
             n_ar_rows = -(-len(noise_model.ar_coefficients) // 3) * 3
-            arrays_and_expected_shapes += [
+            key_paths_arrays_and_shapes += [
                 ((*noise_model_key_path, "noise"), noise_model.residual_covariance, (3, 3)),
                 ((*noise_model_key_path, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
             ]
             if noise_model.ma_coefficients[0] != 1.0:
                 yield (*noise_model_key_path, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (fitted_ranges := self.fitted_ranges) is not None:
-            optional_arrays_and_shapes: list[tuple[str, object, tuple[int, ...]]] = [
+            fitted_keys_arrays_and_shapes: list[tuple[str, object, tuple[int, ...]]] = [
                 ("commands", fitted_ranges.command_ranges, (len(fitted_ranges.command_ranges), 2)),
                 ("rates", fitted_ranges.rate_ranges_rad_s, (3, 2)),
                 ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
@@ -366,10 +366,12 @@ class Model(Section):
                 ("tied", fitted_ranges.effect_share_explained_by_other_regressors, (n_groups,)),
                 ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
             ]  # fmt: skip
-            arrays_and_expected_shapes += [
-                (("fitted", key), array, shape) for key, array, shape in optional_arrays_and_shapes if array
+            key_paths_arrays_and_shapes += [
+                (("fitted", key), array, shape)
+                for key, array, shape in fitted_keys_arrays_and_shapes
+                if array
             ]
-        for key_path, array, shape in arrays_and_expected_shapes:
+        for key_path, array, shape in key_paths_arrays_and_shapes:
             if not _has_shape(array, shape):
                 shape_text = " x ".join(map(str, shape))
                 yield key_path, f"has another shape, allowed: {shape_text} numbers"
@@ -407,7 +409,7 @@ class Model(Section):
         """The model with one of its noise models only."""
         return self.model_copy(update={"noise_models": [noise_model]})
 
-    def with_covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
+    def with_inflated_covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its
         `covariance_inflation_of_noise_model`; the model itself where none was fitted.
 

@@ -594,7 +594,9 @@ def _whitening_sample_share_and_log_noise(samples: Samples, model: Model) -> tup
         samples.noise_ma_coefficients
     )
     noise_covariance_root = np.linalg.cholesky(
-        model.with_covariance_of_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
+        model.with_inflated_covariance_of_noise_model(
+            samples.noise_ma_coefficients
+        ).intercept_past_response_noise()[3]
         / covariance_inflation_of_fitted_noise
     )
     log_noise_sd_product = float(

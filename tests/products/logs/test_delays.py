@@ -50,7 +50,7 @@ def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
 def test_what_all_delays_say_together(changed):
     """The mean of what each alone does, by its weight, sample by sample."""
     samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), build_hypothesis_bank(MODEL)
-    together = filtering.hypothesis_posterior(samples, MODEL, bank)
+    together = filtering.hypothesis_state_and_noise_posterior(samples, MODEL, bank)
     runs = [
         filtering._run_bank_on_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
         for delay_s in DELAYS_S
@@ -70,5 +70,7 @@ def test_what_cannot_be_predicted_changes_no_number_to_none():
     samples = small.flight(MODEL, 60)
     rates = samples.rates.copy()
     rates[30] = np.nan
-    found = filtering.hypothesis_posterior(replace(samples, rates=rates), MODEL, build_hypothesis_bank(MODEL))
+    found = filtering.hypothesis_state_and_noise_posterior(
+        replace(samples, rates=rates), MODEL, build_hypothesis_bank(MODEL)
+    )
     assert all(np.isfinite(part).all() for part in found)

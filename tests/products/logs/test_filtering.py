@@ -12,7 +12,7 @@ from beaver_ftc_logs.filtering import (
     _model_probabilities_with_forgetting,
     _update_gaussian,
     _with_command_delay,
-    hypothesis_posterior,
+    hypothesis_state_and_noise_posterior,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
@@ -52,8 +52,8 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
     commands = healthy.commands.copy()
     commands[k + 1 :] += 0.3
     bank = build_hypothesis_bank(wing_model)
-    one = hypothesis_posterior(healthy, wing_model, bank)[0]
-    other = hypothesis_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
+    one = hypothesis_state_and_noise_posterior(healthy, wing_model, bank)[0]
+    other = hypothesis_state_and_noise_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
     assert np.array_equal(one[: k + 1], other[: k + 1])
     assert not np.array_equal(one[k + 2], other[k + 2])
 
@@ -78,7 +78,7 @@ def test_gains_return_in_their_time(wing_model):
     for _ in range(200_000):
         variance = own.deviation_retention**2 * variance + own.random_walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
-    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.group_gain_sd, rel=1e-3)
+    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.group_gain_offset_sd, rel=1e-3)
 
 
 def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
@@ -127,7 +127,7 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
             command_delay_offset_candidates_s=[0.0],
         )
         one, other = (
-            hypothesis_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
+            hypothesis_state_and_noise_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
             for flight in (drifting, healthy)
         )
         found[walk] = one - other
@@ -144,7 +144,7 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
     model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delay_offset_candidates_s=[0.0])
     bank = build_hypothesis_bank(model)
-    posterior, _, scale = hypothesis_posterior(replace(healthy, rates=rates), model, bank)
+    posterior, _, scale = hypothesis_state_and_noise_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
     answering = 1.0 - posterior[begin + 1 : end + 1, bank.no_response_hypothesis_index].mean()
     grown = np.log(scale[end] / scale[begin])

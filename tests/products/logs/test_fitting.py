@@ -443,7 +443,9 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
         fitting.trust, "effect_share_explained_by_other_regressors", lambda used, model: np.zeros(2)
     )
 
-    monkeypatch.setattr(fitting, "gain_standard_error_by_column", lambda fit, model, between: {"p": between})
+    monkeypatch.setattr(
+        fitting, "rate_and_signal_gain_standard_error", lambda fit, model, between: {"p": between}
+    )
 
     def copied(known):
         return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))

@@ -324,7 +324,7 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         share = 1.0 - left.var() / of.var()
         assert found["explained_of_windows_not_fitted"][name] == pytest.approx(share)
     assert (given["loss"], given["max_nfev"]) == ("soft_l1", 40)
-    start, low, high = identification._output_error_first_guess_and_bounds(2, 0.1)
+    start, low, high = identification._output_error_fixed_guess_and_bounds(2, 0.1)
     np.testing.assert_array_equal(given["start"], start)
     np.testing.assert_array_equal(given["bounds"], (low, high))
 
@@ -388,7 +388,7 @@ def test_of_many_windows_every_so_many_is_kept(n, kept_of):
 
 
 def test_where_the_fit_begins_and_what_it_may_say():
-    start, low, high = identification._output_error_first_guess_and_bounds(2, 0.05)
+    start, low, high = identification._output_error_fixed_guess_and_bounds(2, 0.05)
     assert start.tolist() == [
         0.1, 0.05, 0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7, *[0.01] * 6, 0, 0, 0,
     ]  # fmt: skip
@@ -431,5 +431,5 @@ def test_a_flight_without_a_healthy_sample_is_refused_by_its_name():
 def test_the_remarks_on_the_rates_of_every_flight_are_in_the_error():
     notes = ("q_rad_s: in deg/s", "roll: of no use"), (), ("r_rad_s: late", "p_rad_s: late", "q_rad_s2: odd")
     flights = [SimpleNamespace(samples=SimpleNamespace(notes=of)) for of in notes]
-    said = identification._remarks_on_rates(flights, MODEL)
+    said = identification._rate_mistakes_text(flights, MODEL)
     assert said == "; q_rad_s: in deg/s; r_rad_s: late; p_rad_s: late"

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_residual_noise
-from beaver_ftc_logs.filtering import _update_gaussian, hypothesis_posterior
+from beaver_ftc_logs.filtering import _update_gaussian, hypothesis_state_and_noise_posterior
 from beaver_ftc_logs.model import FittedRanges, NoiseModel, load_model, model_file_text
 from beaver_ftc_logs.regression import unexplained_rates_and_responses, whitened_rates_and_responses
 from beaver_ftc_logs.samples import whiten_samples
@@ -86,9 +86,11 @@ def test_a_model_of_two_colours_takes_the_likelier():
             one for one in model.noise_models if tuple(one.ma_coefficients) == white[i].noise_ma_coefficients
         ]
         alone = model.model_copy(update={"noise_models": own})
-        both = hypothesis_posterior(new, model, build_hypothesis_bank(model))[0][300:]
+        both = hypothesis_state_and_noise_posterior(new, model, build_hypothesis_bank(model))[0][300:]
         np.testing.assert_allclose(
-            both, hypothesis_posterior(new, alone, build_hypothesis_bank(model))[0][300:], atol=1e-6
+            both,
+            hypothesis_state_and_noise_posterior(new, alone, build_hypothesis_bank(model))[0][300:],
+            atol=1e-6,
         )
 
 
@@ -170,10 +172,10 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
         update={"noise_models": [model.noise_models[0].model_copy(update={"covariance_inflation": wider})]}
     )
     flight = replace(small.flight(model, 3000, seed=3), noise_ma_coefficients=(1.0,))
-    scale = hypothesis_posterior(flight, model, build_hypothesis_bank(model))[2]
+    scale = hypothesis_state_and_noise_posterior(flight, model, build_hypothesis_bank(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
     assert build_residual_noise(
-        model.with_covariance_of_noise_model((1.0,)), (1.0,)
+        model.with_inflated_covariance_of_noise_model((1.0,)), (1.0,)
     ).covariance == pytest.approx(wider * np.array(model.residual_covariance))
 
 
@@ -190,14 +192,16 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
         flight = replace(small.flight(model, 400, seed=5), noise_ma_coefficients=average)
         usable_flights = [fitting.FlightWithUsableRows(flight, np.ones(400, dtype=bool))]
         found.append(
-            fitting._with_inflated_noise(usable_flights, model).covariance_inflation_of_noise_model(average)
+            fitting._with_noise_inflated_for_gain_errors(
+                usable_flights, model
+            ).covariance_inflation_of_noise_model(average)
         )
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
     monkeypatch.setattr(fitting, "_normalized_squared_gain_error_and_rank", lambda *_: (1e6, 1))
-    assert fitting._with_inflated_noise(usable_flights, model).covariance_inflation_of_noise_model(
-        average
-    ) == pytest.approx(200.0 * factor)
+    assert fitting._with_noise_inflated_for_gain_errors(
+        usable_flights, model
+    ).covariance_inflation_of_noise_model(average) == pytest.approx(200.0 * factor)
 
 
 @pytest.fixture(scope="module")
@@ -297,7 +301,9 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
 def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):
     """A colour is filtered up to where it counts last: which that is, the whole flight says."""
     new = flown(AVERAGE, 0.5, 1500, 9)
-    whole = hypothesis_posterior(new, moving, build_hypothesis_bank(moving))
-    short = hypothesis_posterior(samples.first_samples(new, 600), moving, build_hypothesis_bank(moving))
+    whole = hypothesis_state_and_noise_posterior(new, moving, build_hypothesis_bank(moving))
+    short = hypothesis_state_and_noise_posterior(
+        samples.first_samples(new, 600), moving, build_hypothesis_bank(moving)
+    )
     for part, cut in zip(whole, short, strict=True):
         np.testing.assert_array_equal(part[:600], cut)

@@ -178,7 +178,7 @@ def test_names_under_other_laws(monkeypatch):
     settings = WING.settings.model_copy(update={"alarm_threshold": 2.0})
     asks = settings.model_copy(
         update={
-            "isolation_evidence_factor": 4.0,
+            "isolation_to_alarm_evidence_ratio": 4.0,
             "isolation_change_hold_s": 1.0,
             "assumes_one_group_at_fault": True,
         }

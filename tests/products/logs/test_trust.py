@@ -248,7 +248,7 @@ def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
         given = model.model_copy(update={"fitted_ranges": known})
         return np.diag(build_trim_and_gain_state_model(given).initial_covariance)[4:]
 
-    step, own = model.settings.effectiveness_level_step, model.settings.group_gain_sd
+    step, own = model.settings.effectiveness_level_step, model.settings.group_gain_offset_sd
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
     assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
 

@@ -156,7 +156,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         _MIN_HYPOTHESIS_PROBABILITY,
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
-    change_to_fault_probability = (
+    any_change_to_fault_probability = (
         bank.change_probability_per_sample
         * bank.transition_share[bank.is_fault_hypothesis].sum()
         / bank.transition_share.sum()
@@ -164,7 +164,8 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
     predicted_fault_probability = np.concatenate(
         [
             [bank.prior_probability[bank.is_fault_hypothesis].sum()],
-            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1] + change_to_fault_probability,
+            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1]
+            + any_change_to_fault_probability,
         ]
     )
     return np.asarray(
@@ -223,16 +224,16 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
     rates_unexplained_by_past, group_responses = (
         np.ascontiguousarray(np.nan_to_num(array)) for array in rates_and_responses
     )
-    noise = build_residual_noise(model, samples.noise_ma_coefficients)
+    noise_parameters = build_residual_noise(model, samples.noise_ma_coefficients)
     min_noise_variance_scales = np.zeros(len(is_predictable))
     if model.vehicle.other_laws:
         residual = np.where(
             is_predictable[:, None],
-            rates_unexplained_by_past - noise.intercept_rad_s - group_responses.sum(axis=1),
+            rates_unexplained_by_past - noise_parameters.intercept_rad_s - group_responses.sum(axis=1),
             0.0,
         )
         min_noise_variance_scales = recent_noise_variance_scale(
-            residual, is_predictable, noise.covariance, model.rate_hz
+            residual, is_predictable, noise_parameters.covariance, model.rate_hz
         )
     bank_run: BankRunResult = run_bank(
         rates_unexplained_by_past,
@@ -240,7 +241,7 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
         is_predictable,
         bank,
         build_trim_and_gain_state_model(model),
-        noise,
+        noise_parameters,
         min_noise_variance_scales,
     )
     return bank_run
@@ -280,14 +281,20 @@ def recent_noise_variance_scale(
 
 @kernel
 def run_bank(
-    rates_unexplained_by_past, group_responses, is_usable, bank, state_model, noise, min_noise_variance_scales
+    rates_unexplained_by_past,
+    group_responses,
+    is_usable,
+    bank,
+    state_model,
+    noise_parameters,
+    min_noise_variance_scales,
 ):
     """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and sample_log_likelihoods
     (n,): the log likelihood of a sample given all before it, times effective_sample_share.
 
     Shapes: rates_unexplained_by_past (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the
-    sample may be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise
-    (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise.
+    sample may be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise_parameters:
+    ResidualNoise (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise.
     """
     n_samples = len(rates_unexplained_by_past)
     n_hypotheses = len(bank.transition_share)
@@ -321,7 +328,7 @@ def run_bank(
                     rates_unexplained_by_past[k],
                     group_responses[k],
                     bank,
-                    noise,
+                    noise_parameters,
                     max(noise_variance_scale, min_noise_variance_scales[k]),
                 )
             )
@@ -333,10 +340,11 @@ def run_bank(
             noise_variance_scale *= np.exp(
                 (1.0 - hypothesis_probabilities[no_response_hypothesis_index])
                 * (mean_clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
-                / noise.scale_memory_samples
+                / noise_parameters.scale_memory_samples
             )
             noise_variance_scale = min(
-                max(noise_variance_scale, noise.min_variance_scale), noise.max_variance_scale
+                max(noise_variance_scale, noise_parameters.min_variance_scale),
+                noise_parameters.max_variance_scale,
             )
         else:
             hypothesis_probabilities = prior_probabilities
@@ -439,7 +447,7 @@ def _correct_hypotheses(
     rates_unexplained_by_past,
     group_responses,
     bank,
-    noise,
+    noise_parameters,
     noise_variance_scale,
 ):
     """Kalman correction of every hypothesis by one sample; state_means and state_covariances are replaced.
@@ -451,14 +459,14 @@ def _correct_hypotheses(
     log_likelihoods = np.empty(n_hypotheses)
     squared_residuals = np.empty(n_hypotheses)
     zero_state_mean, zero_state_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
-    noise_covariance = noise.covariance * noise_variance_scale
-    t_degrees_of_freedom = noise.t_degrees_of_freedom
+    noise_covariance = noise_parameters.covariance * noise_variance_scale
+    t_degrees_of_freedom = noise_parameters.t_degrees_of_freedom
     for h in range(n_hypotheses):
         rate_sensitivity_by_state = _rate_sensitivity_by_state(
             bank.effectiveness[h],
             bank.response_share_scaled_by_group_gain[h],
             group_responses,
-            noise.intercept_rad_s,
+            noise_parameters.intercept_rad_s,
             n_states,
         )
         if h == n_hypotheses - 1:
@@ -468,7 +476,7 @@ def _correct_hypotheses(
                 rates_unexplained_by_past,
                 rate_sensitivity_by_state,
                 noise_covariance,
-                noise,
+                noise_parameters,
             )
         else:
             squared_residuals[h], log_determinant = _update_gaussian(
@@ -477,10 +485,10 @@ def _correct_hypotheses(
                 rates_unexplained_by_past,
                 rate_sensitivity_by_state,
                 noise_covariance,
-                noise,
+                noise_parameters,
             )
-        squared_residual_for_log_likelihood = min(squared_residuals[h], noise.max_squared_residual)
-        log_likelihoods[h] = noise.effective_sample_share * (
+        squared_residual_for_log_likelihood = min(squared_residuals[h], noise_parameters.max_squared_residual)
+        log_likelihoods[h] = noise_parameters.effective_sample_share * (
             -0.5
             * (t_degrees_of_freedom + 3.0)
             * np.log(1.0 + squared_residual_for_log_likelihood / t_degrees_of_freedom)
@@ -496,7 +504,8 @@ def _correct_hypotheses(
     mean_clipped_squared_residual = 0.0
     for h in range(n_hypotheses):
         mean_clipped_squared_residual += hypothesis_probabilities[h] * min(
-            noise.covariance_inflation * squared_residuals[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
+            noise_parameters.covariance_inflation * squared_residuals[h],
+            3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS,
         )
     return (
         hypothesis_probabilities,
@@ -535,7 +544,7 @@ def _update_gaussian(
     rates_unexplained_by_past,
     rate_sensitivity_by_state,
     noise_covariance,
-    noise,
+    noise_parameters,
 ):
     """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by
     rates_unexplained_by_past (3,) = rate_sensitivity_by_state' state_mean + noise, with
@@ -544,7 +553,7 @@ def _update_gaussian(
     Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
     The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
     """
-    n_states, t_degrees_of_freedom = len(state_mean), noise.t_degrees_of_freedom
+    n_states, t_degrees_of_freedom = len(state_mean), noise_parameters.t_degrees_of_freedom
     cross_covariance = np.zeros((n_states, 3))
     residual_covariance = noise_covariance.copy()
     residual = rates_unexplained_by_past.copy()
@@ -567,7 +576,7 @@ def _update_gaussian(
                 kalman_gain[i, j] += cross_covariance[i, k] * inverse_residual_covariance[k, j]
     kalman_gain *= (
         min(1.0, (t_degrees_of_freedom + 3.0) / (t_degrees_of_freedom + squared_residual))
-        if squared_residual < noise.max_squared_residual
+        if squared_residual < noise_parameters.max_squared_residual
         else 0.0
     )
     for j in range(3):

@@ -532,7 +532,7 @@ def identification_text(model: Model) -> str:
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
-            f"  noise of the colour {_noise_model_coefficients_text(noise_model)}: "
+            f"  noise of the colour {_ma_coefficients_text(noise_model)}: "
             f"{noise_model.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
             "differ, and other laws may"
             for noise_model in model.noise_models
@@ -562,7 +562,7 @@ def identification_text(model: Model) -> str:
     return "\n".join(lines)
 
 
-def _noise_model_coefficients_text(noise_model: NoiseModel) -> str:
+def _ma_coefficients_text(noise_model: NoiseModel) -> str:
     return ", ".join(f"{coefficient:.3g}" for coefficient in noise_model.ma_coefficients)
 
 

@@ -294,7 +294,7 @@ def new_detector(**fields):
         record["noise"]["drift_intensity_over_squared_bound"],
     ) = 0.25, 2.0
     (
-        record["noise"]["acceleration_variance_from_input_noise"],
+        record["noise"]["acceleration_variance_by_input_noise"],
         record["noise"]["deflection_error_effect_bound"],
     ) = (
         (0.1, 0.2, 0.3),

@@ -790,7 +790,7 @@ def add_gust_estimate_noise(
         statistical_detector["forces"]["angular_acceleration_by_gust_noise_std"] = (
             angular_acceleration_by_gust_noise_std(flow_angle_noise_std_from_forces, design, y, u, span_m)
         )
-    for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_from_input_noise"):
+    for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
         statistical_detector["noise"][field_name] += (
             angular_acceleration_by_gust_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )

@@ -316,7 +316,7 @@ class DiagnosisReadout:
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_from_input_noise"])
+        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_by_input_noise"])
 
     @cached_property
     def statistical_alarm_level(self) -> float:

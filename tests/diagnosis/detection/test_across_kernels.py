@@ -48,7 +48,7 @@ def fdi(rng):
         2.0,
     )
     (
-        statistical["noise"]["acceleration_variance_from_input_noise"],
+        statistical["noise"]["acceleration_variance_by_input_noise"],
         statistical["noise"]["uncertainty_bound"],
     ) = (
         (1e-6, 4e-6, 9e-6),
@@ -131,7 +131,7 @@ def declared_along(statistical, m):
     moves = float(air["output"]["accounts_for_gusts"])
     size = max(bound, MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2)
     drift = statistical["noise"]["drift_intensity_over_squared_bound"] * size**2 + moves * V * m @ walk @ m
-    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["acceleration_variance_from_input_noise"])) ** 2
+    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"])) ** 2
     return (
         m**2 @ noise,
         jitter,

@@ -687,7 +687,7 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
 def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
     statistical, rng = viewed["statistical"], np.random.default_rng(6)
     (
-        statistical["noise"]["acceleration_variance_from_input_noise"],
+        statistical["noise"]["acceleration_variance_by_input_noise"],
         statistical["noise"]["uncertainty_bound"],
         statistical["noise"]["drift_intensity_over_squared_bound"],
     ) = (
@@ -740,7 +740,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     )
     sizes = np.sqrt(
         [
-            *statistical["noise"]["acceleration_variance_from_input_noise"],
+            *statistical["noise"]["acceleration_variance_by_input_noise"],
             *component["noise_variance_with_without_vane"][:, int(view["uses_inertial_flow_angle"])],
         ]
     )

@@ -317,9 +317,9 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
         noise, _, quantum = getattr(given.sensors, name).noise_bias_quantum
         jitter += slope**2 * (noise**2 + quantum**2 / 12.0)
     still, gusty = as_set_up(UNEVEN), as_set_up({**UNEVEN, "turbulence": "light"})
-    assert still["noise"]["acceleration_variance_from_input_noise"] == pytest.approx(jitter)
+    assert still["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(jitter)
     seen = gust_jitter(given.sensors, design_record()[0], SPAN_M)
-    assert gusty["noise"]["acceleration_variance_from_input_noise"] == pytest.approx(jitter + seen**2)
+    assert gusty["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(jitter + seen**2)
     assert still["noise"]["deflection_error_effect_bound"] == pytest.approx(
         radians(0.5) * np.abs(G).sum(axis=1)
     )
@@ -404,7 +404,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = bound_kernels.angular_acceleration_by_gust_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert np.sqrt(statistical["noise"]["acceleration_variance_from_input_noise"]) == pytest.approx(
+    assert np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"]) == pytest.approx(
         added, rel=0.02
     )
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])

@@ -76,7 +76,7 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
         expected += (
             moved(design, *flown_there, which, thin) * detector["noise"]["reading_noise_std"][which]
         ) ** 2
-    assert detector["noise"]["acceleration_variance_from_input_noise"] == pytest.approx(expected, rel=1e-5)
+    assert detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
         axes = block["axes"][: block["n_axes"]]
         assert block["model_noise_variance"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)

@@ -198,9 +198,7 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
         y[:4], y[4] + KW_TO_DPT * float(alone.detector["noise"]["reading_noise_std"][4]) / (y[3] * y[2])
     )
     square += (_rates(design, x, by_power, u) - _rates(design, x, y, u)) ** 2
-    assert alone.detector["noise"]["acceleration_variance_from_input_noise"] == pytest.approx(
-        square, rel=0.02
-    )
+    assert alone.detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(square, rel=0.02)
     for block in alone.blocks:
         n = block["n_axes"]
         assert block["model_noise_variance"][:n] == pytest.approx(square[block["axes"][:n]], rel=0.02)

@@ -609,7 +609,7 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         gyro_noise_variance += (
             m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].gyro_noise_variance[i // 2]
         )
-        model_noise_std += abs(m[i]) * np.sqrt(noise_model.acceleration_variance_from_input_noise[i])
+        model_noise_std += abs(m[i]) * np.sqrt(noise_model.acceleration_variance_by_input_noise[i])
         if view.is_immune_to_vane_error:
             model_noise_std += abs(m[i]) * forces.angular_acceleration_by_gust_noise_std[i]
         uncertainty_bound += abs(m[i]) * (

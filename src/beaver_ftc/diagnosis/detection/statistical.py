@@ -434,7 +434,7 @@ def _configure_drift_and_model_noise(
     acceleration_variance_by_air_data = (
         acceleration_slopes_by_air_data[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
     )  # later as `add_reading_regressors_and_fill_noise` says
-    statistical["noise"]["acceleration_variance_from_input_noise"] = (
+    statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
     )
     statistical["noise"]["deflection_error_effect_bound"] = (
@@ -591,7 +591,7 @@ def add_reading_regressors_and_fill_noise(
     unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
     moment_table = design_model.moments
     acceleration_slopes_for_one_reading = noise_model.acceleration_change_per_reading
-    noise_model.acceleration_variance_from_input_noise[:] = noise_model.acceleration_variance_without_air_data
+    noise_model.acceleration_variance_by_input_noise[:] = noise_model.acceleration_variance_without_air_data
     for reading_index in range(N_INPUT_READINGS):
         fill_signal_slopes_for_one_reading(
             moment_table, declared_error_record, y, reading_index, noise_model.signal_change_per_reading
@@ -612,7 +612,7 @@ def add_reading_regressors_and_fill_noise(
             acceleration_slopes_for_one_reading,
         )
         for i in range(3):
-            noise_model.acceleration_variance_from_input_noise[i] += (
+            noise_model.acceleration_variance_by_input_noise[i] += (
                 acceleration_slopes_for_one_reading[i] * noise_model.reading_noise_std[reading_index]
             ) ** 2
         pitch_block = blocks[likelihood.PITCH_BLOCK]
@@ -655,7 +655,7 @@ NOISE_MODEL_RECORD = record(
     additional_bound_for_surface_anywhere=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
     # variance by noise of all inputs of the model; without the air data; (rad/s2)2
-    acceleration_variance_from_input_noise=3, acceleration_variance_without_air_data=3,
+    acceleration_variance_by_input_noise=3, acceleration_variance_without_air_data=3,
     # whether errors of the air data count; their noise, units of the readings
     has_reading_errors=int, reading_noise_std=N_INPUT_READINGS,
     # scratch
@@ -1128,7 +1128,7 @@ def fill_uncertainty_bound_drift_and_noise(
             block.drift_intensity[i, i] += uncertainty_drift_intensity
             block.no_gust_filter.drift_intensity[i, i] = uncertainty_drift_intensity
             block.model_noise_variance[i] = block.no_gust_filter.model_noise_variance[i] = (
-                noise_model.acceleration_variance_from_input_noise[axis]
+                noise_model.acceleration_variance_by_input_noise[axis]
             )
         block.drift_decay_factor = (
             np.exp(-dt * V / block.drift_correlation_length_m)

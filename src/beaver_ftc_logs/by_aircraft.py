@@ -255,7 +255,7 @@ def _read_sample_inputs(
     si_column_by_name = convert_to_si(recording, vehicle).columns
     mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
 
-    def sampled_values(quantity_column: QuantityColumn) -> Floats:
+    def sample_values_and_store_age(quantity_column: QuantityColumn) -> Floats:
         values, mean_age_s = values_and_mean_age_at(
             si_column_by_name[quantity_column.column], samples.t_s, samples.dt_s
         )
@@ -264,10 +264,16 @@ def _read_sample_inputs(
         return values
 
     alpha_rad, beta_rad, qdyn_pa, *signals_beyond_flow = (
-        sampled_values(vehicle.flow[name]) for name in _flow_input_names(aircraft)
+        sample_values_and_store_age(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
     assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signal_arrays = [alpha_rad, beta_rad, sampled_values(vehicle.airspeed), qdyn_pa, *signals_beyond_flow]
+    signal_arrays = [
+        alpha_rad,
+        beta_rad,
+        sample_values_and_store_age(vehicle.airspeed),
+        qdyn_pa,
+        *signals_beyond_flow,
+    ]
     surface_indices = _vehicle_surface_indices(vehicle, aircraft)
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
@@ -277,7 +283,7 @@ def _read_sample_inputs(
             if quantity_column is None or quantity_column.column not in si_column_by_name:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
                 raise BadInput(f"{samples.name}: attitude.{angle_name}: {reason}")
-            attitude[:, axis] = sampled_values(quantity_column)
+            attitude[:, axis] = sample_values_and_store_age(quantity_column)
     return [
         samples.rates,
         np.column_stack(signal_arrays),

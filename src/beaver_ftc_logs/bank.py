@@ -86,7 +86,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     )
     may_surfaces_be_stuck = "stuck" in model.vehicle.faults
     has_pair_hypotheses = len(indices_of_groups_with_hypotheses) > 1
-    single_fault_transition_share = (
+    single_fault_share_before_normalization = (
         1.0
         - (_PAIR_LOSS_TRANSITION_SHARE if has_pair_hypotheses else 0.0)
         - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_surfaces_be_stuck else 0.0)
@@ -94,7 +94,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     for group_index in indices_of_groups_with_hypotheses:
         levels, level_shares = _effectiveness_levels_and_prior_shares(model, group_index)
         group_transition_share_per_fault_kind = (
-            single_fault_transition_share
+            single_fault_share_before_normalization
             * len(model.groups[group_index])
             / n_surfaces_with_hypotheses
             / len(model.vehicle.faults)

@@ -179,7 +179,9 @@ def diagnose_inputs(
         aircraft_inputs.has_missing_value,
         gap_free_stretches,
     ) | _rows_by_reason_after_unanticipated_start(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
-    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, rows_by_reason))
+    rows = rows.without_verdict(
+        _drop_empty_add_doubtful_alarm_reason(gap_free_stretches, rows, rows_by_reason)
+    )
     return rows, _verdict_document(
         samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
     )
@@ -417,7 +419,7 @@ def _rows_by_reason_after_unanticipated_start(
     return {reason: is_after_unanticipated_fault_alarm}
 
 
-def _add_rows_after_doubtful_alarm(
+def _drop_empty_add_doubtful_alarm_reason(
     gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, rows_by_reason: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets

@@ -363,7 +363,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
 def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
     rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
     reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
-    found = by_aircraft._add_rows_after_doubtful_alarm([(0, 4), (4, 8)], rows, reasons)
+    found = by_aircraft._drop_empty_add_doubtful_alarm_reason([(0, 4), (4, 8)], rows, reasons)
     says = "the alarm was raised where nothing can be said"
     assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
 

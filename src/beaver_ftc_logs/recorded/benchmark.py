@@ -45,8 +45,8 @@ MAX_SHORT_DELAY_S = 5.0
 SURFACE_KINDS = ("aileron", "rudder", "elevator")
 _KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OUR_METHOD_TITLE = "bank of filters (ours)"
-FREEZE_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
-METHOD_TITLES = {
+FROZEN_OUTPUT_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
+METHOD_TITLE_BY_DETECTOR_NAME = {
     "bank-of-filters": OUR_METHOD_TITLE,
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
@@ -124,11 +124,11 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
     usable_flights, is_single_flight = flights_with_usable_rows(data_set.flights), len(data_set.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    shared_settings = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
+    whole_flight_settings = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
     flight_entries: list[Document] = []
     for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
         model = add_fitted_ranges_and_alarm_threshold(
-            fitted_flights, fit_model(fitted_flights, data_set.vehicle, shared_settings)
+            fitted_flights, fit_model(fitted_flights, data_set.vehicle, whole_flight_settings)
         )
         recording = next(
             recording for recording in data_set.recordings if recording.name == held_out.samples.name
@@ -137,8 +137,8 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
             {"left_out": held_out_name, "method": method_title, **_score_against_log(held_out, rows, model)}
             for method_title, rows in _diagnose_with_each_method(recording, held_out, model)
         ]
-    has_labels = "classes" in flight_entries[0]
-    summarize = summarize_label_scores if has_labels else summarize_failure_scores
+    is_scored_by_labels = "classes" in flight_entries[0]
+    summarize = summarize_label_scores if is_scored_by_labels else summarize_failure_scores
     method_titles = dict.fromkeys(entry["method"] for entry in flight_entries)
     flight_entries_by_method = {
         method_title: [entry for entry in flight_entries if entry["method"] == method_title]
@@ -147,7 +147,7 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
     return {
         "set": data_set.name,
         "vehicle": data_set.vehicle.name,
-        "scored_by": "labels" if has_labels else "events",
+        "scored_by": "labels" if is_scored_by_labels else "events",
         "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
         "rows": [
             {"method": method_title, **summarize(scores)}
@@ -164,12 +164,12 @@ def _diagnose_with_each_method(
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
         yield (
-            METHOD_TITLES.get(name, f"{name}, of the loop"),
+            METHOD_TITLE_BY_DETECTOR_NAME.get(name, f"{name}, of the loop"),
             diagnose_with_detector(name, held_out.samples, model),
         )
-    freeze_rule_rows = diagnose_by_freeze_rule(recording, held_out.samples, model)
-    if freeze_rule_rows is not None:
-        yield FREEZE_RULE_TITLE, freeze_rule_rows
+    frozen_output_rule_rows = diagnose_by_freeze_rule(recording, held_out.samples, model)
+    if frozen_output_rule_rows is not None:
+        yield FROZEN_OUTPUT_RULE_TITLE, frozen_output_rule_rows
 
 
 def settings_of_whole_flight(
@@ -211,7 +211,9 @@ def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
     healthy_flights = [score for score in flight_scores if score["failure"] is None]
     quiet_healthy_flights = [score for score in healthy_flights if not score["false_alarms"]]
     healthy_hours = sum(score["healthy_s"] for score in flight_scores) / 3600.0
-    false_alarm_rate = poisson(sum(score["false_alarms"] for score in flight_scores), healthy_hours)
+    false_alarm_rate_and_interval = poisson(
+        sum(score["false_alarms"] for score in flight_scores), healthy_hours
+    )
     n_detected_or_quiet_flights = len(detected_surface_failures) + len(quiet_healthy_flights)
     return {
         "surface_failures": len(surface_failures),
@@ -223,9 +225,9 @@ def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
         "healthy_flights": len(healthy_flights),
         "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_healthy_flights),
         "false_alarms_per_hour": {
-            "value": false_alarm_rate.value,
-            "low": false_alarm_rate.low,
-            "high": false_alarm_rate.high,
+            "value": false_alarm_rate_and_interval.value,
+            "low": false_alarm_rate_and_interval.low,
+            "high": false_alarm_rate_and_interval.high,
         },
         "healthy_hours": healthy_hours,
         "wrong_group": sum(score["right_group"] is False for score in detected_surface_failures),
@@ -291,24 +293,27 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
     header = ["day", *LABEL_SCORE_TITLES.values(), "classes by sliding least squares"]
     titles_and_tables = []
     for data_set in document["sets"]:
-        table_rows = [
-            [day_scores["day"], *_score_texts(day_scores)]
-            for day_scores in data_set["rows"]
-            if day_scores["kind"] == "one change"
+        day_and_summary_rows = [
+            [one_day_scores["day"], *_day_score_cells(one_day_scores)]
+            for one_day_scores in data_set["rows"]
+            if one_day_scores["kind"] == "one change"
         ]
         for day_kind_summary in data_set["summary"]:
-            table_rows += [
-                [f"{day_kind_summary['kind']}: {statistic}", *_score_texts(day_kind_summary[statistic])]
+            day_and_summary_rows += [
+                [f"{day_kind_summary['kind']}: {statistic}", *_day_score_cells(day_kind_summary[statistic])]
                 for statistic in ("mean", "worst")
             ]
         titles_and_tables.append(
-            (f"{data_set['set']}: other days made of it, halves left out in turn", (header, table_rows))
+            (
+                f"{data_set['set']}: other days made of it, halves left out in turn",
+                (header, day_and_summary_rows),
+            )
         )
     return titles_and_tables
 
 
-def _score_texts(day_scores: Document) -> list[str]:
-    return [f"{day_scores[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
+def _day_score_cells(one_day_scores: Document) -> list[str]:
+    return [f"{one_day_scores[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
 
 
 LABEL_TABLE_HEADER = ["method", *LABEL_SCORE_TITLES.values()]
@@ -336,11 +341,11 @@ def _failure_score_cells(method_scores: Document) -> list[str]:
     n_ailerons_and_rudders_within_5_s, n_aileron_and_rudder_failures = (
         sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
     )
-    false_alarm_rate = method_scores["false_alarms_per_hour"]
+    rate_interval = method_scores["false_alarms_per_hour"]
     return [
         *cells,
         f"{n_ailerons_and_rudders_within_5_s} of {n_aileron_and_rudder_failures}",
-        f"{false_alarm_rate['value']:.1f} ({false_alarm_rate['low']:.1f} to {false_alarm_rate['high']:.1f})",
+        f"{rate_interval['value']:.1f} ({rate_interval['low']:.1f} to {rate_interval['high']:.1f})",
         f"{method_scores['healthy_flights_with_an_alarm']} of {method_scores['healthy_flights']}",
         str(method_scores["wrong_group"]),
     ]

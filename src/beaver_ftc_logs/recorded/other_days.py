@@ -62,43 +62,45 @@ def unchanged_day(n_surfaces: int) -> DayChanges:
     return DayChanges("as it was", np.zeros(n_surfaces), np.zeros(n_surfaces), np.ones(n_surfaces))
 
 
-def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
+def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
     """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
     unchanged = unchanged_day(len(mixer_shares))
-    days = [unchanged]
+    days_in_order = [unchanged]
     for command_name, surface_shares in zip(command_names, mixer_shares.T, strict=True):
         for shift in (-0.04, 0.04):
-            days.append(
+            days_in_order.append(
                 replace(
                     unchanged,
                     name=f"trim of {command_name} {shift:+.2f}",
                     trim_shift_commands=shift * surface_shares,
                 )
             )
-            days.append(
+            days_in_order.append(
                 replace(
                     unchanged,
                     name=f"neutral of {command_name} {shift:+.2f}",
                     neutral_shift_commands=shift * surface_shares,
                 )
             )
-    days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days += [
+    days_in_order += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
+    days_in_order += [
         replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
         for delay_s in (-0.04, 0.04)
     ]
-    days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
-    days += [
+    days_in_order += [
+        replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)
+    ]
+    days_in_order += [
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
     for i, surface_unit_vector in enumerate(np.eye(len(mixer_shares))):
         for gain in (0.94, 1.06):
             surface_gains = np.where(surface_unit_vector, gain, 1.0)
-            days.append(
+            days_in_order.append(
                 replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
             )
-    return days
+    return days_in_order
 
 
 def random_days(n_surfaces: int, seeds: range) -> list[DayChanges]:
@@ -210,20 +212,24 @@ def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
     whole_flight_model = fit_model(usable_flights, data_set.vehicle, settings)
     n_surfaces = len(data_set.vehicle.surfaces)
     days_by_kind = {
-        "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_column_names),
+        "one change": unchanged_and_one_change_days(
+            mixer_matrix(data_set.vehicle), data_set.vehicle.command_column_names
+        ),
         "drawn, settings chosen on these": random_days(n_surfaces, TUNING_SEEDS),
         "drawn, not looked at": random_days(n_surfaces, TEST_SEEDS),
     }
-    scores_of_days = [
-        day_scores
+    scores_of_all_days = [
+        one_day_scores
         for kind, days in days_by_kind.items()
-        for day_scores in _score_days(kind, days, models_and_held_out, whole_flight_model)
+        for one_day_scores in _score_days(kind, days, models_and_held_out, whole_flight_model)
     ]
     summaries = [
-        _summarize_days(kind, [day_scores for day_scores in scores_of_days if day_scores["kind"] == kind])
+        _summarize_days(
+            kind, [one_day_scores for one_day_scores in scores_of_all_days if one_day_scores["kind"] == kind]
+        )
         for kind in days_by_kind
     ]
-    return {"set": data_set.name, "rows": scores_of_days, "summary": summaries}
+    return {"set": data_set.name, "rows": scores_of_all_days, "summary": summaries}
 
 
 def _score_days(
@@ -234,23 +240,28 @@ def _score_days(
 ) -> Iterator[Document]:
     _, lagged_rate_coefficients, _, noise_covariance = whole_flight_model.intercept_past_response_noise()
     for day in days:
-        scores_by_detector: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
+        part_scores_by_detector: dict[str, list[Document]] = {
+            BANK_OF_FILTERS_DETECTOR: [],
+            _RIVAL_DETECTOR: [],
+        }
         for model, held_out in models_and_held_out:
             altered_samples = apply_day_changes(
                 day, held_out.samples, lagged_rate_coefficients, noise_covariance
             )
             labels = benchmark.labels_nan_outside_usable_span(held_out)
-            for detector_name, part_scores in scores_by_detector.items():
+            for detector_name, part_scores in part_scores_by_detector.items():
                 part_scores.append(
                     scoring.score_against_labels(
                         diagnose_with_detector(detector_name, altered_samples, model), labels
                     )
                 )
-        rival_class_score = benchmark.summarize_label_scores(scores_by_detector[_RIVAL_DETECTOR])["classes"]
+        rival_class_score = benchmark.summarize_label_scores(part_scores_by_detector[_RIVAL_DETECTOR])[
+            "classes"
+        ]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_label_scores(scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
+            **benchmark.summarize_label_scores(part_scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
             "beside": rival_class_score,
         }
 
@@ -258,13 +269,13 @@ def _score_days(
 def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
     values_of_score = {
-        key: [day_scores[key] for day_scores in scores_of_days]
+        key: [one_day_scores[key] for one_day_scores in scores_of_days]
         for key in (*benchmark.LABEL_SCORE_TITLES, "beside")
     }
-    mean = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
+    mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
     return {
         "kind": kind,
-        "mean": mean,
+        "mean": mean_by_score,
         "worst": {
             k: _WORST_FUNCTION_BY_SCORE.get(k, min)(score_values)
             for k, score_values in values_of_score.items()

@@ -61,7 +61,7 @@ def test_tables_have_a_line_a_method(document):
 
 def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
     days = other_days.random_days(2, range(2))
-    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(other_days, "unchanged_and_one_change_days", lambda mixer, commands: days[:1])
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: days[1:])
     page = tmp_path / "page.md"
     page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")

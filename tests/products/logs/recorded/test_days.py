@@ -11,8 +11,8 @@ from beaver_ftc_logs.recorded import benchmark, other_days
 from beaver_ftc_logs.recorded.other_days import (
     DayChanges,
     apply_day_changes,
-    one_change_days,
     random_days,
+    unchanged_and_one_change_days,
     unchanged_day,
 )
 from kept import in_short
@@ -26,7 +26,7 @@ NOISE = np.array(MODEL.residual_covariance)
 
 
 def test_the_days_on_which_one_thing_changes(changed):
-    assert not changed([vars(day) for day in one_change_days(MIXER, ["roll", "pitch"])])
+    assert not changed([vars(day) for day in unchanged_and_one_change_days(MIXER, ["roll", "pitch"])])
 
 
 def test_drawn_days(changed):
@@ -158,7 +158,9 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = FilterSettings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
     monkeypatch.setattr(benchmark, "settings_of_whole_flight", lambda usable_flights, data: quick)
-    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)])
+    monkeypatch.setattr(
+        other_days, "unchanged_and_one_change_days", lambda mixer, commands: [unchanged_day(2)]
+    )
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
     document = other_days._test_data_set_on_days(data)
     assert not changed(document)

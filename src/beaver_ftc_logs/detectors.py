@@ -40,7 +40,7 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.regression import (
     expand_group_values_to_surfaces,
-    surface_indices_by_group,
+    surface_indices_of_each_group,
     unexplained_rates_and_responses,
 )
 from beaver_ftc_logs.samples import Samples
@@ -223,7 +223,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
-    surface_indices_of_groups = surface_indices_by_group(model)
+    surface_indices_of_groups = surface_indices_of_each_group(model)
     if len(surface_indices_of_groups) > len(LOOP_SURFACE_BY_GROUP_INDEX):
         raise BadInput(
             f"{model.vehicle.name}: {len(surface_indices_of_groups)} groups of surfaces, allowed for a "
@@ -295,7 +295,7 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Dia
 
 def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n_samples, surface_indices_of_groups = len(verdicts), surface_indices_by_group(model)
+    n_samples, surface_indices_of_groups = len(verdicts), surface_indices_of_each_group(model)
     faulty = np.array([_is_statistic_high_or_detected(verdict) for verdict in verdicts], dtype=np.int64)
     effectiveness, effectiveness_low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
     isolated_names = np.full(n_samples, "", dtype=object)

@@ -14,7 +14,7 @@ from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import (
     power_spectral_density,
-    surface_indices_by_group,
+    surface_indices_of_each_group,
     variance_inflation_factors,
 )
 from beaver_ftc_logs.samples import (
@@ -61,7 +61,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "collinear": collinear_regressors(usable_flights, model),
         "colour": median_standard_error_inflation_by_axis(usable_flights, model),
         "spectrum": residual_to_white_density_by_band(usable_flights, model),
-        "output_error": fit_output_error(usable_flights, surface_indices_by_group(model)),
+        "output_error": fit_output_error(usable_flights, surface_indices_of_each_group(model)),
     }
     settings = model.settings.model_copy(update={"credible_mass": credible_mass})
     return model.model_copy(update={"settings": settings, "identification_results": identification_results})

@@ -73,12 +73,12 @@ def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
 
 @contextmanager
 def package_errors_as_bad_input(
-    path: Path, log_kind: str, package: str, allowed_file_text: str
+    path: Path, log_kind: str, package: str, valid_log_file_text: str
 ) -> Iterator[None]:
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
     here. Raises BadInput where the package is missing, or the file is none that it can read.
 
-    log_kind: such a log is called; allowed_file_text: says which files hold one.
+    log_kind: such a log is called; valid_log_file_text: says which files hold one.
     """
     try:
         with redirect_stdout(StringIO()):
@@ -91,7 +91,7 @@ def package_errors_as_bad_input(
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
         reason = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(
-            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {allowed_file_text}"
+            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {valid_log_file_text}"
         ) from None
 
 
@@ -136,8 +136,8 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.in
     """
     if (np.diff(stamps) > 0).all() and np.isfinite(stamps).all():
         return np.arange(len(stamps)), ""
-    stamped_rows = np.flatnonzero(np.isfinite(stamps))
-    kept_rows = stamped_rows[_longest_increasing_rows(stamps[stamped_rows])]
+    finite_stamp_rows = np.flatnonzero(np.isfinite(stamps))
+    kept_rows = finite_stamp_rows[_longest_increasing_rows(stamps[finite_stamp_rows])]
     left_out_rows = np.setdiff1d(np.arange(len(stamps)), kept_rows)
     misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or stamps[k] != stamps[k - 1]]
     if not misplaced_rows:

@@ -85,16 +85,16 @@ def _delay_rows(values: np.ndarray, lag: int, fill_value: float) -> np.ndarray:
     return np.concatenate([np.full((lag, *values.shape[1:]), fill_value), values[: len(values) - lag]])
 
 
-def surface_indices_by_group(model: Model) -> list[list[int]]:
+def surface_indices_of_each_group(model: Model) -> list[list[int]]:
     """The model's groups as positions of their surfaces."""
-    surface_names = list(model.vehicle.surfaces)
-    return [[surface_names.index(name) for name in group_surfaces] for group_surfaces in model.groups]
+    vehicle_surface_names = list(model.vehicle.surfaces)
+    return [[vehicle_surface_names.index(name) for name in group_surfaces] for group_surfaces in model.groups]
 
 
 def expand_group_values_to_surfaces(group_values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     group_index_of_surface = np.full(len(model.vehicle.surfaces), -1)
-    for group_index, surface_indices in enumerate(surface_indices_by_group(model)):
+    for group_index, surface_indices in enumerate(surface_indices_of_each_group(model)):
         group_index_of_surface[surface_indices] = group_index
     return np.asarray(
         np.take(np.column_stack([group_values, np.ones(len(group_values))]), group_index_of_surface, axis=1)
@@ -116,7 +116,7 @@ def unexplained_rates_and_responses(
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     past_regressors, lagged_group_commands, is_predictable = build_regressors(
-        samples, surface_indices_by_group(model), *lag_counts_and_label_scaling
+        samples, surface_indices_of_each_group(model), *lag_counts_and_label_scaling
     )
     _, lagged_rate_and_signal_coefficients, response_coefficients, _ = model.intercept_past_response_noise()
     rates_unexplained_by_past = samples.rates - np.einsum(
@@ -256,19 +256,19 @@ def _newey_west_standard_errors(
 
 
 def coefficient_upper_bounds_and_squared_residuals(
-    regressors: Floats, outputs: Floats, effective_sample_share: float
+    regressors: Floats, output_series: Floats, effective_sample_share: float
 ) -> tuple[Floats, Floats]:
-    """Least squares of outputs (n,) on regressors (n, m): what each coefficient surely does not exceed, (m,),
-    which is much where columns make one another up; and squares of what is left (n,). effective_sample_share:
-    as in `FilterSettings`."""
+    """Least squares of output_series (n,) on regressors (n, m): what each coefficient surely does not exceed,
+    (m,), which is much where columns make one another up; and squares of what is left (n,).
+    effective_sample_share: as in `FilterSettings`."""
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
     scaled_regressors = regressors / regressor_rms
     scaled_inverse_gram = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
         + _GRAM_EIGENVALUE_FLOOR * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
-    scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ outputs)
-    squared_residual_by_row = (outputs - scaled_regressors @ scaled_coefficients) ** 2
+    scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ output_series)
+    squared_residual_by_row = (output_series - scaled_regressors @ scaled_coefficients) ** 2
     scaled_standard_errors = np.sqrt(
         np.maximum(np.diag(scaled_inverse_gram), 0.0)
         * squared_residual_by_row.mean()

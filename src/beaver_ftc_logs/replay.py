@@ -40,12 +40,12 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     ordered_input_arrays = [
         np.column_stack([log_columns[name] for name in names]) for names in column_names_of_each_input
     ]
-    replayed_verdicts = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
+    verdicts_and_bounds = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
     diagnosis_rows = stepped.diagnosis_rows_from_replay(
-        log_columns["t_s"], replayed_verdicts, aircraft.surfaces, scenario.fdi
+        log_columns["t_s"], verdicts_and_bounds, aircraft.surfaces, scenario.fdi
     )
     return diagnosis_columns(diagnosis_rows, aircraft.surfaces), _replay_verdict(
-        path, scenario, log_columns, replayed_verdicts.verdicts
+        path, scenario, log_columns, verdicts_and_bounds.verdicts
     )
 
 
@@ -85,7 +85,7 @@ def _replay_verdict(
         float(row_t_s) for row_t_s, row_verdict in zip(t_s, verdicts, strict=True) if row_verdict.detected
     ]
     isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
-    logged_and_replayed = zip(log_columns.get("detected", []), verdicts, strict=False)
+    logged_flags_and_verdicts = zip(log_columns.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
         "replay": True,
@@ -96,7 +96,8 @@ def _replay_verdict(
         "isolation_s": isolation_s,
         "isolated": name,
         "rows_that_differ": sum(
-            bool(logged_flag) != row_verdict.detected for logged_flag, row_verdict in logged_and_replayed
+            bool(logged_flag) != row_verdict.detected
+            for logged_flag, row_verdict in logged_flags_and_verdicts
         ),
         "left_out": _unreplayed_input_texts(scenario),
     }
@@ -116,7 +117,7 @@ def _unreplayed_input_texts(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal_sensors = type(scenario.sensors)()
     sensors_with_declared_errors = [
-        name for name, value in scenario.sensors if value != getattr(ideal_sensors, name)
+        name for name, sensor_settings in scenario.sensors if sensor_settings != getattr(ideal_sensors, name)
     ]
     sensors_logged_without_errors = [
         name for name in sensors_with_declared_errors if name not in ("p", "q", "r")
@@ -152,6 +153,10 @@ def as_text(verdict: Document) -> str:
     )
     if verdict["isolated"]:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
-    comparison_texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
-    lines = [f"{verdict['flight']}: {outcome}; {comparison_texts[verdict['as_flown']]}"]
+    comparison_text_by_as_flown = {
+        True: "as flown",
+        False: "not as flown",
+        None: "nothing beside it to compare with",
+    }
+    lines = [f"{verdict['flight']}: {outcome}; {comparison_text_by_as_flown[verdict['as_flown']]}"]
     return "\n".join([*lines, *(f"  left out: {input_text}" for input_text in verdict["left_out"])])

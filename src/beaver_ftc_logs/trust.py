@@ -57,7 +57,7 @@ def compute_fitted_ranges(
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
     used; held_out_gain_standard_errors (G,) and held_out_max_noise_variance_scale: of parts not fitted."""
-    surface_groups = regression.surface_indices_by_group(model)
+    surface_groups = regression.surface_indices_of_each_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
     used_airspeeds = [
@@ -164,7 +164,7 @@ def _effect_powers(
 ) -> tuple[Floats, Floats]:
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
-    surface_groups = regression.surface_indices_by_group(model)
+    surface_groups = regression.surface_indices_of_each_group(model)
     lag_counts_and_label_scaling = (
         model.n_rate_lags,
         model.n_command_lags,

@@ -66,7 +66,7 @@ def test_a_flight_shorter_than_the_past():
 
 def test_columns_of_groups_become_those_of_surfaces():
     values = np.array([[0.2, 0.4], [0.6, 0.8]])
-    assert regression.surface_indices_by_group(TAIL) == [[0, 2], [1]]
+    assert regression.surface_indices_of_each_group(TAIL) == [[0, 2], [1]]
     assert regression.expand_group_values_to_surfaces(values, TAIL).tolist() == [
         [0.2, 0.4, 0.2],
         [0.6, 0.8, 0.6],

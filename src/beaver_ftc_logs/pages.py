@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-_MAX_PLOTTED_POINTS = 6000
+_TARGET_PLOTTED_POINTS = 6000
 IDENTIFICATION_PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
 _PREDICTION_FIGURE_SPAN_S = 40.0
 _MAX_SHOWN_FLIGHTS = 3
@@ -84,8 +84,8 @@ def _log_notes(samples: Samples) -> list[str]:
     gap_count_text = "1 gap" if n_gaps == 1 else f"{n_gaps} gaps"
     notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gap_count_text} in the log."]
     notes += [
-        f"{name} has its own stamps: its last value is held, {mean_age_s:.2f} s old on average."
-        for name, mean_age_s in samples.mean_age_s_by_held_column.items()
+        f"{name} has its own stamps: its last value is held, {mean_held_value_age_s:.2f} s old on average."
+        for name, mean_held_value_age_s in samples.mean_age_s_by_held_column.items()
     ]
     return [*notes, *samples.notes]
 
@@ -124,7 +124,7 @@ def _label_axis(axis: Any, label: str, **grid_options: Any) -> None:
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
-    shown_rows = slice(None, None, max(len(t_s) // _MAX_PLOTTED_POINTS, 1))
+    shown_rows = slice(None, None, max(len(t_s) // _TARGET_PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(
             t_s[shown_rows], values[shown_rows, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name
@@ -134,7 +134,7 @@ def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str]
 
 
 def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, bounds_label: str) -> None:
-    shown_rows = slice(None, None, max(len(rows.t_s) // _MAX_PLOTTED_POINTS, 1))
+    shown_rows = slice(None, None, max(len(rows.t_s) // _TARGET_PLOTTED_POINTS, 1))
     axis.fill_between(
         rows.t_s[shown_rows], rows.effectiveness_low[shown_rows, surface_index],
         rows.effectiveness_high[shown_rows, surface_index],
@@ -167,9 +167,9 @@ def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
 
 
 def write_diagnosis(
-    out: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
+    parent_folder: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
 ) -> Path:
-    """Write the folder `out/<flight>` whole or not at all; returns it."""
+    """Write the folder `parent_folder/<flight>` whole or not at all; returns it."""
     effectiveness_columns = (
         column
         for columns_of_surface in zip(
@@ -189,12 +189,16 @@ def write_diagnosis(
         zip(diagnosis_column_names(model.vehicle.surfaces), columns_in_order, strict=True)
     )
     return write_results(
-        out, samples.name, values_by_column_name, verdict, render_diagnosis(samples, model, rows, verdict)
+        parent_folder,
+        samples.name,
+        values_by_column_name,
+        verdict,
+        render_diagnosis(samples, model, rows, verdict),
     )
 
 
 def write_diagnosis_with_aircraft_model(
-    out: Path,
+    parent_folder: Path,
     samples: Samples,
     surfaces: Sequence[str],
     rows: DiagnosisRows,
@@ -213,30 +217,30 @@ def write_diagnosis_with_aircraft_model(
     }
     page = _render_flight_page(samples, surfaces, rows, verdict, wording)
     return write_results(
-        out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_extra_files
+        parent_folder, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_extra_files
     )
 
 
 def write_results(
-    out: Path,
+    parent_folder: Path,
     name: str,
     values_by_column_name: dict[str, Any],
     verdict: dict[str, Any],
     page: str | None = None,
     write_extra_files: Callable[[Path], None] | None = None,
 ) -> Path:
-    """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
+    """Write `parent_folder/<name>` whole or not at all: diagnosis.parquet, verdict.json and report.html."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    with result_folder(out, name) as folder:
+    with result_folder(parent_folder, name) as folder:
         parquet.write_table(pa.table(values_by_column_name), folder / "diagnosis.parquet")
         (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
         if page is not None:
             (folder / "report.html").write_text(page, encoding="utf-8")
         if write_extra_files is not None:
             write_extra_files(folder)
-    return out / name
+    return parent_folder / name
 
 
 def refuse_to_replace_foreign_file(path: Path) -> None:
@@ -287,21 +291,21 @@ def _encode_png(figure: Any) -> str:
 
 def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    models_and_held_out = [
-        (fitting.fit_with_same_order(fitted_flights, model), held_out, name)
-        for fitted_flights, held_out, name in fitting.validation_folds(usable_flights)
+    fold_models_flights_names = [
+        (fitting.fit_with_same_order(flights_fitted_in_fold, model), held_out, name)
+        for flights_fitted_in_fold, held_out, name in fitting.validation_folds(usable_flights)
     ]
-    models_and_held_out = [
-        model_and_held_out
-        for model_and_held_out in models_and_held_out
-        if model_and_held_out[1].is_usable.any()
+    fold_models_flights_names = [
+        fold_model_flight_name
+        for fold_model_flight_name in fold_models_flights_names
+        if fold_model_flight_name[1].is_usable.any()
     ][:_MAX_SHOWN_FLIGHTS]
-    n_subfigures = max(len(models_and_held_out), 1)
+    n_subfigures = max(len(fold_models_flights_names), 1)
     figure = _new_figure(11, 4.6 * n_subfigures)
     subfigures = figure.subfigures(n_subfigures, squeeze=False)[:, 0]
-    for subfigure, (fold_model, held_out, name) in zip(subfigures, models_and_held_out, strict=False):
+    for subfigure, (fold_model, held_out, name) in zip(subfigures, fold_models_flights_names, strict=False):
         axes = subfigure.subplots(3, 1, sharex=True)
-        t_s, measured_rates, residual = _rates_and_residual_in_liveliest_window(
+        t_s, measured_rates, residual = _times_rates_residual_in_liveliest_window(
             fold_model, held_out, round(_PREDICTION_FIGURE_SPAN_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
@@ -316,7 +320,7 @@ def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], m
     return figure
 
 
-def _rates_and_residual_in_liveliest_window(
+def _times_rates_residual_in_liveliest_window(
     model: Model, held_out: fitting.FlightWithUsableRows, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
@@ -348,11 +352,13 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
     residual = np.vstack(
         [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
     )
-    frequency_hz, axis_densities = power_spectral_density(residual, 1.0 / model.rate_hz)
+    frequency_hz, residual_power_densities = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
-        axis.loglog(frequency_hz[1:], axis_densities[1:, i], color=SERIES[i], linewidth=1.1, label=name)
+        axis.loglog(
+            frequency_hz[1:], residual_power_densities[1:, i], color=SERIES[i], linewidth=1.1, label=name
+        )
         white_noise_density = residual[:, i].var() / (0.5 * model.rate_hz)
         axis.axhline(white_noise_density, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)

@@ -15,7 +15,7 @@ from beaver_ftc_logs.recording import Column, Floats
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, KIND_AND_SI_FACTOR_OF_UNIT, RATE, nearest_unit
 
 _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_UNIT_RATIO = 20, 0.7, 1.3
+_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_RATIO_TO_UNIT_FACTOR = 20, 0.7, 1.3
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
 _MAX_EXCHANGED_CORRELATION, _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
@@ -50,7 +50,7 @@ def fit_roll_angle_to_rates(
     rate_columns: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
     rate_times_s = rate_columns[0].t_s
-    p, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    p, q, r = (_interpolate_column(body_rate_column, rate_times_s) for body_rate_column in rate_columns)
     roll_at_rate_times, full_circle = (
         _interpolate_column(roll_column, rate_times_s),
         _full_circle(roll_column.values),
@@ -74,7 +74,7 @@ def fit_pitch_angle_to_rates(
 ) -> AngleRateFit | None:
     """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
     rate_times_s = rate_columns[0].t_s
-    _, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    _, q, r = (_interpolate_column(body_rate_column, rate_times_s) for body_rate_column in rate_columns)
     roll_rad_at_rate_times = (
         _interpolate_column(roll_column, rate_times_s) * 2.0 * np.pi / _full_circle(roll_column.values)
     )
@@ -91,7 +91,7 @@ def fit_yaw_angle_to_rates(
     """How the yaw angle follows the rates, as `fit_roll_angle_to_rates`; r and q are in one unit, since a
     turn changes both alike."""
     rate_times_s = rate_columns[0].t_s
-    _, q, r = (_interpolate_column(rate_column, rate_times_s) for rate_column in rate_columns)
+    _, q, r = (_interpolate_column(body_rate_column, rate_times_s) for body_rate_column in rate_columns)
     roll_rad_at_rate_times = (
         _interpolate_column(roll_column, rate_times_s) * 2.0 * np.pi / _full_circle(roll_column.values)
     )
@@ -124,7 +124,7 @@ def _interpolated_pitch_rad(roll_column: Column, pitch_column: Column, t_s: Floa
 
 def _fit_angle_to_rate(
     t_s: Floats,
-    angle: Floats,
+    logged_angle: Floats,
     rate_terms: list[Floats],
     full_circle: float | None = None,
     pitch_rad_at_samples: Floats | None = None,
@@ -153,7 +153,9 @@ def _fit_angle_to_rate(
         is_window_continuous_and_not_steep &= (
             cumulated_steep_count[window_end_rows] == cumulated_steep_count[window_begin_rows]
         )
-    angle_changes = (angle[window_end_rows] - angle[window_begin_rows])[is_window_continuous_and_not_steep]
+    angle_changes = (logged_angle[window_end_rows] - logged_angle[window_begin_rows])[
+        is_window_continuous_and_not_steep
+    ]
     rate_integrals = (rate_term_integrals[window_end_rows] - rate_term_integrals[window_begin_rows])[
         is_window_continuous_and_not_steep
     ]
@@ -173,7 +175,7 @@ def _fit_angle_to_rate(
         slope=np.sign(cross_product_sum) * np.sqrt(angle_change_square_sum / rate_integral_square_sum),
         correlation=cross_product_sum / np.sqrt(rate_integral_square_sum * angle_change_square_sum),
         n_windows=len(rate_integrals),
-        max_angle_magnitude=float(np.nanmax(np.abs(angle))),
+        max_angle_magnitude=float(np.nanmax(np.abs(logged_angle))),
         max_rate_magnitude=float(np.nanmax(np.abs(rate_terms[0]))),
     )
 
@@ -243,8 +245,8 @@ def find_attitude_mistake(
 
 def _min_correlation_to_replace_rate(named_rate_fit: AngleRateFit, is_candidate_a_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
-    named_rate_correlation = abs(named_rate_fit.correlation)
-    if is_candidate_a_rate and named_rate_correlation < (
+    named_rate_correlation_magnitude = abs(named_rate_fit.correlation)
+    if is_candidate_a_rate and named_rate_correlation_magnitude < (
         _MAX_EXCHANGED_CORRELATION
         if named_rate_fit.has_many_windows
         else _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS
@@ -252,9 +254,9 @@ def _min_correlation_to_replace_rate(named_rate_fit: AngleRateFit, is_candidate_
         return _MIN_AGREEING_CORRELATION
     return (
         _HIGH_CORRELATION
-        if named_rate_correlation < _MIN_AGREEING_CORRELATION
+        if named_rate_correlation_magnitude < _MIN_AGREEING_CORRELATION
         else _EXACT_CORRELATION
-        if named_rate_correlation < _HIGH_CORRELATION
+        if named_rate_correlation_magnitude < _HIGH_CORRELATION
         else np.inf
     )
 
@@ -307,14 +309,14 @@ def angle_rate_factor_remark(fit: AngleRateFit, rate_column_name: str, angle_col
     if is_near_one:
         return f"{angle_to_rate_integral_ratio_text}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
-        fitting_unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _MAX_UNIT_RATIO)
+        fitting_unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _MAX_RATIO_TO_UNIT_FACTOR)
     ):
         return (
             f"{angle_to_rate_integral_ratio_text}: {angle_column_name} is in {fitting_unit}, a factor of "
             f"{KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
         )
     if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
-        fitting_unit := nearest_unit(RATE, slope_magnitude, _MAX_UNIT_RATIO)
+        fitting_unit := nearest_unit(RATE, slope_magnitude, _MAX_RATIO_TO_UNIT_FACTOR)
     ):
         return (
             f"{angle_to_rate_integral_ratio_text}: {rate_column_name} is in {fitting_unit}, a factor of "
@@ -332,7 +334,7 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
     max_pitch = float(np.nanmax(np.abs(pitch_column.values), initial=0.0))
     if max_pitch <= _MAX_PITCH_RAD:
         return None
-    fitting_unit = next(
+    plausible_unit = next(
         (
             candidate_unit
             for candidate_unit in ("deg", "cdeg")
@@ -340,13 +342,13 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
         ),
         None,
     )
-    fitting_unit_text = (
-        f"it is in {fitting_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
-        if fitting_unit
+    plausible_unit_text = (
+        f"it is in {plausible_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[plausible_unit][1]:.4g} fits"
+        if plausible_unit
         else "no unit fits"
     )
     return (
-        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fitting_unit_text}; "
+        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {plausible_unit_text}; "
         "look at the rates' too"
     )
 
@@ -364,17 +366,17 @@ def gravity_remark(z_acceleration_column: Column, column_name: str) -> str | Non
         < _PLAUSIBLE_GRAVITY_RANGE_G[1]
     ):
         return None
-    fitting_unit = (
+    plausible_unit = (
         nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_of_magnitudes_mps2, 2.0)
         if median_of_magnitudes_mps2 > 0.0
         else None
     )
-    fitting_unit_text = (
-        f"it is in {fitting_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[fitting_unit][1]:.4g} fits"
-        if fitting_unit
+    plausible_unit_text = (
+        f"it is in {plausible_unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[plausible_unit][1]:.4g} fits"
+        if plausible_unit
         else "no unit fits: is 1 g in it?"
     )
     return (
         f"{column_name}: is {median_of_magnitudes_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
-        f"{_GRAVITY_MPS2:.4g}: {fitting_unit_text}"
+        f"{_GRAVITY_MPS2:.4g}: {plausible_unit_text}"
     )

@@ -16,7 +16,7 @@ EffectivenessAtTime = Callable[[float], float]
 
 SAMPLE_RATE_HZ, HEALTHY_FLIGHT_S, FAULTY_FLIGHT_S = 20.0, 600.0, 180.0
 WEAK_ELEVON_FROM_S, WEAK_ELEVON_EFFECTIVENESS = 90.0, 0.4
-_DAMPING_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
+_RATE_STATE_MATRIX_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
 _ACCELERATION_BY_FULL_ELEVON_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
 """Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
 _TURBULENCE_DRIVING_NOISE = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second
@@ -89,7 +89,7 @@ def _simulate_rows(
             dt_s
         ) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
         rates = rates + dt_s * (
-            _DAMPING_PER_S @ rates
+            _RATE_STATE_MATRIX_PER_S @ rates
             + effective_right_and_left_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
             + turbulence_rad_s2
         )

@@ -758,7 +758,7 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass_properties: 
     gust["config"]["rolling_gust_correlation_length"] = rotation_lengths(span_m)[0]
 
 
-def add_gust_estimate_noise(
+def fill_and_add_gust_estimate_noise(
     statistical_detector: np.void,
     sensor_errors: SensorErrors,
     design: np.void,

@@ -220,7 +220,7 @@ def begin_frame_with_instant(prediction, bound_record, layout, diagnoses_all_typ
 def redo_last_move_to_command(prediction, command):
     """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
     prediction.u[:] = prediction.u_before
-    move_healthy_surfaces(prediction, command)
+    store_command_and_move_healthy_surfaces(prediction, command)
 
 
 @kernel
@@ -267,7 +267,7 @@ def form_innovation_after_known_faults(prediction, measured_rates, dt):
 
 
 @kernel
-def move_healthy_surfaces(prediction, command):
+def store_command_and_move_healthy_surfaces(prediction, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     for s in range(command.size):
         prediction.commanded[s] = command[s]

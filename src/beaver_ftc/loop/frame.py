@@ -42,7 +42,7 @@ from beaver_ftc.diagnosis.model_prediction import (
     evaluate_bound_and_frame_means,
     evaluate_design_model,
     fill_acceleration_with_known_faults,
-    move_healthy_surfaces,
+    store_command_and_move_healthy_surfaces,
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
@@ -586,7 +586,7 @@ def finish(frame, commanded, row):
     laws.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
     laws.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
-    move_healthy_surfaces(prediction, control.allocation.output.command)
+    store_command_and_move_healthy_surfaces(prediction, control.allocation.output.command)
     hand_over(frame.truth, prediction.commanded, control.power.output)
     advance_clock(frame)
     frame.row += 1

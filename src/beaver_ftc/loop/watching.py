@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.diagnosis.model_prediction import (
     evaluate_bound_and_frame_means,
     evaluate_design_model,
-    move_healthy_surfaces,
+    store_command_and_move_healthy_surfaces,
 )
 from beaver_ftc.loop.frame import accommodate, advance_clock, estimated_theta_of_isolated_loss, start_clock
 from beaver_ftc.plant.instruments import take_sample
@@ -31,7 +31,7 @@ def take(frames, x, y, command, attitude):
     prediction, measured = frame.prediction, frame.measured
     start_clock(frame)
     if frame.k > 0:
-        move_healthy_surfaces(prediction, command)
+        store_command_and_move_healthy_surfaces(prediction, command)
     take_sample(measured, x, y, attitude)
     evaluate_design_model(prediction, measured)
     evaluate_bound_and_frame_means(prediction, frame.fdi.bound, measured, frame.k, frame.dt)

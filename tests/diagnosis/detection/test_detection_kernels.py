@@ -233,7 +233,7 @@ def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
     record = new_prediction(1.0)
     record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
     record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
-    model_prediction.move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
+    model_prediction.store_command_and_move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
     assert record["u_before"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
     assert record["u"] == pytest.approx(record["commanded"])
     assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])

@@ -400,7 +400,9 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     statistical["gust"]["config"]["wing_span"] = SPAN_M
     forces["in_use"], forces["component"]["accelerometer_innovation_variance"] = known, (0.3**2, 0.2**2)
     forces["component"]["axis_and_force_innovation_per_vane_error"][:, 1] = -6.0, 50.0
-    gusts.add_gust_estimate_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
+    gusts.fill_and_add_gust_estimate_noise(
+        statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt
+    )
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = bound_kernels.angular_acceleration_by_gust_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)

@@ -78,9 +78,9 @@ from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
     MIN_UNMEASURED_GUST_INTENSITY_SHARES,
     UNMEASURED_SHARE_FROM_FORCE_ERROR,
-    add_gust_estimate_noise,
     configure_gust_estimate,
     configure_gust_velocity_and_speed_error,
+    fill_and_add_gust_estimate_noise,
 )
 from beaver_ftc.diagnosis.state import DAMAGE_MAY_HAVE_EXCLUDED_OTHERS, LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
@@ -324,7 +324,7 @@ def configure_statistical_detector(
             pitch_block["gust_drift_intensity_factor"] = (
                 pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
             ) ** 2
-        add_gust_estimate_noise(statistical, sensor_errors, design_model, *trim[1:], dt_s)
+        fill_and_add_gust_estimate_noise(statistical, sensor_errors, design_model, *trim[1:], dt_s)
 
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:

@@ -372,7 +372,7 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
     for (fault_class, _), row in adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.items():
         fdi = new_fdi()
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 7
-        row.begin(fdi)
+        row.begin_at_alarm(fdi)
         assert (
             fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist()
             == [7 * (fault_class != "all")] * 4

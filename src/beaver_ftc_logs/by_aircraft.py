@@ -24,7 +24,7 @@ from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
 from beaver_ftc_logs.stepped import (
     ReplayedVerdicts,
-    declared_errors,
+    declared_error_sections,
     diagnosis_rows_from_replay,
     replay_samples,
 )
@@ -74,7 +74,7 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
     if loaded_scenario.airframe.name != aircraft.name:
         reason = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    return DiagnosedAircraft(loaded_scenario.airframe, declared_errors(loaded_scenario))
+    return DiagnosedAircraft(loaded_scenario.airframe, declared_error_sections(loaded_scenario))
 
 
 @dataclass(frozen=True)

@@ -267,8 +267,8 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    trust.check_rate_units(samples, model.fitted_ranges)
-    trust.check_columns_as_identified(samples, model)
+    trust.refuse_rates_in_other_unit(samples, model.fitted_ranges)
+    trust.refuse_columns_not_as_identified(samples, model)
 
 
 def diagnosis_rows_from_posterior(

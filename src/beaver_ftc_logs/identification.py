@@ -23,7 +23,7 @@ from beaver_ftc_logs.samples import (
     UNFITTED_NOISE_MA_CANDIDATES,
     Samples,
     whiten_samples,
-    with_airspeed_effects,
+    with_airspeed_scaling_and_products,
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -296,7 +296,7 @@ def _scale_flights_and_vehicle_if_better(
     if vehicle.reference_airspeed_mps is not None or reference_airspeed_mps <= 0.0:
         return flights, vehicle
     scaled_flights = [
-        with_airspeed_effects(flight, reference_airspeed_mps, vehicle.surface_airspeed_powers)
+        with_airspeed_scaling_and_products(flight, reference_airspeed_mps, vehicle.surface_airspeed_powers)
         for flight in flights
     ]
     scaled_vehicle = vehicle.model_copy(update={"reference_airspeed_mps": reference_airspeed_mps})
@@ -321,7 +321,9 @@ def _scale_by_best_airspeed_powers(
     linkages change the square. Another than that must explain decisively more."""
 
     scaled_flights = [
-        with_airspeed_effects(flight, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers)
+        with_airspeed_scaling_and_products(
+            flight, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
+        )
         for flight in flights
     ]
     whitened_flights = whiten_flights(
@@ -332,7 +334,7 @@ def _scale_by_best_airspeed_powers(
         scaled_vehicle: Vehicle, whitens_if_air_moves: bool = True
     ) -> list[Samples]:
         rescaled_flights = [
-            with_airspeed_effects(
+            with_airspeed_scaling_and_products(
                 flight, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
             for flight in flights
@@ -406,7 +408,7 @@ def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> 
         commands=trust.central_ranges(flights[0].commands), rates=trust.central_ranges(flights[0].rates)
     )
     for flight in flights[1:]:
-        trust.check_command_units(
+        trust.refuse_commands_in_other_unit(
             flight.name, flight.commands, flight.rates, first_flight_ranges, list(vehicle.surfaces)
         )
 

@@ -36,7 +36,7 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     aircraft = scenario.airframe
     column_names_of_each_input = [*stepped.log_column_names_of_each_input(aircraft), ["altitude_m"]]
     log_columns = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
-    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_error_sections(scenario))
     ordered_input_arrays = [
         np.column_stack([log_columns[name] for name in names]) for names in column_names_of_each_input
     ]

@@ -106,7 +106,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     for name in rate_column_names:
         values, mean_age_s = values_and_mean_age_by_column[name]
         values_and_mean_age_by_column[name] = (
-            np.where(_is_stale(recording.columns[name], t_s, step_s), np.nan, values),
+            np.where(_is_held_value_stale(recording.columns[name], t_s, step_s), np.nan, values),
             mean_age_s,
         )
 
@@ -123,7 +123,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         rates=stacked_columns(rate_column_names),
         commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_column_names), mixer_matrix(vehicle)),
         signals=stacked_columns(vehicle.signal_column_names),
-        labels=_labelled_effectiveness_by_surface(recording, vehicle, t_s),
+        labels=_labelled_surface_effectiveness(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
         mean_age_s_by_held_column={
@@ -150,11 +150,13 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     return (
         samples
         if reference_airspeed_mps is None
-        else with_airspeed_effects(samples, reference_airspeed_mps, vehicle.surface_airspeed_powers)
+        else with_airspeed_scaling_and_products(
+            samples, reference_airspeed_mps, vehicle.surface_airspeed_powers
+        )
     )
 
 
-def with_airspeed_effects(
+def with_airspeed_scaling_and_products(
     samples: Samples, reference_airspeed_mps: float, airspeed_powers: Sequence[float] = (2.0,)
 ) -> Samples:
     """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
@@ -164,10 +166,10 @@ def with_airspeed_effects(
     dynamic_pressure_ratio = np.clip(
         np.nan_to_num(airspeed / reference_airspeed_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
     )[:, None]
-    rate_and_signal_airspeed_products = np.column_stack([samples.rates, samples.signals]) * (
+    products_with_relative_airspeed_deviation = np.column_stack([samples.rates, samples.signals]) * (
         np.sqrt(dynamic_pressure_ratio) - 1.0
     )
-    signals_and_products = np.column_stack([samples.signals, rate_and_signal_airspeed_products])
+    signals_and_products = np.column_stack([samples.signals, products_with_relative_airspeed_deviation])
     return replace(
         samples,
         commands=samples.commands * dynamic_pressure_ratio ** (0.5 * np.array(airspeed_powers)),
@@ -237,10 +239,10 @@ def _time_since_column_change_s(column: Column, t_s: Floats) -> Floats:
     )
 
 
-def _is_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
+def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
     """Whether at each sample a gap has opened since the last number of a column."""
     column = _column_of_finite_rows(column)
-    usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
+    usual_step_s = max(_median_step_of_first_stamps_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
 
 
@@ -282,11 +284,11 @@ def _sampled_energy_height_rate_mps(
 
 def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
-    columns, attitude, mistake = recording.columns, vehicle.attitude, None
-    rate_by_column_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if attitude and not signals.is_clipped(next(iter(rate_by_column_name.values())).values).any():
-        angle_quantities = [attitude.roll, attitude.pitch, attitude.yaw]
-        named_angles = [
+    columns, attitude_columns, mistake = recording.columns, vehicle.attitude, None
+    rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    if attitude_columns and not signals.is_clipped(next(iter(rate_column_by_name.values())).values).any():
+        angle_quantities = [attitude_columns.roll, attitude_columns.pitch, attitude_columns.yaw]
+        named_angle_columns_or_none = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
             for quantity in angle_quantities
         ]
@@ -298,7 +300,9 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
         possible_rate_columns = {
             name: columns[name] for name in dict.fromkeys(possible_rate_column_names) if name in columns
         }
-        mistake = physics.find_attitude_mistake(rate_by_column_name, named_angles, possible_rate_columns)
+        mistake = physics.find_attitude_mistake(
+            rate_column_by_name, named_angle_columns_or_none, possible_rate_columns
+        )
     z_acceleration_column = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and z_acceleration_column:
         mistake = physics.gravity_remark(z_acceleration_column, vehicle.acceleration.column)
@@ -310,7 +314,7 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
 
 def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
     """A recording with the columns that a vehicle names in SI."""
-    quantity_of_column = {quantity.column: quantity for _, quantity in vehicle.model_quantities()}
+    quantity_of_column = {quantity.column: quantity for _, quantity in vehicle.located_model_quantities()}
     quantity_of_column |= {quantity.column: quantity for quantity in vehicle.flow.values()}
     quantity_of_column |= {quantity.column: quantity for _, _, quantity in vehicle.quantities_of_known_kind()}
     converted_columns = {
@@ -373,7 +377,7 @@ def _check_stamps_and_make_time_base(
         raise BadInput(
             f"{flight_name}: has {len(stamps)} samples of the rates, allowed: at least {_MIN_LOG_SAMPLES}"
         )
-    step_s = _median_step_s(stamps)
+    step_s = _median_step_of_first_stamps_s(stamps)
     rate_hz = 1.0 / step_s
     if rate_hz < MIN_LOG_RATE_HZ:
         raise BadInput(
@@ -428,7 +432,7 @@ def _regular_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[n
     return stamps[stretch_begin_rows][stretch_number] + index_in_stretch * step_s, stretch_number, step_s
 
 
-def _median_step_s(stamps: Floats) -> float:
+def _median_step_of_first_stamps_s(stamps: Floats) -> float:
     """The usual step of the first stamps, s: a log cut short later has the same."""
     return float(np.median(np.diff(stamps[:_MIN_LOG_SAMPLES]))) if len(stamps) > 1 else float("inf")
 
@@ -439,7 +443,7 @@ def values_and_mean_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[
         return column.values, None
     return (
         _interval_means_and_mean_age(column, t_s, step_s)
-        if _median_step_s(column.t_s) < 0.6 * step_s
+        if _median_step_of_first_stamps_s(column.t_s) < 0.6 * step_s
         else _latest_values_and_mean_age(column, t_s)
     )
 
@@ -478,13 +482,13 @@ def _interval_means_and_mean_age(column: Column, t_s: Floats, step_s: float) -> 
     interval_begin_rows = np.searchsorted(stamps, t_s - step_s + stamp_tolerance_s, side="right")
     n_rows_in_interval = interval_end_rows - interval_begin_rows
     held_values, _ = _latest_values_and_mean_age(column, t_s)
-    interval_mean = (
+    interval_mean_or_zero = (
         cumulated_values[interval_end_rows] - cumulated_values[interval_begin_rows]
     ) / np.maximum(n_rows_in_interval, 1)
-    return np.where(n_rows_in_interval > 0, interval_mean, held_values), 0.5 * step_s
+    return np.where(n_rows_in_interval > 0, interval_mean_or_zero, held_values), 0.5 * step_s
 
 
-def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
+def _labelled_surface_effectiveness(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
     """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
     labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
     for i, surface in enumerate(vehicle.surfaces):
@@ -505,17 +509,17 @@ def constant_stretches(values: Floats) -> list[tuple[int, int]]:
 def read_columns_of_vehicle(path: Path, vehicle: Vehicle, reader_name: str | None = None) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
-    return read_flight(path, *_reader_arguments(vehicle, reader_name))
+    return read_flight(path, *_positional_reader_arguments(vehicle, reader_name))
 
 
 def read_parts_for_vehicle(
     path: Path, vehicle: Vehicle, reader_name: str | None = None
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return read_parts(path, *_reader_arguments(vehicle, reader_name))
+    return read_parts(path, *_positional_reader_arguments(vehicle, reader_name))
 
 
-def _reader_arguments(
+def _positional_reader_arguments(
     vehicle: Vehicle, reader_name: str | None
 ) -> tuple[str | None, tuple[str, str] | None, list[str]]:
     time_column_and_unit = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
@@ -564,15 +568,15 @@ def first_samples(samples: Samples, n_samples: int) -> Samples:
     return samples if n_samples >= len(samples.t_s) else _select_rows(samples, slice(n_samples))
 
 
-def _select_rows(samples: Samples, rows: slice) -> Samples:
+def _select_rows(samples: Samples, row_slice: slice) -> Samples:
     """Some of the samples, copied."""
     selected_fields = {
-        name: values[rows].copy()
+        name: values[row_slice].copy()
         for name in _PER_SAMPLE_FIELDS
         if (values := getattr(samples, name)) is not None
     }
     time_since_change_s_by_column = {
-        name: values[rows].copy() for name, values in samples.time_since_change_s_by_column.items()
+        name: values[row_slice].copy() for name, values in samples.time_since_change_s_by_column.items()
     }
     return replace(
         samples,

@@ -24,14 +24,16 @@ def score_diagnosis(samples: Samples, diagnosis_rows: DiagnosisRows, groups: lis
     is_surface_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_surface_labelled.any():
         return score_against_failures(diagnosis_rows, samples.logged_failures, groups)
-    sample_index_of_row = np.maximum(np.searchsorted(samples.t_s, diagnosis_rows.t_s, side="right") - 1, 0)
-    fields_of_labelled_surfaces = {
+    last_sample_index_of_row = np.maximum(
+        np.searchsorted(samples.t_s, diagnosis_rows.t_s, side="right") - 1, 0
+    )
+    labelled_surface_arrays_by_field = {
         name: getattr(diagnosis_rows, name).compress(is_surface_labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(diagnosis_rows, **fields_of_labelled_surfaces),
-        samples.labels[sample_index_of_row].compress(is_surface_labelled, axis=1),
+        replace(diagnosis_rows, **labelled_surface_arrays_by_field),
+        samples.labels[last_sample_index_of_row].compress(is_surface_labelled, axis=1),
     )
 
 
@@ -86,7 +88,7 @@ def score_against_failures(
     """Scores against the first failure in the log: alarms before it are false, the first one after it has the
     delay delay_s."""
     first_failure_s = min((failure.t_s for failure in failures), default=np.inf)
-    onset = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
+    failure_onset_record = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
     first_failed_surfaces = sorted(
         {
             failure.surface
@@ -94,23 +96,23 @@ def score_against_failures(
             if failure.t_s < first_failure_s + _SIMULTANEOUS_FAILURE_SPAN_S
         }
     )
-    is_before_failure = onset.is_false(diagnosis_rows.t_s)
+    is_before_failure = failure_onset_record.is_false(diagnosis_rows.t_s)
     alarm_rows_after_failure = np.flatnonzero(~is_before_failure & (diagnosis_rows.faulty == 1))
     detected = bool(alarm_rows_after_failure.size)
     name_shares = _name_shares_after_failure(diagnosis_rows, alarm_rows_after_failure)
     return {
         "failure": "+".join(first_failed_surfaces) or None,
-        "failure_s": onset.at_s,
+        "failure_s": failure_onset_record.at_s,
         "healthy_s": float(diagnosis_rows.t_s[is_before_failure][-1] - diagnosis_rows.t_s[0])
         if is_before_failure.any()
         else 0.0,
         "false_alarms": int(np.sum(np.diff(diagnosis_rows.faulty[is_before_failure], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": onset.delay_s(float(diagnosis_rows.t_s[alarm_rows_after_failure[0]]))
+        "delay_s": failure_onset_record.delay_s(float(diagnosis_rows.t_s[alarm_rows_after_failure[0]]))
         if detected
         else None,
         "named": name_shares,
-        "right_group": _is_right_group(name_shares, first_failed_surfaces, groups),
+        "right_group": _is_most_frequent_name_right(name_shares, first_failed_surfaces, groups),
     }
 
 
@@ -127,7 +129,7 @@ def _name_shares_after_failure(
     }
 
 
-def _is_right_group(
+def _is_most_frequent_name_right(
     name_shares: dict[str, float], failed_surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure is a group that failed; None without a failure or

@@ -40,8 +40,8 @@ def is_clipped(values: Floats) -> Mask:
     """
     is_clipped_row = np.zeros(len(values), dtype=bool)
     for signed_values in (values, -values):
-        finite_values = np.where(np.isfinite(signed_values), signed_values, -np.inf)
-        is_at_running_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (
+        values_nan_as_minus_infinity = np.where(np.isfinite(signed_values), signed_values, -np.inf)
+        is_at_running_maximum = (signed_values == np.maximum.accumulate(values_nan_as_minus_infinity)) & (
             signed_values > 0.0
         )
         row_index = np.arange(len(signed_values))
@@ -49,7 +49,7 @@ def is_clipped(values: Floats) -> Mask:
             np.where(_differs_from_previous(signed_values) | ~is_at_running_maximum, row_index, 0)
         )
         running_maximum_ordinal = np.cumsum(
-            _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
+            _differs_from_previous(np.maximum.accumulate(values_nan_as_minus_infinity)).astype(np.int64)
         )  # a larger value begins the count again
         n_rows_at_maximum = np.cumsum(is_at_running_maximum) - _count_rows_at_previous_maxima(
             is_at_running_maximum, running_maximum_ordinal
@@ -85,17 +85,17 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     if len(finite_rows) < MIN_STILL_ROWS:
         return finite_rows[:0]
     signed_steps = np.diff(values[finite_rows])
-    median_step_size = (
+    median_nonzero_step_size = (
         float(np.median(np.abs(signed_steps[signed_steps != 0.0]))) if (signed_steps != 0.0).any() else 0.0
     )
-    is_spike = (np.abs(signed_steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step_size) & (
-        np.abs(signed_steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step_size
+    is_spike = (np.abs(signed_steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_nonzero_step_size) & (
+        np.abs(signed_steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_nonzero_step_size
     )
     is_spike &= signed_steps[:-1] * signed_steps[1:] < 0.0
     spike_rows = finite_rows[1:-1][is_spike]
     return (
         spike_rows
-        if median_step_size > 0.0 and len(spike_rows) <= _MAX_SPIKE_SHARE * len(finite_rows)
+        if median_nonzero_step_size > 0.0 and len(spike_rows) <= _MAX_SPIKE_SHARE * len(finite_rows)
         else finite_rows[:0]
     )
 

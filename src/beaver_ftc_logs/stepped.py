@@ -43,7 +43,7 @@ class ReplayedVerdicts:
     relative_command_gain_upper_bounds: Floats
 
 
-def declared_errors(scenario: Any) -> dict[str, Any]:
+def declared_error_sections(scenario: Any) -> dict[str, Any]:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     scenario_values = scenario.model_dump(mode="json", exclude_unset=True)
     return {key: scenario_values[key] for key in _ERROR_DECLARING_SCENARIO_KEYS if key in scenario_values}
@@ -180,7 +180,7 @@ def diagnosis_rows_from_replay(
                 max(1.0 + float(verdict.estimate), effectiveness_low[k, surface_index]),
                 effectiveness_high[k, surface_index],
             )
-    names = [_isolated_surface_or_unknown(verdict, surfaces) for verdict in replayed_verdicts.verdicts]
+    names = [_isolated_surface_unknown_or_empty(verdict, surfaces) for verdict in replayed_verdicts.verdicts]
     return DiagnosisRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
@@ -220,7 +220,7 @@ def _is_loss_or_untyped(verdict: Verdict) -> bool:
     return verdict.type in (None, LOSS_FAULT_TYPE)
 
 
-def _isolated_surface_or_unknown(verdict: Verdict, surfaces: Sequence[str]) -> str:
+def _isolated_surface_unknown_or_empty(verdict: Verdict, surfaces: Sequence[str]) -> str:
     if not verdict.detected:
         return ""
     return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN_SURFACE

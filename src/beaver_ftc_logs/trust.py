@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 _RANGE_MARGIN_SHARE = 0.5
 """Share of its span by which a range is passed before a row is outside."""
-_AIRSPEED_MARGIN_SHARE = 0.15
+_AIRSPEED_MARGIN_SHARE_OF_LIMIT = 0.15
 _RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
 _MAX_UNCHANGED_TIME_FACTOR = 3.0
 _MAX_FALSE_MISTAKE_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
@@ -57,7 +57,7 @@ def compute_fitted_ranges(
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
     used; held_out_gain_standard_errors (G,) and held_out_max_noise_variance_scale: of parts not fitted."""
-    surface_groups = regression.surface_indices_of_each_group(model)
+    group_surface_indices = regression.surface_indices_of_each_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
     used_airspeeds = [
@@ -66,7 +66,7 @@ def compute_fitted_ranges(
         if samples.airspeed is not None
     ]
     group_commands = np.column_stack(
-        [commands[:, surface_indices].sum(axis=1) for surface_indices in surface_groups]
+        [commands[:, surface_indices].sum(axis=1) for surface_indices in group_surface_indices]
     )
     return FittedRanges(
         commands=central_ranges(commands),
@@ -164,7 +164,7 @@ def _effect_powers(
 ) -> tuple[Floats, Floats]:
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
-    surface_groups = regression.surface_indices_of_each_group(model)
+    group_surface_indices = regression.surface_indices_of_each_group(model)
     lag_counts_and_label_scaling = (
         model.n_rate_lags,
         model.n_command_lags,
@@ -172,7 +172,7 @@ def _effect_powers(
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     regressors_and_predictability_by_flight = [
-        regression.build_regressors(flight, surface_groups, *lag_counts_and_label_scaling)
+        regression.build_regressors(flight, group_surface_indices, *lag_counts_and_label_scaling)
         for flight, _ in flights_with_used_rows
     ]
     is_row_used_by_flight = [
@@ -201,13 +201,13 @@ def _effect_powers(
     residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
     effect_power, power_unexplained_by_other_regressors = (
-        np.zeros(len(surface_groups)),
-        np.zeros(len(surface_groups)),
+        np.zeros(len(group_surface_indices)),
+        np.zeros(len(group_surface_indices)),
     )
-    for group_index in range(len(surface_groups)):
+    for group_index in range(len(group_surface_indices)):
         other_lagged_commands = [
             lagged_group_commands[:, other_group_index]
-            for other_group_index in range(len(surface_groups))
+            for other_group_index in range(len(group_surface_indices))
             if other_group_index != group_index
         ]
         other_regressors = np.column_stack(
@@ -287,7 +287,7 @@ def unknown_effect_sentences(model: Model) -> list[str]:
     ]
 
 
-def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> None:
+def refuse_rates_in_other_unit(samples: Samples, fitted_ranges: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
     if fitted_ranges is None or not fitted_ranges.rate_sd_rad_s:
@@ -323,7 +323,7 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
             )
 
 
-def check_command_units(
+def refuse_commands_in_other_unit(
     flight_name: str, commands: Floats, rates: Floats, fitted_ranges: FittedRanges, surfaces: Sequence[str]
 ) -> None:
     """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
@@ -369,7 +369,7 @@ class _GainBoundsOverFlight(NamedTuple):
     sample_log_likelihood_by_part: Floats
 
 
-def check_columns_as_identified(samples: Samples, model: Model) -> None:
+def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
     """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
     flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
     since no fault has always been there and changes what is not its own.
@@ -387,7 +387,7 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
         (whitened_flight_and_model, log_likelihoods_and_sample_count)
         for whitened_flight_and_model in whitened_flights_and_models or [(samples, model)]
         if (
-            log_likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(
+            log_likelihoods_and_sample_count := _part_log_likelihoods_and_sample_count(
                 *whitened_flight_and_model
             )
         )
@@ -420,8 +420,8 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
         likeliest_whitened_flight, likeliest_model
     )
     if mistake_text is not None:
-        allowed_text = "allowed: columns, signs and units as in the flights of the model"
-        raise BadInput(f"{samples.name}: {mistake_text}, {allowed_text}")
+        allowed_columns_text = "allowed: columns, signs and units as in the flights of the model"
+        raise BadInput(f"{samples.name}: {mistake_text}, {allowed_columns_text}")
 
 
 def _column_mistake_texts(
@@ -437,7 +437,7 @@ def _column_mistake_texts(
         gain_bounds.smallest_group_gain_lower_bounds,
         strict=True,
     ):
-        group_name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
+        group_name, relative_motion = "+".join(group), _relative_group_command_motion(samples, model, group)
         command_text = f"the command of {group_name}"
         motion_text = f"moves {relative_motion:.3g} times as much as in the flights of the"
         if gain_upper_bound < MAX_REVERSED_GAIN:
@@ -528,13 +528,13 @@ def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tu
     corrected_logs = list(
         logs_with_one_mistake_corrected(samples, model.vehicle, surfaces_of_unknown_effect(model))
     )
-    log_likelihoods_and_sample_count = _sample_log_likelihood_by_flight_part(samples, model)
+    log_likelihoods_and_sample_count = _part_log_likelihoods_and_sample_count(samples, model)
     if log_likelihoods_and_sample_count is None:
         return {}, 0.0
     sample_log_likelihood_by_part, n_effective_part_samples = log_likelihoods_and_sample_count
     min_sample_log_likelihood_gain_by_correction = {}
     for log_with_one_mistake_corrected in corrected_logs:
-        corrected_log_likelihoods_and_count = _sample_log_likelihood_by_flight_part(
+        corrected_log_likelihoods_and_count = _part_log_likelihoods_and_sample_count(
             log_with_one_mistake_corrected.samples, model
         )
         min_sample_log_likelihood_gain_by_correction[log_with_one_mistake_corrected.correction_text] = (
@@ -551,7 +551,7 @@ def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tu
     return min_sample_log_likelihood_gain_by_correction, n_effective_part_samples
 
 
-def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tuple[Floats, float] | None:
     """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
@@ -568,7 +568,7 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
         )
     ) is None:
         return None
-    regressors_and_targets = [
+    regressors_and_targets_by_part = [
         _trim_and_gain_regression_data(
             part_rows, rates_unexplained_by_past, group_responses, whitening_matrix
         )
@@ -580,7 +580,7 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
                 regressors, targets, effective_sample_share
             )[1]
         )
-        for regressors, targets in regressors_and_targets
+        for regressors, targets in regressors_and_targets_by_part
     ]
     return -log_noise_sd_product - 1.5 * np.log(noise_variance_scales), effective_sample_share * min(
         map(len, rows_by_part)
@@ -636,7 +636,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     )
     if (rows_by_part := regression.split_into_parts_for_bounds(np.flatnonzero(is_predictable))) is None:
         return None
-    column_contributions, column_names = _column_contributions_to_rates(samples, model)
+    column_contributions, column_names = _rate_contributions_and_column_names(samples, model)
     column_contributions = regression.subtract_noise_prediction(
         column_contributions, model.residual_ar_coefficients(samples.noise_ma_coefficients)
     )
@@ -646,7 +646,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     )
     gain_upper_bounds = np.full(n_groups, -np.inf)
     gain_lower_bounds = np.full(n_groups, np.inf)
-    largest_column_gain_upper_bounds = np.full(len(column_names), -np.inf)
+    column_gain_upper_bounds = np.full(len(column_names), -np.inf)
     noise_variance_scales = []
     responses_and_contributions = np.concatenate([group_responses, column_contributions], axis=1)
     for part_rows in rows_by_part:
@@ -666,20 +666,20 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         )
         gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
         gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
-        largest_column_gain_upper_bounds = np.maximum(
-            largest_column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
+        column_gain_upper_bounds = np.maximum(
+            column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
         )  # what the past does is taken off already
         noise_variance_scales.append(_noise_variance_scale(squared_residuals))
     return _GainBoundsOverFlight(
         gain_upper_bounds.tolist(),
         gain_lower_bounds.tolist(),
-        dict(zip(column_names, largest_column_gain_upper_bounds.tolist(), strict=True)),
+        dict(zip(column_names, column_gain_upper_bounds.tolist(), strict=True)),
         min(noise_variance_scales),
         -log_noise_sd_product - 1.5 * np.log(noise_variance_scales),
     )
 
 
-def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -> float:
+def _relative_group_command_motion(samples: Samples, model: Model, group: list[str]) -> float:
     """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
     not known."""
     if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
@@ -690,7 +690,7 @@ def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -
     return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
 
-def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
+def _rate_contributions_and_column_names(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
     """Compute the contribution of each column to each predicted sample: rates of the other axes, and signals,
     (n, C, 3); and their names."""
     n_signal_lags = model.vehicle.n_signal_lags(model.n_rate_lags)
@@ -778,7 +778,9 @@ def _rows_out_of_fitted_ranges_by_reason(
     if fitted_ranges.airspeed_range_mps is not None and samples.airspeed is not None:
         low, high = fitted_ranges.airspeed_range_mps
         is_airspeed_out_of_range = ~_is_within_or_unknown(
-            samples.airspeed, (1.0 - _AIRSPEED_MARGIN_SHARE) * low, (1.0 + _AIRSPEED_MARGIN_SHARE) * high
+            samples.airspeed,
+            (1.0 - _AIRSPEED_MARGIN_SHARE_OF_LIMIT) * low,
+            (1.0 + _AIRSPEED_MARGIN_SHARE_OF_LIMIT) * high,
         )
         rows_by_reason[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(
             is_airspeed_out_of_range, samples
@@ -835,7 +837,7 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
     }
 
 
-def has_frozen_column_or_clipped_rate(samples: Samples, model: Model) -> Mask:
+def is_row_frozen_or_clipped(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
     is_column_frozen_or_rate_clipped = np.zeros(len(samples.t_s), dtype=bool)
     for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
@@ -851,7 +853,7 @@ def has_frozen_column_or_clipped_rate(samples: Samples, model: Model) -> Mask:
 
 def with_rates_unknown_where_frozen_or_clipped(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live."""
-    is_column_frozen_or_rate_clipped = has_frozen_column_or_clipped_rate(samples, model)
+    is_column_frozen_or_rate_clipped = is_row_frozen_or_clipped(samples, model)
     if not is_column_frozen_or_rate_clipped.any():
         return samples
     return replace(samples, rates=np.where(is_column_frozen_or_rate_clipped[:, None], np.nan, samples.rates))

@@ -277,14 +277,14 @@ class Vehicle(Section):
     )
 
     @model_validator(mode="after")
-    def _check_keys_agree(self) -> "Vehicle":
+    def _check_names_units_and_columns(self) -> "Vehicle":
         reason = (
             "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
         )
         bad_names = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
         for surface, weight_by_command in self.surfaces.items():
-            mistakes += _unknown_name_mistakes(
+            mistakes += _unknown_name_conflicts(
                 ("surfaces", surface), weight_by_command, "command", self.command_column_names
             )
         surface_tables_by_key: dict[str, Collection[str]] = {
@@ -294,12 +294,12 @@ class Vehicle(Section):
             "airspeed_powers": self.airspeed_powers,
         }
         for key, value_by_surface in surface_tables_by_key.items():
-            mistakes += _unknown_name_mistakes((key,), value_by_surface, "surface", self.surfaces)
+            mistakes += _unknown_name_conflicts((key,), value_by_surface, "surface", self.surfaces)
         for location, kind, quantity in self.quantities_of_known_kind():
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._conflicting_column_reading_mistakes()
+        mistakes += self._column_reading_conflicts()
         refuse(mistakes)
         return self
 
@@ -325,11 +325,11 @@ class Vehicle(Section):
                 locations_kinds_and_quantities.append((("flow", name), ANGLE, self.flow[name]))
         return locations_kinds_and_quantities
 
-    def _conflicting_column_reading_mistakes(self) -> list[Conflict]:
+    def _column_reading_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
         first_quantity_of_column: dict[str, QuantityColumn] = {}
         for location, quantity in [
-            *self.model_quantities(),
+            *self.located_model_quantities(),
             *((location, quantity) for location, _, quantity in self.quantities_of_known_kind()),
         ]:
             if first_quantity_of_column.setdefault(quantity.column, quantity) != quantity:
@@ -341,7 +341,7 @@ class Vehicle(Section):
                 ]
         return []
 
-    def model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
+    def located_model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
         locations_and_quantities: list[tuple[Location, QuantityColumn]] = [
             (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
@@ -382,25 +382,25 @@ class Vehicle(Section):
     @property
     def signal_regressor_names(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
-        airspeed (`samples.with_airspeed_effects`)."""
+        airspeed (`samples.with_airspeed_scaling_and_products`)."""
         rate_column_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        rate_and_signal_names_with_airspeed = (
+        column_names_multiplied_by_airspeed = (
             rate_column_names + self.signal_column_names if self.reference_airspeed_mps is not None else []
         )
         return self.signal_column_names + [
-            f"{name} by airspeed" for name in rate_and_signal_names_with_airspeed
+            f"{name} by airspeed" for name in column_names_multiplied_by_airspeed
         ]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [quantity for _, quantity in self.model_quantities()] + [
+        quantities = [quantity for _, quantity in self.located_model_quantities()] + [
             quantity for _, _, quantity in self.quantities_of_known_kind()
         ]
         quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 
-def _unknown_name_mistakes(
+def _unknown_name_conflicts(
     location: Location, names: Iterable[str], name_kind: str, known_names: Collection[str]
 ) -> list[Conflict]:
     """One mistake for each name below a location that is not known."""
@@ -416,8 +416,8 @@ def unused_keys_as_comments(used_keys: Collection[str]) -> str:
     lines = ["# Further keys:"]
     for name, field in Vehicle.model_fields.items():
         if name not in used_keys:
-            example = f"   for example {field.examples[0]}" if field.examples else ""
-            lines.append(f"# {name}: {field.description}{example}")
+            example_text = f"   for example {field.examples[0]}" if field.examples else ""
+            lines.append(f"# {name}: {field.description}{example_text}")
     return "\n".join(lines) + "\n"
 
 

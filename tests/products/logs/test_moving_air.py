@@ -216,7 +216,7 @@ def moving():
 def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
-    trust.check_columns_as_identified(flight, moving)
+    trust.refuse_columns_not_as_identified(flight, moving)
     found = [
         trust._bound_gains_over_flight_parts(whiten_samples(flight, one.ma_coefficients), moving)
         for one in moving.noise_models
@@ -232,7 +232,9 @@ def test_columns_are_compared_in_white(moving, colour):
         colour == (1.0,) or min(plain.largest_group_gain_upper_bounds) > 1.9
     )  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
-        trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
+        trust.refuse_columns_not_as_identified(
+            replace(flight, commands=flight.commands * [-1.0, 1.0]), moving
+        )
 
 
 def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
@@ -241,9 +243,9 @@ def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
         commands=trust.central_ranges(flight.commands), rates=trust.central_ranges(flight.rates)
     )
     moving = moving.model_copy(update={"fitted_ranges": known})
-    trust.check_columns_as_identified(flight, moving)
+    trust.refuse_columns_not_as_identified(flight, moving)
     with pytest.raises(BadInput, match=r"likely with `scale: 0.01745` on p_rad_s"):
-        trust.check_columns_as_identified(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
+        trust.refuse_columns_not_as_identified(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
 
 
 @pytest.mark.parametrize(("keys", "rate_hz"), [

@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.samples import load_flights_for_fit
-from beaver_ftc_logs.trust import central_ranges, check_columns_as_identified
+from beaver_ftc_logs.trust import central_ranges, refuse_columns_not_as_identified
 from products.logs import small, synthetic
 
 
@@ -62,26 +62,28 @@ def n_signal_lags():
 @pytest.mark.parametrize("share", [-1.0, 0.0])
 def test_a_signal_that_does_not_do_what_it_did_is_refused(n_signal_lags, share):
     model, flight = n_signal_lags
-    assert check_columns_as_identified(flight, model) is None
+    assert refuse_columns_not_as_identified(flight, model) is None
     noise = np.random.default_rng(2).standard_normal(flight.signals.shape)
     other = replace(flight, signals=share * flight.signals if share else 20.0 + 3.0 * noise)
     with pytest.raises(BadInput, match=r"what the rates answer to .*airspeed_m_s.* is not"):
-        check_columns_as_identified(other, model)
+        refuse_columns_not_as_identified(other, model)
 
 
 def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(n_signal_lags):
     """A lost surface changes nothing of it."""
     model, _ = n_signal_lags
     lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
-    assert check_columns_as_identified(lost, model) is None
+    assert refuse_columns_not_as_identified(lost, model) is None
     past = np.array(model.lagged_rate_and_signal_coefficients)
     past[:3] += np.array([[0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
     coupled = model.model_copy(update={"lagged_rate_and_signal_coefficients": past.tolist()})
     idle = coupled.model_copy(update={"command_response": np.zeros_like(model.command_response).tolist()})
     flight = small.flight(idle, n=6000, seed=9)
-    assert check_columns_as_identified(flight, coupled) is None
+    assert refuse_columns_not_as_identified(flight, coupled) is None
     with pytest.raises(BadInput, match=r"what the rates answer to .* is not what it is in the model"):
-        check_columns_as_identified(replace(flight, rates=flight.rates * np.array([1.0, 1.0, -1.0])), coupled)
+        refuse_columns_not_as_identified(
+            replace(flight, rates=flight.rates * np.array([1.0, 1.0, -1.0])), coupled
+        )
 
 
 @pytest.mark.parametrize(("factor", "left", "refused"), [
@@ -98,6 +100,6 @@ def test_a_command_that_moves_far_more_and_does_hardly_anything_is_refused(
         with pytest.raises(
             BadInput, match=r"the command of elevator moves .* times as much as in the flights"
         ):
-            check_columns_as_identified(more, model)
+            refuse_columns_not_as_identified(more, model)
     else:
-        assert check_columns_as_identified(more, model) is None
+        assert refuse_columns_not_as_identified(more, model) is None

@@ -51,10 +51,10 @@ def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
 
 def test_the_usual_step_is_that_of_the_first_fifty_stamps():
     t_s = np.concatenate([stamps(0.1, 26), 2.6 + stamps(0.2, 40)])
-    assert of._median_step_s(t_s) == pytest.approx(0.1)
-    assert of._median_step_s(t_s[2:]) == pytest.approx(0.2)
-    assert of._median_step_s(t_s[:1]) == np.inf
-    assert of._median_step_s(t_s[:2]) == pytest.approx(0.1)
+    assert of._median_step_of_first_stamps_s(t_s) == pytest.approx(0.1)
+    assert of._median_step_of_first_stamps_s(t_s[2:]) == pytest.approx(0.2)
+    assert of._median_step_of_first_stamps_s(t_s[:1]) == np.inf
+    assert of._median_step_of_first_stamps_s(t_s[:2]) == pytest.approx(0.1)
 
 
 def test_a_fast_log_is_sampled_over_each_stretch_from_its_first_stamp():
@@ -248,7 +248,7 @@ def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
 def test_labels_are_the_last_ones_of_each_surface_that_has_them():
     vehicle = small.vehicle(labels={"left": {"column": "left_left", "scale": 0.01}, "right": "right_left"})
     known = RecordedFlight("log", {"left_left": column([1.0, 3.0], [40.0, 70.0])})
-    labels = of._labelled_effectiveness_by_surface(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
+    labels = of._labelled_surface_effectiveness(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
     assert np.isnan(labels[:, 0]).all()
     np.testing.assert_allclose(labels[:, 1], [np.nan, 0.4, 0.4, 0.7])
 

@@ -136,7 +136,7 @@ RIGHT = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_whether_the_group_is_the_right_one(name):
     named, surfaces, right = RIGHT[name]
-    assert scoring._is_right_group(named, surfaces, GROUPS) is right
+    assert scoring._is_most_frequent_name_right(named, surfaces, GROUPS) is right
 
 
 def test_a_score_is_by_labels_where_there_are_any():

@@ -137,7 +137,7 @@ def test_rows_use_nothing_later(model):
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        trust.check_rate_units(flown, model.fitted_ranges)
+        trust.refuse_rates_in_other_unit(flown, model.fitted_ranges)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)
@@ -309,9 +309,9 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
-            trust.check_command_units("log", *flown, fitted, ["aileron", "elevator"])
+            trust.refuse_commands_in_other_unit("log", *flown, fitted, ["aileron", "elevator"])
     else:
-        trust.check_command_units("log", *flown, fitted, ["aileron", "elevator"])
+        trust.refuse_commands_in_other_unit("log", *flown, fitted, ["aileron", "elevator"])
 
 
 SPANS = {"commands": [[2.0, 3.0], [-7.0, -6.5]], "rates": [[0.5, 1.1], [-2.2, 0.8], [4.0, 4.4]]}
@@ -367,9 +367,9 @@ def test_for_how_long_each_column_may_stand_still():
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
     short = replace(samples, t_s=np.arange(3.0), time_since_change_s_by_column=still_s)
-    assert trust.has_frozen_column_or_clipped_rate(short, model).tolist() == [False, True, False]
+    assert trust.is_row_frozen_or_clipped(short, model).tolist() == [False, True, False]
     clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
-    assert trust.has_frozen_column_or_clipped_rate(clipped, model).tolist() == [False, True, True]
+    assert trust.is_row_frozen_or_clipped(clipped, model).tolist() == [False, True, True]
 
 
 def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
@@ -412,9 +412,9 @@ def test_what_is_kept_of_the_flights_fitted():
     model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
     commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
     flown = replace(other, commands=commands)
-    assert trust._relative_command_motion(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
-    assert trust._relative_command_motion(flown, model, ["left", "right"]) == pytest.approx(3.992)
-    assert trust._relative_command_motion(flown, small.model(), ["left"]) == 0.0
+    assert trust._relative_group_command_motion(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
+    assert trust._relative_group_command_motion(flown, model, ["left", "right"]) == pytest.approx(3.992)
+    assert trust._relative_group_command_motion(flown, small.model(), ["left"]) == 0.0
     assert trust.central_ranges(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
     assert trust.central_ranges(np.empty((3, 0))) == []
 
@@ -433,7 +433,7 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     likely = np.array([0.9, 0.3, 0.5, 0.7])
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
     read = [CorrectedLog(*one) for one in (("A", "short"), ("B", "other", 0.1))]
-    monkeypatch.setattr(trust, "_sample_log_likelihood_by_flight_part", lambda samples, _: parts[samples])
+    monkeypatch.setattr(trust, "_part_log_likelihoods_and_sample_count", lambda samples, _: parts[samples])
     monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
     assert trust._likelier_column_mistake_text("as it is", small.model()) == told
@@ -445,7 +445,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
     """Of a rate what its past does to other axes than its own; of a signal what it does to all."""
     model = small.model(small.TAIL)
     flown = small.flight(model, n=7)
-    found, names = trust._column_contributions_to_rates(flown, model)
+    found, names = trust._rate_contributions_and_column_names(flown, model)
     past, rates = np.array(model.lagged_rate_and_signal_coefficients), flown.rates
     assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
     for k in range(2, 7):
@@ -465,7 +465,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
 )  # fmt: skip
 def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least, moved, says):
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
-    monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: moved)
+    monkeypatch.setattr(trust, "_relative_group_command_motion", lambda samples, model, group: moved)
     model = SimpleNamespace(groups=[["right", "left"]], fitted_ranges=None)
     found = trust._GainBoundsOverFlight([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
     wrong = trust._column_mistake_texts(None, model, found)
@@ -487,7 +487,7 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
 )
 def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkeypatch, sd, refused):
     """Four standard errors of a quarter: by such a model a sound log answers with a gain of 0.19, too."""
-    monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: 3.1)
+    monkeypatch.setattr(trust, "_relative_group_command_motion", lambda samples, model, group: 3.1)
     known = SimpleNamespace(
         effect_share_explained_by_other_regressors=[0.9],
         group_gain_standard_error=[sd],
@@ -507,9 +507,9 @@ def test_of_a_rate_without_a_number_no_unit_is_judged():
     known = small.model(fitted={"commands": [], "rates": [], "spread": [1.0, 1.0, 1.0]})
     rates = np.random.default_rng(1).normal(0.0, 57.3, (200, 3))
     with pytest.raises(BadInput, match="deg/s"):
-        trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)
+        trust.refuse_rates_in_other_unit(small.flight(known, 200, rates=rates), known.fitted_ranges)
     rates[:, 2] = np.nan
-    trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)
+    trust.refuse_rates_in_other_unit(small.flight(known, 200, rates=rates), known.fitted_ranges)
 
 
 def test_the_power_of_a_group_s_effect_is_in_variances_of_correlated_noise(model):

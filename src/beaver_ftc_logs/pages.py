@@ -253,16 +253,19 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    usable_flights = fitting.flights_with_usable_rows(flights)
+    flights_with_usable_mask = fitting.flights_with_usable_rows(flights)
     rate_regression = fitting.fit_least_squares_of_order(
-        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
+        flights_with_usable_mask, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     coefficient_names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=IDENTIFICATION_PAGE_MARK,
         model=model,
         found=model.identification_results,
-        used=sum(int(usable_flight.is_usable.sum()) for usable_flight in usable_flights),
+        used=sum(
+            int(flight_with_usable_mask.is_usable.sum())
+            for flight_with_usable_mask in flights_with_usable_mask
+        ),
         coefficients=list(
             zip(
                 coefficient_names,
@@ -271,8 +274,8 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
                 strict=True,
             )
         ),
-        fits=_encode_png(_prediction_figure(usable_flights, model)),
-        spectrum=_encode_png(_spectrum_figure(usable_flights, model)),
+        fits=_encode_png(_prediction_figure(flights_with_usable_mask, model)),
+        spectrum=_encode_png(_spectrum_figure(flights_with_usable_mask, model)),
         correlation=_encode_png(_coefficient_correlation_figure(rate_regression, coefficient_names)),
     )
 
@@ -289,11 +292,11 @@ def _encode_png(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
+def _prediction_figure(flights_with_usable_mask: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     fold_models_flights_names = [
         (fitting.fit_with_same_order(flights_fitted_in_fold, model), held_out, name)
-        for flights_fitted_in_fold, held_out, name in fitting.validation_folds(usable_flights)
+        for flights_fitted_in_fold, held_out, name in fitting.validation_folds(flights_with_usable_mask)
     ]
     fold_models_flights_names = [
         fold_model_flight_name
@@ -347,10 +350,13 @@ def _first_row_of_liveliest_window(
     )
 
 
-def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
+def _spectrum_figure(flights_with_usable_mask: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = np.vstack(
-        [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
+        [
+            fitting.rows_and_one_step_residuals(model, flight_with_usable_mask)[1]
+            for flight_with_usable_mask in flights_with_usable_mask
+        ]
     )
     frequency_hz, residual_power_densities = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)

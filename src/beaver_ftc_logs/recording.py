@@ -103,7 +103,7 @@ def columns_and_time_origin(
     topics: each topic's fields by name, one of them the stamps in us.
     """
     kept_rows_and_note_of_topic = {
-        name: rows_with_increasing_time(name, _as_floats(fields[stamp_field]))
+        name: rows_with_increasing_time(name, _as_float_array(fields[stamp_field]))
         for name, fields in topics.items()
     }
     first_stamps_us = [
@@ -115,16 +115,16 @@ def columns_and_time_origin(
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
         kept_rows, note = kept_rows_and_note_of_topic[name]
-        t_s = (_as_floats(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
+        t_s = (_as_float_array(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
         columns |= {
-            f"{name}.{field}": Column(t_s, _as_floats(values)[kept_rows], note)
+            f"{name}.{field}": Column(t_s, _as_float_array(values)[kept_rows], note)
             for field, values in fields.items()
             if field != stamp_field
         }
     return columns, origin_us * _S_PER_US
 
 
-def _as_floats(values: Any) -> Floats:
+def _as_float_array(values: Any) -> Floats:
     return np.asarray(values, dtype=float)
 
 

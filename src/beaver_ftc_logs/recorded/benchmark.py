@@ -121,12 +121,17 @@ def result_files(document: Document) -> Files:
 
 
 def _compare_methods(data_set: FlightDataSet) -> Document:
-    usable_flights, is_single_flight = flights_with_usable_rows(data_set.flights), len(data_set.flights) == 1
+    flights_with_usable_mask, is_single_flight = (
+        flights_with_usable_rows(data_set.flights),
+        len(data_set.flights) == 1,
+    )
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    whole_flight_settings = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
+    whole_flight_settings = (
+        settings_of_whole_flight(flights_with_usable_mask, data_set) if is_single_flight else None
+    )
     flight_entries: list[Document] = []
-    for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
+    for fitted_flights, held_out, held_out_name in validation_folds(flights_with_usable_mask):
         model = add_fitted_ranges_and_alarm_threshold(
             fitted_flights, fit_model(fitted_flights, data_set.vehicle, whole_flight_settings)
         )
@@ -173,14 +178,14 @@ def _diagnose_with_each_method(
 
 
 def settings_of_whole_flight(
-    usable_flights: list[FlightWithUsableRows], data_set: FlightDataSet
+    flights_with_usable_mask: list[FlightWithUsableRows], data_set: FlightDataSet
 ) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
-    model = fit_model(usable_flights, data_set.vehicle)
-    if len(usable_flights) > 1:
+    model = fit_model(flights_with_usable_mask, data_set.vehicle)
+    if len(flights_with_usable_mask) > 1:
         return model.settings
     return model.settings.model_copy(
-        update={"credible_mass": score_folds_and_choose_credible_mass(usable_flights, model)[1]}
+        update={"credible_mass": score_folds_and_choose_credible_mass(flights_with_usable_mask, model)[1]}
     )
 
 

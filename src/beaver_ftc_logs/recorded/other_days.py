@@ -203,13 +203,13 @@ def run_other_days(folder: Path) -> Document:
 
 
 def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
-    usable_flights = flights_with_usable_rows(data_set.flights)
-    settings = benchmark.settings_of_whole_flight(usable_flights, data_set)
+    flights_with_usable_mask = flights_with_usable_rows(data_set.flights)
+    settings = benchmark.settings_of_whole_flight(flights_with_usable_mask, data_set)
     models_and_held_out = [
         (fit_model(fitted_flights, data_set.vehicle, settings), held_out)
-        for fitted_flights, held_out, _ in validation_folds(usable_flights)
+        for fitted_flights, held_out, _ in validation_folds(flights_with_usable_mask)
     ]
-    whole_flight_model = fit_model(usable_flights, data_set.vehicle, settings)
+    whole_flight_model = fit_model(flights_with_usable_mask, data_set.vehicle, settings)
     n_surfaces = len(data_set.vehicle.surfaces)
     days_by_kind = {
         "one change": unchanged_and_one_change_days(

@@ -37,7 +37,7 @@ _DISTRUST_AFTER_CLIPPING_S = 30.0
 _MIN_MOVED_EFFECT_POWER_RATIO = 1e-6
 _MAX_SHARE_EXPLAINED_BY_OTHERS, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
-_MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR = 10.0, 1.6
+_MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RANGE_QUANTILES = (0.001, 0.999)
@@ -300,9 +300,9 @@ def refuse_rates_in_other_unit(samples: Samples, fitted_ranges: FittedRanges | N
         is_ratio_alike_on_axes = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
         if (
             is_ratio_alike_on_axes
-            and 1.0 / _UNIT_TOLERANCE_FACTOR**2
+            and 1.0 / _UNIT_TOLERANCE_FACTOR_ROOT**2
             < geometric_mean_sd_ratio / units_per_rad
-            < _UNIT_TOLERANCE_FACTOR**2
+            < _UNIT_TOLERANCE_FACTOR_ROOT**2
         ):
             raise BadInput(
                 f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
@@ -311,9 +311,9 @@ def refuse_rates_in_other_unit(samples: Samples, fitted_ranges: FittedRanges | N
             )
         if (
             is_ratio_alike_on_axes
-            and 1.0 / _UNIT_TOLERANCE_FACTOR**2
+            and 1.0 / _UNIT_TOLERANCE_FACTOR_ROOT**2
             < geometric_mean_sd_ratio * units_per_rad
-            < _UNIT_TOLERANCE_FACTOR**2
+            < _UNIT_TOLERANCE_FACTOR_ROOT**2
         ):
             raise BadInput(
                 f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
@@ -555,8 +555,8 @@ def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tu
     """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
-    whitening_matrix, effective_sample_share, log_noise_sd_product = _whitening_sample_share_and_log_noise(
-        samples, model
+    whitening_matrix, effective_sample_share, log_unfiltered_noise_sd_product = (
+        _whitening_sample_share_and_log_noise(samples, model)
     )
     is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         samples, model
@@ -582,9 +582,9 @@ def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tu
         )
         for regressors, targets in regressors_and_targets_by_part
     ]
-    return -log_noise_sd_product - 1.5 * np.log(noise_variance_scales), effective_sample_share * min(
-        map(len, rows_by_part)
-    )
+    return -log_unfiltered_noise_sd_product - 1.5 * np.log(
+        noise_variance_scales
+    ), effective_sample_share * min(map(len, rows_by_part))
 
 
 def _whitening_sample_share_and_log_noise(samples: Samples, model: Model) -> tuple[Floats, float, float]:
@@ -599,14 +599,14 @@ def _whitening_sample_share_and_log_noise(samples: Samples, model: Model) -> tup
         ).intercept_past_response_noise()[3]
         / covariance_inflation_of_fitted_noise
     )
-    log_noise_sd_product = float(
+    log_unfiltered_noise_sd_product = float(
         np.log(np.diag(noise_covariance_root)).sum()
         - 3.0 * np.log(sum(samples.noise_ma_coefficients or (1.0,)))
     )
     return (
         np.linalg.inv(noise_covariance_root).T,
         model.settings.effective_sample_share / covariance_inflation_of_fitted_noise,
-        log_noise_sd_product,
+        log_unfiltered_noise_sd_product,
     )
 
 
@@ -640,7 +640,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     column_contributions = regression.subtract_noise_prediction(
         column_contributions, model.residual_ar_coefficients(samples.noise_ma_coefficients)
     )
-    (whitening_matrix, effective_sample_share, log_noise_sd_product), n_groups = (
+    (whitening_matrix, effective_sample_share, log_unfiltered_noise_sd_product), n_groups = (
         _whitening_sample_share_and_log_noise(samples, model),
         len(model.groups),
     )
@@ -675,7 +675,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         gain_lower_bounds.tolist(),
         dict(zip(column_names, column_gain_upper_bounds.tolist(), strict=True)),
         min(noise_variance_scales),
-        -log_noise_sd_product - 1.5 * np.log(noise_variance_scales),
+        -log_unfiltered_noise_sd_product - 1.5 * np.log(noise_variance_scales),
     )
 
 

@@ -149,7 +149,7 @@ def innovations(declared, seed=0):
     """Innovations squared, over what the filter expects of them, on a healthy flight in gusts."""
     detector = plugin_class(DETECTORS, "augmented-ekf")()
     detector.reset(context(declared, **{**detector.defaults, "noise": 1.0, "drift_per_s": 1e-6}))
-    squares, detector.statistic = [], lambda square: squares.append(square) or 0.0
+    squares, detector.update_statistic = [], lambda square: squares.append(square) or 0.0
     for measured in flight(duration_s=20, seed=seed, air=GUSTY):
         detector.step(measured, np.zeros(4))
     return np.mean(squares) / 3.0

@@ -33,7 +33,7 @@ from beaver_ftc_logs.diagnose import (
     check_log_fits_model,
     diagnose,
     finalize_rows_at_log_stamps,
-    join_flagged_names,
+    join_flagged_names_by_row,
     standardized_healthy_residual,
 )
 from beaver_ftc_logs.model import Model
@@ -137,19 +137,20 @@ def _diagnosis_rows_from_least_squares(
                 np.abs(estimated_effectiveness[:, group_index, None] - levels).argmin(axis=1)
             ]
         has_loss = estimated_effectiveness < 1.0
-    group_bounds_by_side = {
+    group_bounds_by_end = {
         "low": np.minimum(low_from_standard_error, estimated_effectiveness),
         "high": np.maximum(high_from_standard_error, estimated_effectiveness),
     }
-    surface_bounds_by_side = {
-        side: expand_group_values_to_surfaces(bound, model) for side, bound in group_bounds_by_side.items()
+    surface_bounds_by_end = {
+        bound_end: expand_group_values_to_surfaces(bound, model)
+        for bound_end, bound in group_bounds_by_end.items()
     }
-    isolated_names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
+    isolated_names = join_flagged_names_by_row(has_loss, ["+".join(group) for group in model.groups])
     return _rows_with_default_bounds(
         samples,
         isolated_names,
         expand_group_values_to_surfaces(estimated_effectiveness, model),
-        **surface_bounds_by_side,
+        **surface_bounds_by_end,
     )
 
 
@@ -200,7 +201,9 @@ def diagnose_by_freeze_rule(
         is_frozen[:, surface_names.index(name)] = (
             samples.t_s - unchanged_since_s[np.maximum(last_output_rows, 0)] > MIN_FROZEN_OUTPUT_S
         ) & (last_output_rows >= 0)
-    return _rows_with_default_bounds(samples, join_flagged_names(is_frozen, surface_names), 1.0 - is_frozen)
+    return _rows_with_default_bounds(
+        samples, join_flagged_names_by_row(is_frozen, surface_names), 1.0 - is_frozen
+    )
 
 
 class LinearRateModel:

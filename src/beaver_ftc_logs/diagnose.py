@@ -446,7 +446,7 @@ def _surfaces_at_fault(
         is_group_likely &= ~(
             is_group_likely[:, has_group_loss_hypothesis].all(axis=1) & (has_group_loss_hypothesis.sum() > 1)
         )[:, None]
-    likely_names = join_flagged_names(is_group_likely, ["+".join(group) for group in model.groups])
+    likely_names = join_flagged_names_by_row(is_group_likely, ["+".join(group) for group in model.groups])
     isolated_names = np.full(len(posterior), "", dtype=object)
     is_unknown_offset_likelier = (
         posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
@@ -467,7 +467,7 @@ def _surfaces_at_fault(
                 previous_name != UNKNOWN_SURFACE
                 and (
                     new_name_unchanged_samples < hold_samples
-                    or _would_restore_excluded_surfaces(new_name, previous_name, model)
+                    or _would_name_all_named_before(new_name, previous_name, model)
                 )
             )
         )
@@ -475,7 +475,7 @@ def _surfaces_at_fault(
     return isolated_names
 
 
-def _would_restore_excluded_surfaces(new_name: str, previous_name: str, model: Model) -> bool:
+def _would_name_all_named_before(new_name: str, previous_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
     return model.settings.assumes_one_group_at_fault and (
@@ -483,7 +483,7 @@ def _would_restore_excluded_surfaces(new_name: str, previous_name: str, model: M
     )
 
 
-def join_flagged_names(is_flagged: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+def join_flagged_names_by_row(is_flagged: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
     """The names that are flagged in is_flagged (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in is_flagged], dtype=object)
 

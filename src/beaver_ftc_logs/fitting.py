@@ -651,9 +651,9 @@ def _standardized_centred_responses_and_residual(
             )
         )
     ).T
-    standardized_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
-    standardized_residual = residual @ whitening_matrix
-    return _without_mean(standardized_responses), _without_mean(standardized_residual)
+    noise_whitened_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
+    noise_whitened_residual = residual @ whitening_matrix
+    return _without_mean(noise_whitened_responses), _without_mean(noise_whitened_residual)
 
 
 def _without_mean(values: Floats) -> Floats:
@@ -681,11 +681,11 @@ def _estimate_trim_walk_sd_per_sample(
                     held_out.samples.noise_ma_coefficients
                 ).residual_covariance
             )
-            standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise_covariance), MIN_DIVISOR))
+            noise_whitened_residual = residual / np.sqrt(np.maximum(np.diag(noise_covariance), MIN_DIVISOR))
             for begin, end in _begins_and_ends_of_consecutive_rows(rows):
                 for i, n_span_samples in enumerate(span_lengths_samples.astype(int).tolist()):
                     span_means = (
-                        standardized_residual[begin:end][: (end - begin) // n_span_samples * n_span_samples]
+                        noise_whitened_residual[begin:end][: (end - begin) // n_span_samples * n_span_samples]
                         .reshape(-1, n_span_samples, 3)
                         .mean(axis=1)
                     )
@@ -1094,14 +1094,14 @@ def rate_and_signal_gain_standard_error(
         coefficients_over_standard_errors = coefficients / np.maximum(
             rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
         )
-        inverse_error_correlation = np.linalg.pinv(
+        inverse_coefficient_error_correlation = np.linalg.pinv(
             rate_regression.coefficient_error_correlation[np.ix_(coefficient_rows, coefficient_rows)],
             rcond=_RANK_TOLERANCE,
         )
         information = np.einsum(
             "la,lm,ma->",
             coefficients_over_standard_errors,
-            inverse_error_correlation,
+            inverse_coefficient_error_correlation,
             coefficients_over_standard_errors,
         ) - np.count_nonzero(coefficients)
         standard_error_by_rate_or_signal[name] = min(

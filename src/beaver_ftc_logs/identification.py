@@ -36,7 +36,7 @@ _DECISIVE_BIC_DIFFERENCE = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 FREE_RUN_WINDOW_S = 2.0
-_MAX_FREE_RUN_WINDOWS = 400
+_MIN_WINDOWS_AFTER_THINNING = 400
 _AIRSPEED_POWER_CANDIDATES = (0.0, 1.0, 3.0)
 _MAX_WHITENING_ROUNDS = 8
 _MAX_COMMAND_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
@@ -350,10 +350,10 @@ def _scale_by_best_airspeed_powers(
     surface_names = list(vehicle.surfaces)
     for surface_indices in regression.group_surfaces_by_commands(vehicle):
         for airspeed_power in _AIRSPEED_POWER_CANDIDATES:
-            candidate_powers = vehicle.airspeed_powers | {
+            candidate_power_by_surface = vehicle.airspeed_powers | {
                 surface_names[i]: airspeed_power for i in surface_indices
             }
-            candidate_vehicle = vehicle.model_copy(update={"airspeed_powers": candidate_powers})
+            candidate_vehicle = vehicle.model_copy(update={"airspeed_powers": candidate_power_by_surface})
             if (
                 bic := _min_bic(scale_and_optionally_whiten_flights(candidate_vehicle), candidate_vehicle)
             ) < bic_to_beat:
@@ -511,15 +511,15 @@ def residual_to_white_density_by_band(
     )
     frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     white_density = residual.var(axis=0) / (0.5 * model.rate_hz)
-    band_entries = []
+    band_density_ratio_records = []
     for low_hz, high_hz in _SPECTRUM_BANDS_HZ:
         is_in_band = (frequency_hz > low_hz) & (frequency_hz <= high_hz)
         if is_in_band.any():
             density_ratio = (density[is_in_band].mean(axis=0) / white_density).tolist()
-            band_entries.append(
+            band_density_ratio_records.append(
                 {"from_hz": low_hz, "to_hz": high_hz, **dict(zip("pqr", density_ratio, strict=True))}
             )
-    return band_entries
+    return band_density_ratio_records
 
 
 def identification_text(model: Model) -> str:
@@ -715,7 +715,7 @@ def _cut_free_run_windows(
     for usable_flight in usable_flights:
         samples = usable_flight.samples
         effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        summed_group_commands = np.column_stack(
+        effective_group_commands = np.column_stack(
             [
                 (samples.commands * effectiveness)[:, surface_indices].sum(axis=1)
                 for surface_indices in surface_groups
@@ -723,7 +723,7 @@ def _cut_free_run_windows(
         )
         is_usable = (
             usable_flight.is_usable
-            & np.isfinite(summed_group_commands).all(axis=1)
+            & np.isfinite(effective_group_commands).all(axis=1)
             & np.isfinite(samples.rates).all(axis=1)
         )
         for window_end in range(n_past_samples + window_samples, len(is_usable), window_samples):
@@ -732,9 +732,9 @@ def _cut_free_run_windows(
                 is_usable[window_rows].all()
                 and samples.stretch_number[window_rows.start] == samples.stretch_number[window_end - 1]
             ):
-                window_commands.append(summed_group_commands[window_rows])
+                window_commands.append(effective_group_commands[window_rows])
                 window_rates.append(samples.rates[window_end - window_samples : window_end])
-    window_thinning_factor = max(len(window_rates) // _MAX_FREE_RUN_WINDOWS, 1)
+    window_thinning_factor = max(len(window_rates) // _MIN_WINDOWS_AFTER_THINNING, 1)
     window_commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
     return np.reshape(window_commands[::window_thinning_factor], window_commands_shape), np.reshape(
         window_rates[::window_thinning_factor], (-1, window_samples, 3)

@@ -93,7 +93,9 @@ def _simulate_rows(
             + effective_right_and_left_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
             + turbulence_rad_s2
         )
-        roll_and_pitch_rad = roll_and_pitch_rad + dt_s * _euler_rates(rates, roll_and_pitch_rad)
+        roll_and_pitch_rad = roll_and_pitch_rad + dt_s * _roll_and_pitch_angle_rates(
+            rates, roll_and_pitch_rad
+        )
 
 
 def _control_law(roll_and_pitch_rad: Floats, rates: Floats, demanded_roll_and_pitch_rad: Floats) -> Floats:
@@ -101,7 +103,7 @@ def _control_law(roll_and_pitch_rad: Floats, rates: Floats, demanded_roll_and_pi
     return np.clip(1.2 * (demanded_roll_and_pitch_rad - roll_and_pitch_rad) - 0.15 * rates[:2], -1.0, 1.0)
 
 
-def _euler_rates(rates: Floats, roll_and_pitch_rad: Floats) -> Floats:
+def _roll_and_pitch_angle_rates(rates: Floats, roll_and_pitch_rad: Floats) -> Floats:
     """Rates of the roll and the pitch angle."""
     p, q, r = rates
     phi, theta = roll_and_pitch_rad

@@ -143,7 +143,9 @@ def effect_share_explained_by_other_regressors(
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    effect_power, power_unexplained_by_other_regressors = _effect_powers(flights_with_used_rows, model)
+    effect_power, power_unexplained_by_other_regressors = _effect_and_unexplained_powers(
+        flights_with_used_rows, model
+    )
     has_moved = effect_power > _MIN_MOVED_EFFECT_POWER_RATIO
     share_explained_by_other_regressors = 1.0 - power_unexplained_by_other_regressors / np.minimum(
         np.where(has_moved, effect_power, 1.0), _EFFECT_NOISE_POWER_RATIO_CAP
@@ -156,10 +158,10 @@ def effect_power_unexplained_by_other_regressors(
 ) -> Floats:
     """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
     sample, (G,)."""
-    return _effect_powers(flights_with_used_rows, model)[1]
+    return _effect_and_unexplained_powers(flights_with_used_rows, model)[1]
 
 
-def _effect_powers(
+def _effect_and_unexplained_powers(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
 ) -> tuple[Floats, Floats]:
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
@@ -437,21 +439,24 @@ def _column_mistake_texts(
         gain_bounds.smallest_group_gain_lower_bounds,
         strict=True,
     ):
-        group_name, relative_motion = "+".join(group), _relative_group_command_motion(samples, model, group)
-        command_text = f"the command of {group_name}"
+        surface_group_name, relative_motion = (
+            "+".join(group),
+            _relative_group_command_motion(samples, model, group),
+        )
+        command_text = f"the command of {surface_group_name}"
         motion_text = f"moves {relative_motion:.3g} times as much as in the flights of the"
         if gain_upper_bound < MAX_REVERSED_GAIN:
             mistake_text = (
                 f"the rates answer {command_text} the other way round in all of it (does `scale: -1` fit?)"
             )
-            mistakes[f"sign {group_name}"] = mistake_text
+            mistakes[f"sign {surface_group_name}"] = mistake_text
         elif (
             has_known_gain
             and gain_upper_bound < _MIN_COMMAND_GAIN
             and relative_motion > _MAX_ALIKE_MOTION_FACTOR
         ):
             effect_size_text = f"does at most {gain_upper_bound:.2g} of what it did"
-            mistakes[f"unit {group_name}"] = (
+            mistakes[f"unit {surface_group_name}"] = (
                 f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
             )
         elif (
@@ -460,7 +465,7 @@ def _column_mistake_texts(
             and 0.0 < relative_motion < 1.0 / _MAX_ALIKE_MOTION_FACTOR
         ):
             effect_size_text = f"does at least {gain_lower_bound:.3g} times what it did"
-            mistakes[f"unit {group_name}"] = (
+            mistakes[f"unit {surface_group_name}"] = (
                 f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
             )
     if mistaken_columns := [
@@ -839,24 +844,22 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
 
 def is_row_frozen_or_clipped(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
-    is_column_frozen_or_rate_clipped = np.zeros(len(samples.t_s), dtype=bool)
+    is_any_column_frozen = np.zeros(len(samples.t_s), dtype=bool)
     for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
-        is_column_frozen_or_rate_clipped |= (
-            samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
-        )
+        is_any_column_frozen |= samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
     return (
-        is_column_frozen_or_rate_clipped
+        is_any_column_frozen
         if samples.is_rate_clipped is None
-        else is_column_frozen_or_rate_clipped | samples.is_rate_clipped
+        else is_any_column_frozen | samples.is_rate_clipped
     )
 
 
 def with_rates_unknown_where_frozen_or_clipped(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live."""
-    is_column_frozen_or_rate_clipped = is_row_frozen_or_clipped(samples, model)
-    if not is_column_frozen_or_rate_clipped.any():
+    is_frozen_or_clipped = is_row_frozen_or_clipped(samples, model)
+    if not is_frozen_or_clipped.any():
         return samples
-    return replace(samples, rates=np.where(is_column_frozen_or_rate_clipped[:, None], np.nan, samples.rates))
+    return replace(samples, rates=np.where(is_frozen_or_clipped[:, None], np.nan, samples.rates))
 
 
 def credibility_entry(rows_by_reason: Mapping[str, Mask], is_credible: NDArray[np.int64]) -> Document:

@@ -4,14 +4,14 @@ from inspect import signature
 
 import numpy as np
 
-from beaver_ftc.diagnosis.schemes import diagnosis_dtype
+from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.diagnosis.state import LOSS
 
 DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 
 
 def new_fdi():
-    fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
+    fdi = np.zeros(1, fdi_dtype(4)).view(np.recarray)[0]
     fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["decay_factor"][:3] = (
         DT,
         3,

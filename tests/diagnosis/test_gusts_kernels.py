@@ -204,7 +204,9 @@ def test_level_axes_are_a_rotation(seed):
     gusts.fill_level_to_body_rotation(phi, theta, turn)
     of_level = to_earth((phi, theta, 0.0))
     assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
-    assert [gusts.level_component(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
+    assert [gusts.component_in_level_axes(turn, body, i) for i in range(3)] == pytest.approx(
+        of_level.apply(body)
+    )
 
 
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():

@@ -12,7 +12,7 @@ from beaver_ftc.diagnosis.state import (
     INTERVAL_THRESHOLD,
     LOSS,
     NOT_ISOLATED,
-    POSITION,
+    POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
@@ -230,7 +230,7 @@ def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted,
     assert on(isolation.decide_isolation, fdi, 5.0) == UNANTICIPATED
 
 
-@pytest.mark.parametrize("kind", [LOSS, POSITION])
+@pytest.mark.parametrize("kind", [LOSS, POSITION_HYPOTHESIS])
 def test_a_hypothesis_is_the_difference_it_makes_to_the_moment(kind):
     """Surface 2 at u: healthy it gives G u; at share 1 + theta of it, or at the position theta."""
     rng, u = np.random.default_rng(3), np.array([0.1, -0.2, 0.3, 0.0])
@@ -319,7 +319,8 @@ def doubtful(kind=LOSS, **switches):
     ("kind", "switches", "started", "possible"),
     [
         (LOSS, {}, True, True), (LOSS, {"memory": 1}, False, False), (LOSS, {"shared": 1}, True, False),
-        (LOSS, {"shared": 1}, False, True), (POSITION, {}, True, False), (POSITION, {}, False, True),
+        (LOSS, {"shared": 1}, False, True), (POSITION_HYPOTHESIS, {}, True, False),
+        (POSITION_HYPOTHESIS, {}, False, True),
         (LOSS, {"membership": 1, "abrupt": 1}, True, False), (LOSS, {"membership": 1}, True, True),
         (LOSS, {"abrupt": 1}, True, True), (LOSS, {"membership": 1, "abrupt": 1}, False, True),
     ],
@@ -333,7 +334,7 @@ def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, poss
 
 
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
-    fdi, fie = doubtful(POSITION, memory=1)
+    fdi, fie = doubtful(POSITION_HYPOTHESIS, memory=1)
     fdi["bank"]["output"]["residual"] = 0.0
     assert not on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), False)
     fdi["bank"]["output"]["innovation"] = 0.0
@@ -341,14 +342,15 @@ def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
-    fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
+    fdi, fie = doubtful(POSITION_HYPOTHESIS, membership=1, abrupt=1)
     fdi["bank"]["output"]["innovation"] = 0.0
     on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), True)
     assert fie["feasible_theta_min"].tolist() == [-1.0] * 3
 
 
 @pytest.mark.parametrize(
-    ("kind", "errors", "wider"), [(POSITION, 1, True), (POSITION, 0, False), (LOSS, 1, False)]
+    ("kind", "errors", "wider"),
+    [(POSITION_HYPOTHESIS, 1, True), (POSITION_HYPOTHESIS, 0, False), (LOSS, 1, False)],
 )
 def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, errors, wider):
     rng, fdi = np.random.default_rng(6), new_fdi()
@@ -413,7 +415,12 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
         fdi["types"]["config"]["frame_shows_single_instant"],
     ) = 4, 9, 1, 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
-        fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = POSITION, s, -1.0, 1.0
+        fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = (
+            POSITION_HYPOTHESIS,
+            s,
+            -1.0,
+            1.0,
+        )
         fie["frame_mean_effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY["all", "worst-case"].isolate(

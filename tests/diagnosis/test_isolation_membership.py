@@ -5,7 +5,7 @@ import pytest
 from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import POSITION
+from beaver_ftc.diagnosis.state import POSITION_HYPOTHESIS
 
 
 @pytest.mark.parametrize("slope", [2.0, -2.0])
@@ -85,7 +85,7 @@ def test_the_dominant_axis_is_that_of_the_largest_effect():
 def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     """A position whose terms' errors grow with it: the room is a fixed point of where it can have been."""
     fdi = new_fdi()
-    fie = estimator(fdi, POSITION, surface=1, low=-0.6, high=0.5)
+    fie = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.6, high=0.5)
     (
         fdi["config"]["n_substeps"],
         fdi["bank"]["output"]["innovation"],
@@ -125,7 +125,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
 
 def test_where_no_position_agrees_the_whole_travel_stays_possible():
     fdi = new_fdi()
-    fie = estimator(fdi, POSITION, surface=1, low=-0.6, high=0.5)
+    fie = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.6, high=0.5)
     (
         fdi["config"]["n_substeps"],
         fdi["bank"]["output"]["innovation"],

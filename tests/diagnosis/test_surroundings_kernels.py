@@ -465,7 +465,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
     likely = conclusion.uses_statistical_estimates(fdi["statistical"]["test_config"], authority)
     alarm = fdi["statistical"]["alarm"]
-    found = schemes.built_in_detection_statistic(fdi["bank"], alarm, authority, likely)
+    found = schemes.built_in_detection_threshold_ratio(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
     assert bool(likely) == (enabled == 1 and authority != WORST_CASE_DETECTOR)
 

@@ -3,14 +3,14 @@
 import numpy as np
 
 from beaver_ftc.diagnosis.bounds import N_MAP_COORDINATES
-from beaver_ftc.diagnosis.schemes import diagnosis_dtype
+from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.loop.frame import INCONCLUSIVE, note_inconclusive
 
 DENSITY = 6
 
 
 def diagnosis(enabled=1, outside=1, time_s=5.0, n_boxes=2, **place):
-    fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
+    fdi = np.zeros(1, fdi_dtype(4)).view(np.recarray)[0]
     fdi["config"]["enabled"], error_map = enabled, fdi["bound"]["error_map"]
     error_map["n_boxes"], error_map["is_outside_all_boxes"], error_map["time_s"] = n_boxes, outside, time_s
     error_map["n_time_rows"], error_map["until_s"][0] = 1, 60.0

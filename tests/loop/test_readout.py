@@ -74,12 +74,12 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
     diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
     shares = [
         one.score_in_std / diagnosis.statistical_alarm_level
-        for block in diagnosis.statistical_blocks
+        for block in diagnosis.statistical_filters
         for one in block.hypotheses
     ]
     logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
     assert max(shares) == pytest.approx(max(logged), rel=1e-12)
-    for block in diagnosis.statistical_blocks:
+    for block in diagnosis.statistical_filters:
         assert block.hypothesis_tests_by_onset.score.shape[0] == len(block.hypotheses)
         assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled

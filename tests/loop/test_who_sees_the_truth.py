@@ -16,7 +16,7 @@ import pytest
 import beaver_ftc
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
-from beaver_ftc.diagnosis.schemes import diagnosis_dtype
+from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.loop.frame import true_faults_dtype
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.instruments import MEASURED
@@ -112,7 +112,7 @@ def test_what_is_meant_to_see_the_truth_does(calls):
 
 
 def test_the_truth_has_a_type_of_its_own():
-    others = prediction_dtype(4), diagnosis_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
+    others = prediction_dtype(4), fdi_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
     assert truth_dtype(4) not in others
 
 

@@ -78,7 +78,7 @@ _MIN_TRUE_OVER_MEASURED_AIRSPEED = 0.1
 ROUNDING_RAD_S2 = 1e-11
 UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same for filters with a covariance, whose noise is 1e-4: above the acceleration of any aircraft.
-UNMAPPED_ERROR_IN_FILTERS_RAD_S2 = 100.0
+ERROR_BOUND_OFF_MAP_IN_FILTERS_RAD_S2 = 100.0
 _MAP_EDGE_ROUNDING_SHARE = 1e-9
 N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 

@@ -160,7 +160,7 @@ def fill_level_to_body_rotation(phi, theta, level_to_body):
 
 
 @kernel
-def level_component(level_to_body, body_vector, level_axis):
+def component_in_level_axes(level_to_body, body_vector, level_axis):
     """Component along a level axis of a vector (3,) in body axes."""
     return (
         level_to_body[0, level_axis] * body_vector[0]
@@ -281,7 +281,7 @@ def advance_gust_estimate(gust, y, attitude, dt):
     """
     acceleration_in_level_axes = gust.memory.scratch
     for i in range(3):
-        acceleration_in_level_axes[i] = level_component(
+        acceleration_in_level_axes[i] = component_in_level_axes(
             gust.memory.level_to_body, gust.memory.specific_force, i
         )
     acceleration_in_level_axes[2] += gust.config.gravity

@@ -165,7 +165,7 @@ def unit_term_acceleration(
     surface."""
     V, geometry = log_columns["airspeed_mps"], aircraft.geometry
     inertia_coefficient = inertia_coefficients(aircraft.mass)
-    value_by_factor: dict[str | None, Any] = {
+    value_by_factor_name: dict[str | None, Any] = {
         **{name: log_columns[name] for name in aircraft.signals},
         "alpha": log_columns["alpha_rad"], "beta": log_columns["beta_rad"],
         "ph": log_columns["p_rad_s"] * geometry.span_m / (2.0 * V),
@@ -175,7 +175,7 @@ def unit_term_acceleration(
     unit_term_force = (
         log_columns["qdyn_pa"]
         * geometry.wing_area_m2
-        * prod(value_by_factor[factor] for factor in term.factors)
+        * prod(value_by_factor_name[factor] for factor in term.factors)
     )
     acceleration_per_force = {
         "Cl": (inertia_coefficient.Pl * geometry.span_m, 0.0, inertia_coefficient.Rl * geometry.span_m),

@@ -14,9 +14,10 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-LOSS on aileron, elevator and rudder is the published class. POSITION states only that the surface does not
-follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every fault of
-the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
+LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the
+surface does not follow its command. Its parameter, the deflection in rad, may change in any way, so it
+covers every fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of
+fault it is.
 
 Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
 
@@ -57,7 +58,7 @@ from beaver_ftc.diagnosis.state import (
     LOSS,
     NOT_ISOLATED,
     PITCH,
-    POSITION,
+    POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
@@ -278,7 +279,7 @@ def clear_mean_effect(mean_effect):
 
 
 @kernel
-def add_to_mean_effect(mean_effect, fault_effect, frame_share_of_block):
+def add_frame_to_block_mean_effect(mean_effect, fault_effect, frame_share_of_block):
     """Add the effect of a frame, a `frame_share_of_block` of the block, to the mean over the block."""
     for i in range(3):
         mean_effect.acceleration_at_zero_theta[i] += (
@@ -349,7 +350,7 @@ def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[Est
     return (
         *loss_entries,
         *stand_in_surface_loss_entries,
-        *((f"{name}_position", POSITION, s) for name, s in surface_index_by_name.items()),
+        *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in surface_index_by_name.items()),
     )
 
 
@@ -417,7 +418,7 @@ def fill_effect_of_hypothesis(
     if healthy.
     """
     for i in range(3):
-        if hypothesis_kind == POSITION:
+        if hypothesis_kind == POSITION_HYPOTHESIS:
             acceleration_at_zero_theta[i], regressor[i] = (
                 -Gu_by_surface[i, surface_index],
                 G[i, surface_index],
@@ -447,7 +448,7 @@ def update_fault_effect_and_reach(
     set_effect_error_bound(fault_effect, effect_error_bound, fie.surface)
     if (
         bound_record.has_surface_term_errors or bound_record.error_map.one_surface_may_be_anywhere
-    ) and fie.hypothesis_kind == POSITION:
+    ) and fie.hypothesis_kind == POSITION_HYPOTHESIS:
         bound_deflection_and_widen_error(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
         advance_reachable_residuals(filter_bank, fie, config.dt)
@@ -526,7 +527,7 @@ def update_and_test_if_fault_possible(
         is_possible = is_possible and are_residuals_reachable(
             filter_bank, fie, isolation.config.shares_theta_across_axes
         )
-    if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION) and (
+    if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION_HYPOTHESIS) and (
         isolation_started_earlier or isolation.config.uses_reach_test
     ):
         is_possible = is_possible and some_theta_explains_innovation(
@@ -731,7 +732,7 @@ def advance_estimators(isolation, bound_record, x, predicted_acceleration, dt):
 def update_likelihood_confirmation_and_exclusion(
     fie,
     test_config,
-    statistical_blocks,
+    statistical_filters,
     isolation,
     loss_estimator_of_surface,
     fault_is_declared_constant,
@@ -748,11 +749,11 @@ def update_likelihood_confirmation_and_exclusion(
     fie.excluded_by_likelihood = 0
     if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not fault_is_declared_constant):
         fie.confirmed_by_likelihood = statistical.confirms_loss(
-            test_config, statistical_blocks, all_estimator_records, loss_estimator_of_surface, s
+            test_config, statistical_filters, all_estimator_records, loss_estimator_of_surface, s
         )  # what follows later may be its end
     if fie.confirmed_by_likelihood or not statistical.excludes_loss(
         test_config,
-        statistical_blocks,
+        statistical_filters,
         all_estimator_records,
         loss_estimator_of_surface,
         s,
@@ -762,7 +763,7 @@ def update_likelihood_confirmation_and_exclusion(
         return
     fie.excluded_by_likelihood = statistical.excludes_loss(
         test_config,
-        statistical_blocks,
+        statistical_filters,
         all_estimator_records,
         loss_estimator_of_surface,
         s,

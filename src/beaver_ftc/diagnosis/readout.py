@@ -1,7 +1,7 @@
 """The diagnosis at one frame, as certificates, studies and integrations read it: values with names and units.
 
 The layout of the records is the business of their stages alone. A readout copies what it returns: it does not
-change when the flight goes on. `fdi` is a record of `schemes.diagnosis_dtype`.
+change when the flight goes on. `fdi` is a record of `schemes.fdi_dtype`.
 """
 
 from functools import cached_property
@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.state import scheme_number
 
 class IsolationEstimator(NamedTuple):
     """An isolation estimator, of the hypothesis that one surface has lost effectiveness (kind LOSS) or is at
-    a position (kind POSITION).
+    a position (kind POSITION_HYPOTHESIS).
 
     theta_min, theta_max: known set of its parameter. active_axes: those on which its residuals count.
     parity_direction (3,): direction in which the fault has no effect, zero where it is not used.
@@ -324,7 +324,7 @@ class DiagnosisReadout:
         return float(self._fdi["statistical"]["test_config"]["alarm_level"])
 
     @cached_property
-    def statistical_blocks(self) -> tuple[StatisticalBlock, ...]:
+    def statistical_filters(self) -> tuple[StatisticalBlock, ...]:
         """The filters of the statistical detector."""
         return tuple(map(_read_block, self._fdi["statistical"]["block"]))
 
@@ -392,7 +392,7 @@ RECORDED_BLOCK_FIELDS = (
 )  # fmt: skip
 
 
-def certificate_arrays_until_alarm(
+def current_certificate_arrays(
     fdi: np.void, n_estimators: int, has_statistical_detector: bool
 ) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants the frames up to the alarm, not copies.
@@ -459,7 +459,7 @@ def _read_block(block_record: np.void) -> StatisticalBlock:
             "score",
             "supporting_correlation_sign",
             "correlation_by_calm_air",
-            "correlation_by_coarse_gust",
+            "correlation_from_coarse_gust",
         )
     )
     return StatisticalBlock(

@@ -24,7 +24,7 @@ _ALARM_AUTHORITY_CODE_OF_NAME = {
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
 }
-LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
+LOSS, POSITION_HYPOTHESIS = 0, 1  # kinds of hypothesis: isolation.py
 PITCH_SURFACE_GROUP, LATERAL_SURFACE_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
 
@@ -105,12 +105,12 @@ def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
     return [primary_surface_index_by_axis[axis] for axis in range(3)]
 
 
-_DETECTOR_ROW_BY_NAME = compiled_rows(DETECTORS)
+_COMPILED_DETECTOR_ENTRY_BY_NAME = compiled_rows(DETECTORS)
 _PLUGIN_SCHEME_KERNEL_PATH = (
     f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
 )
 SCHEME_KERNEL_PATHS = (
-    *dict.fromkeys(row["kernels"] for row in _DETECTOR_ROW_BY_NAME.values()),
+    *dict.fromkeys(row["kernels"] for row in _COMPILED_DETECTOR_ENTRY_BY_NAME.values()),
     _PLUGIN_SCHEME_KERNEL_PATH,
 )
 PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_SCHEME_KERNEL_PATH)
@@ -119,7 +119,7 @@ PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_SCHEME_KERNEL_PATH)
 def scheme_number(name: str) -> int:
     """Index of the path of a scheme's kernels in SCHEME_KERNEL_PATHS."""
     return (
-        SCHEME_KERNEL_PATHS.index(_DETECTOR_ROW_BY_NAME[name]["kernels"])
-        if name in _DETECTOR_ROW_BY_NAME
+        SCHEME_KERNEL_PATHS.index(_COMPILED_DETECTOR_ENTRY_BY_NAME[name]["kernels"])
+        if name in _COMPILED_DETECTOR_ENTRY_BY_NAME
         else PLUGIN_SCHEME_NUMBER
     )

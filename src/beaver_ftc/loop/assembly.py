@@ -204,7 +204,7 @@ def frame_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE, line: i
         running=RUNNING,
         since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
         truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
-        prediction=model_prediction.prediction_dtype(n), fdi=schemes.diagnosis_dtype(n, size),
+        prediction=model_prediction.prediction_dtype(n), fdi=schemes.fdi_dtype(n, size),
         assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
         control=control.control_dtype(n), autopilot=AUTOPILOT,
         held=int, held_rad=n,  # whether another than the law commands, and what

@@ -183,7 +183,7 @@ def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[s
 
 def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
     """Those of which it wants the frames up to the alarm: see `diagnosis.readout.recorded_until_alarm`."""
-    return of_diagnosis.certificate_arrays_until_alarm(frame["fdi"], n, statistical)
+    return of_diagnosis.current_certificate_arrays(frame["fdi"], n, statistical)
 
 
 def switch_statistical_tests(frame: np.void, enabled: bool) -> None:

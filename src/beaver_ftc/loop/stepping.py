@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
 from beaver_ftc.diagnosis.model_prediction import redo_last_move_to_command
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
-from beaver_ftc.diagnosis.schemes import built_in_detection_statistic as largest_statistic
+from beaver_ftc.diagnosis.schemes import built_in_detection_threshold_ratio as largest_statistic
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
@@ -79,8 +79,8 @@ def finish(frames, references, log):
 
 
 @kernel
-def built_in_detection_statistic(frames):
-    """The built-in detection's statistic at this frame: see schemes.built_in_detection_statistic."""
+def built_in_detection_threshold_ratio(frames):
+    """The built-in detection's statistic at this frame: see schemes.built_in_detection_threshold_ratio."""
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.alarm_authority
     return largest_statistic(

@@ -48,13 +48,13 @@ ALARM_NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> Document | None:
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     diagnosis = tape.alarm.diagnosis
-    b, h, slot = _largest_score(diagnosis.statistical_blocks)
+    b, h, slot = _largest_score(diagnosis.statistical_filters)
     first = next(
         (r for r in range(k, tape.first, -1) if onset_slot_restarting_at_frame(r - tape.since) == slot), None
     )
     if first is None or k - first > MAX_WRITTEN_FRAMES:
         return None
-    hypothesis = diagnosis.statistical_blocks[b].hypotheses[h]
+    hypothesis = diagnosis.statistical_filters[b].hypotheses[h]
     score = hypothesis.score_in_std / diagnosis.statistical_alarm_level
     said = _likelihood_fields(tape, history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + LOGGED_SCORE_TOLERANCE:
@@ -84,7 +84,7 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
     """Column, and largest share of the alarm level, of each hypothesis that raises alarms."""
     found: dict[str, float] = {}
     for hypothesis in (
-        each for block in diagnosis.statistical_blocks for each in block.hypotheses if each.may_raise_alarm
+        each for block in diagnosis.statistical_filters for each in block.hypotheses if each.may_raise_alarm
     ):
         column = _share_column(hypothesis, surfaces)
         share = hypothesis.score_in_std / diagnosis.statistical_alarm_level
@@ -178,7 +178,7 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
 def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int], rows: range) -> Document:
     """The statement of a test, block, hypothesis and onset's slot, with these frames."""
     (b, h, slot), dt, diagnosis = test, history.dt, tape.alarm.diagnosis
-    block, here = diagnosis.statistical_blocks[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
+    block, here = diagnosis.statistical_filters[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
     of = {name: tape.filters[name][here, b] for name in (*RECORDED_BLOCK_FIELDS, "signature")}
     then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
     felt = _affected_axes(of, now["signature"][:, h], len(block.axis_indices))

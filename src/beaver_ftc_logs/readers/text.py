@@ -188,14 +188,14 @@ def _broken_line_recorder(broken_line_beginnings: list[str]) -> Callable[[Any], 
     return record_line
 
 
-def _all_text_conversion(names: Sequence[str], wanted_columns: Sequence[str]) -> Any:
+def _all_text_conversion(column_names: Sequence[str], wanted_columns: Sequence[str]) -> Any:
     """Every cell as text: which of them hold numbers is found out here, and not by the first block."""
     import pyarrow as pa
     from pyarrow import csv
 
     return csv.ConvertOptions(
-        include_columns=list(wanted_columns) or list(islice(names, 1)),
-        column_types=dict.fromkeys(names, pa.string()),
+        include_columns=list(wanted_columns) or list(islice(column_names, 1)),
+        column_types=dict.fromkeys(column_names, pa.string()),
         strings_can_be_null=True,
     )
 

@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.likelihood import MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2, STEP_FAULT
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_RECORD_SIZE, configure_parity_views
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
-from beaver_ftc.diagnosis.state import LOSS, POSITION
+from beaver_ftc.diagnosis.state import LOSS, POSITION_HYPOTHESIS
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
@@ -325,7 +325,7 @@ def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical["test_config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["hypothesis_kind"], fie["surface"], fie["frame_mean_effect"]["regressor"] = (
-            POSITION,
+            POSITION_HYPOTHESIS,
             s,
             np.eye(3, 4)[:, s],
         )

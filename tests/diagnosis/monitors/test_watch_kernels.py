@@ -221,8 +221,11 @@ def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, gyros_excluded, a
 
 @pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
 def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected_at_s, early):
-    assert watching.surface_alarm_may_be_initial_error(new_watch(started_at_s=2.5), detected_at_s) == early
-    assert not watching.surface_alarm_may_be_initial_error(
+    assert (
+        watching.surface_alarm_may_be_initial_sensor_error(new_watch(started_at_s=2.5), detected_at_s)
+        == early
+    )
+    assert not watching.surface_alarm_may_be_initial_sensor_error(
         new_watch(enabled=0, started_at_s=2.5), detected_at_s
     )
 
@@ -833,7 +836,7 @@ def test_an_alarm_on_roll_counts_as_one():
 
 def test_what_is_named_is_replaced_and_flags_are_one():
     monitor = new_watch()
-    watching.isolate_sensor(monitor, CLIMB_TEST, 3.0)
+    watching.mark_sensor_isolated(monitor, CLIMB_TEST, 3.0)
     assert monitor["output"]["is_reading_unused"][CLIMB_TEST] == 1
     monitor = new_watch()
     on(watching.raise_alarm_and_judge_surface_conclusion, detected_fdi(9.4, 1), monitor, 10.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import put
 
-from beaver_ftc.diagnosis.schemes import diagnosis_dtype
+from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_SURFACE_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
@@ -19,7 +19,7 @@ POSITION_OF = (4, 5, 6, 7)
 
 def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     """A record in which these types are left, {surface: kinds}; other surfaces are excluded."""
-    fdi = np.zeros(1, diagnosis_dtype(4))[0]
+    fdi = np.zeros(1, fdi_dtype(4))[0]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = (
         detected,
         verdict,

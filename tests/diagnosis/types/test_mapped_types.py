@@ -9,7 +9,7 @@ from kernels import estimator, new_fdi, on
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.diagnosis import bounds, isolation
-from beaver_ftc.diagnosis.state import POSITION
+from beaver_ftc.diagnosis.state import POSITION_HYPOTHESIS
 
 AILERON, ELEVATOR, RUDDER = range(3)
 SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [2.0, 3.0, 1.0]])
@@ -112,7 +112,7 @@ def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, i
 
 def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
-    fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
+    fie, bound = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
         bound["error_map"]["one_surface_may_be_anywhere"],
         bound["error_map"]["n_travel_levels"],

@@ -192,7 +192,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in (
         (BIAS, commanded_surface.bias_interval_of_judged_frame),
-        (GROWING_BIAS, commanded_surface.update_growing_bias_and_consistent_interval),
+        (GROWING_BIAS, commanded_surface.update_growing_bias_returning_consistent_interval),
     ):
         judged(judge, fdi, surface, kind, 5)
         assert surface["feasible_sets"]["excluded"][kind]
@@ -256,14 +256,18 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
             offset - 0.01,
             offset + 0.01,
         )
-        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(
+            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
+        )
     assert surface["feasible_sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(
+            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
+        )
         assert surface["growing_bias"]["min_growth_up"] == surface["growing_bias"]["min_growth_down"] == 0.0
 
 
@@ -288,7 +292,11 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
                 min(place + 0.01, HIGH),
             )
             judged(
-                commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5
+                commanded_surface.update_growing_bias_returning_consistent_interval,
+                fdi,
+                surface,
+                GROWING_BIAS,
+                5,
             )
     assert surface["growing_bias"]["has_run_towards_stop"].tolist() == ran
 
@@ -302,7 +310,9 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
             place - 0.01,
             place + 0.01,
         )
-        judged(commanded_surface.update_growing_bias_and_consistent_interval, fdi, surface, GROWING_BIAS, 5)
+        judged(
+            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
+        )
         assert surface["growing_bias"]["has_run_towards_stop"][1] == ran
 
 
@@ -316,7 +326,7 @@ def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0
             place + 0.01,
         )
         judged(
-            commanded_surface.update_rate_limit_and_consistent_interval,
+            commanded_surface.update_rate_limit_returning_consistent_interval,
             fdi,
             surface,
             SLOW,
@@ -374,7 +384,13 @@ def swung(signs, slowest_half_cycle_frames=20):
             0.1 * sign + 0.02,
         )
         on(commanded_surface.add_squared_deflection_error, fdi, surface, OSCILLATORY)
-        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, frame)
+        judged(
+            commanded_surface.update_oscillation_returning_consistent_interval,
+            fdi,
+            surface,
+            OSCILLATORY,
+            frame,
+        )
     return fdi, surface
 
 
@@ -473,7 +489,13 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_can_hide
         stop_can_hide_deflection,
     )
     for frame in range(30):
-        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, frame)
+        judged(
+            commanded_surface.update_oscillation_returning_consistent_interval,
+            fdi,
+            surface,
+            OSCILLATORY,
+            frame,
+        )
     assert surface["feasible_sets"]["excluded"][OSCILLATORY] == excluded
 
 
@@ -494,7 +516,7 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    judged(held_surface.update_stuck_and_consistent_interval, fdi, surface, STUCK, 5)
+    judged(held_surface.update_stuck_returning_consistent_interval, fdi, surface, STUCK, 5)
     assert on(held_surface.stuck_deflection_range, fdi, surface, STUCK) == (0.1, 0.2)
     assert types.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
@@ -651,7 +673,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
         if released_surface_returns_via_actuator
         else held_surface.STATUS_REFUTED
     )
-    judged(held_surface.update_releases_and_consistent_interval, fdi, surface, STUCK, -0.1, 0.1)
+    judged(held_surface.update_releases_returning_consistent_interval, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["feasible_sets"]["excluded"][STUCK] == (not released_surface_returns_via_actuator)
     assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))
@@ -894,7 +916,7 @@ def test_a_jam_that_looks_healthy_is_what_it_was_before():
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, 10)
+    judged(commanded_surface.update_oscillation_returning_consistent_interval, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
     assert (swing["error_sign"], swing["n_half_cycles"], swing["sign_since_frame"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
@@ -902,5 +924,7 @@ def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_co
             low,
             high,
         )
-        judged(commanded_surface.update_oscillation_and_consistent_interval, fdi, surface, OSCILLATORY, 10)
+        judged(
+            commanded_surface.update_oscillation_returning_consistent_interval, fdi, surface, OSCILLATORY, 10
+        )
         assert swing["error_sign"] == 0, "on its command it is on no side of it"

@@ -8,7 +8,7 @@ import small
 
 from beaver_ftc_logs.diagnose import (
     _add_unknown_effect_surfaces_widening_bounds,
-    _would_restore_excluded_surfaces,
+    _would_name_all_named_before,
 )
 from beaver_ftc_logs.filtering import recent_noise_variance_scale
 from beaver_ftc_logs.identification import with_assumed_law_and_air
@@ -74,5 +74,5 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
 )
 def test_a_surface_that_was_excluded_stays_so(now, said, wide):
-    assert _would_restore_excluded_surfaces(now, said, small.model(settings={"one_group": True})) is wide
-    assert not _would_restore_excluded_surfaces(now, said, small.model())
+    assert _would_name_all_named_before(now, said, small.model(settings={"one_group": True})) is wide
+    assert not _would_name_all_named_before(now, said, small.model())

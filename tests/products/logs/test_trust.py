@@ -517,7 +517,7 @@ def test_the_power_of_a_group_s_effect_is_in_variances_of_correlated_noise(model
     root = np.array([[0.05, 0.0, 0.0], [0.03, 0.03, 0.0], [-0.01, 0.01, 0.015]])
     correlated = small.model(noise=(root @ root.T).tolist())
     flown = small.flight(correlated, n=1500, seed=6)
-    power, unexplained = trust._effect_powers([(flown, np.ones(1500, bool))], correlated)
+    power, unexplained = trust._effect_and_unexplained_powers([(flown, np.ones(1500, bool))], correlated)
     reach = max(correlated.n_rate_lags, correlated.n_command_lags)
     for g in range(2):
         lagged = [flown.commands[reach - j : 1500 - j] for j in range(1, 4)]

@@ -373,14 +373,17 @@ def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
 
 
 @kernel
-def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out):
-    """Fill out from first_index on with exp(-(grid_position - j)^2 / 2), j = 0, 1, ...; return the sum of
+def fill_gaussians_and_sum_squares(axis_position, n_gaussians, first_index, out):
+    """Fill out from first_index on with exp(-(axis_position - j)^2 / 2), j = 0, 1, ...; return the sum of
     their squares.
 
-    The ratio of a value and the one before is exp(grid_position - j - 1/2). The ratio of two successive
+    The ratio of a value and the one before is exp(axis_position - j - 1/2). The ratio of two successive
     ratios is 1 / e. So two exponentials are enough for all values.
     """
-    gaussian, next_gaussian_ratio = np.exp(-0.5 * grid_position * grid_position), np.exp(grid_position - 0.5)
+    gaussian, next_gaussian_ratio = (
+        np.exp(-0.5 * axis_position * axis_position),
+        np.exp(axis_position - 0.5),
+    )
     sum_of_squares = 0.0
     for j in range(n_gaussians):
         out[first_index + j] = gaussian

@@ -198,15 +198,15 @@ def update_force_innovation_and_regressors(forces, gust, force_index, measured_s
         force_record.regressor[k - first_term_index] = term_regressor_per_unit_coefficient
         predicted_chord_scaled_force += all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
     if force_index == SIDE_INDEX_AMONG_FORCES:
-        sideslip_rate_chord_scaled_force = (
+        chord_scaled_force_from_sideslip_rate = (
             chord_scaled_force_per_coefficient
             * forces.sideslip_rate_coefficient
             * forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES]
             * forces.wing_span
             / (2.0 * measured_signals.y[AIRSPEED])
         )
-        force_record.regressor[end_term_index - first_term_index] = sideslip_rate_chord_scaled_force
-        predicted_chord_scaled_force += sideslip_rate_chord_scaled_force
+        force_record.regressor[end_term_index - first_term_index] = chord_scaled_force_from_sideslip_rate
+        predicted_chord_scaled_force += chord_scaled_force_from_sideslip_rate
     force_record.regressor[force_record.n_regressors - 1] = predicted_chord_scaled_force
     force_record.predicted_chord_scaled_force = predicted_chord_scaled_force
     if forces.n_updates_capped_at_minimum == 0:
@@ -450,17 +450,17 @@ def _force_coefficient(
     x, y, u = flight_state
     geometry, V = aircraft.geometry, y[AIRSPEED]
     normalised_rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
-    value_by_factor = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
+    value_by_factor_name = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
         zip(aircraft.signals, y[4:], strict=True)
     )
-    value_by_factor |= dict(
+    value_by_factor_name |= dict(
         zip(
             ("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE),
             (y[0], y[1], *normalised_rates, 0.0),
             strict=True,
         )
     )
-    return float(aircraft.coefficient(coefficient_name, value_by_factor))
+    return float(aircraft.coefficient(coefficient_name, value_by_factor_name))
 
 
 def _force_coefficient_slopes(

@@ -138,7 +138,7 @@ ONSET_TESTS_RECORD = record(
     max_correlation_by_varying_uncertainty=N_ONSET_TESTS_PER_GROUP,
     max_correlation_by_rate_limited_uncertainty=N_ONSET_TESTS_PER_GROUP,
     # shares of N: of lambda p; of a roughly visible gust
-    correlation_by_calm_air=N_ONSET_TESTS_PER_GROUP, correlation_by_coarse_gust=N_ONSET_TESTS_PER_GROUP,
+    correlation_by_calm_air=N_ONSET_TESTS_PER_GROUP, correlation_from_coarse_gust=N_ONSET_TESTS_PER_GROUP,
     score=N_ONSET_TESTS_PER_GROUP,
     llr_lower_bound=N_ONSET_TESTS_PER_GROUP, llr_upper_bound=N_ONSET_TESTS_PER_GROUP,
     llr=N_ONSET_TESTS_PER_GROUP,  # log-likelihood ratio
@@ -409,7 +409,7 @@ def reset_onset_slot(block, onset_slot):
                 k
             ] = onset_tests.max_correlation_by_varying_uncertainty[k] = 0.0
             onset_tests.max_correlation_by_rate_limited_uncertainty[k] = 0.0
-            onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_by_coarse_gust[k] = 0.0
+            onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_from_coarse_gust[k] = 0.0
             onset_tests.remaining_growth_share[k] = 1.0
             for i in range(4):
                 onset_tests.signature_filter_state[i, k] = 0.0
@@ -608,18 +608,21 @@ def accumulate_regressor_correlation(
 
 
 @kernel
-def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
+def accumulate_correlation_from_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
     """Add the frame to the share of N that a roughly visible gust contributes.
 
     `whiten_signatures_and_accumulate_sums` must have filled the weights of the frame.
     """
-    gust_response_0, gust_response_1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
+    gust_acceleration_axis_0, gust_acceleration_axis_1 = (
+        block.coarse_gust_response[0],
+        block.coarse_gust_response[1],
+    )
     for k in range(n_tests):
-        onset_tests.correlation_by_coarse_gust[k] = (
-            evidence_decay_factor * onset_tests.correlation_by_coarse_gust[k]
+        onset_tests.correlation_from_coarse_gust[k] = (
+            evidence_decay_factor * onset_tests.correlation_from_coarse_gust[k]
             + (
-                onset_tests.correlation_weight[0, k] * gust_response_0
-                + onset_tests.correlation_weight[1, k] * gust_response_1
+                onset_tests.correlation_weight[0, k] * gust_acceleration_axis_0
+                + onset_tests.correlation_weight[1, k] * gust_acceleration_axis_1
             )
         )
 
@@ -638,7 +641,7 @@ def accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor):
         onset_tests, n_tests = block.onset_tests[group_index], n_onset_tests_in_group(block, group_index)
         whiten_signatures_and_accumulate_sums(block, onset_tests, n_tests, dt, evidence_decay_factor)
         if block.has_coarse_gust_estimate:
-            accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
+            accumulate_correlation_from_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
         if uses_regressors:
             accumulate_regressor_correlation(
                 block, onset_tests, block.regressor_correlation[group_index], n_tests, evidence_decay_factor
@@ -725,7 +728,7 @@ def evaluate_onset_tests(
             supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
         )
         evidence_from_errors_and_air += max(
-            supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0
+            supporting_correlation_sign[k] * onset_tests.correlation_from_coarse_gust[k], 0.0
         )
         is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
         supporting_evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)

@@ -39,7 +39,7 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import (
-    UNMAPPED_ERROR_IN_FILTERS_RAD_S2,
+    ERROR_BOUND_OFF_MAP_IN_FILTERS_RAD_S2,
     add_published_bound,
     additional_error_bound_at_travel_level,
     equivalent_coefficient_error_bounds,
@@ -1096,7 +1096,7 @@ def fill_uncertainty_bound_drift_and_noise(
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
         if has_error_map:
             uncertainty_bound[i] += min(
-                bound_record.error_map.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
+                bound_record.error_map.error_bound_now[i], ERROR_BOUND_OFF_MAP_IN_FILTERS_RAD_S2
             )
         if bound_record.error_map.one_surface_may_be_anywhere:
             noise_model.additional_bound_for_surface_anywhere[i] = additional_error_bound_at_travel_level(

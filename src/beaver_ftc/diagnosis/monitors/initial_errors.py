@@ -393,7 +393,7 @@ def fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r):
 
 
 @kernel
-def filter_effects_per_unit_error(redundancy, initial_errors):
+def update_filtered_effects_per_unit_error(redundancy, initial_errors):
     """Pass effects per unit error, largest and signed, through the filters of the tests."""
     filter_decay_by_pole = redundancy.config.filter_decay_by_pole
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
@@ -611,7 +611,7 @@ def update_initial_error_bounds(redundancy, initial_errors, readings):
         return
     update_recent_change_and_widen_bounds(redundancy, initial_errors)
     fill_effects_per_unit_error(redundancy, initial_errors, readings)
-    filter_effects_per_unit_error(redundancy, initial_errors)
+    update_filtered_effects_per_unit_error(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)
 
 

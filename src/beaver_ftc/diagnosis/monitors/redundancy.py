@@ -928,9 +928,9 @@ def run_tests_with_equation(redundancy, readings, has_engine_sensors):
     fill_residuals(redundancy, readings)
     bound_residuals(redundancy, readings)
     memory.first_acceleration_error_bound = 0.0
-    is_too_steep = max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD
+    pitch_is_too_steep = max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD
     for test_index in range(RPM_TEST):
-        if is_too_steep and test_index < SPEED_TEST:
+        if pitch_is_too_steep and test_index < SPEED_TEST:
             restart_test(redundancy.test[test_index])
         else:
             filter_residual_and_update_bound_ratio(redundancy, redundancy.test[test_index])

@@ -569,7 +569,7 @@ def raise_alarm_and_isolate_broken_sensor(
     for i in range(N_SENSORS):
         if measured.missing[i] and output.isolated_sensor == NO_SENSOR:
             raise_alarm_and_judge_surface_conclusion(monitor, surface_conclusion, t)
-            isolate_sensor(monitor, i, t)
+            mark_sensor_isolated(monitor, i, t)
     if output.isolated_sensor != NO_SENSOR:
         return
     if output.worst_residual_bound_ratio > 1.0 and not output.alarmed:
@@ -587,7 +587,7 @@ def raise_alarm_and_isolate_broken_sensor(
             if output.is_suspect[i]:
                 n_suspects, last_suspect_index = n_suspects + 1, i
         if n_suspects == 1:
-            isolate_sensor(monitor, last_suspect_index, t)
+            mark_sensor_isolated(monitor, last_suspect_index, t)
 
 
 @kernel
@@ -622,7 +622,7 @@ def raise_alarm_and_judge_surface_conclusion(monitor, surface_conclusion, t):
 
 
 @kernel
-def isolate_sensor(monitor, sensor_index, t):
+def mark_sensor_isolated(monitor, sensor_index, t):
     """Isolate a sensor at t s."""
     monitor.output.isolated_sensor, monitor.output.isolated_at_s = sensor_index, t
     monitor.output.is_reading_unused[sensor_index] = 1
@@ -1018,7 +1018,7 @@ def allows_surface_isolation(monitor, surface_alarm_is_from_earlier_frame):
 
 
 @kernel
-def surface_alarm_may_be_initial_error(monitor, detected_at_s):
+def surface_alarm_may_be_initial_sensor_error(monitor, detected_at_s):
     """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
     may have caused it: the design model uses its reading from the first frame on."""
     return monitor.config.enabled and detected_at_s < monitor.memory.started_at_s + INITIAL_ERROR_WINDOW_S

@@ -207,13 +207,15 @@ class AugmentedUkf(EffectivenessFilter):
         dt, f = self.context.dt_s, self.context.model.f
         propagated_points = state_points.copy()
         f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
-        loss_accelerations = np.array(
+        acceleration_changes_from_loss = np.array(
             [
                 measured.contribution[:, self.leading_surface_indices] @ point[3:N_STATES_WITHOUT_GUSTS]
                 for point in state_points
             ]
         )
-        propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_accelerations)
+        propagated_points[:, :3] += dt * (
+            measured.acceleration + f_change_from_measured + acceleration_changes_from_loss
+        )
         if self.turbulence_model.n_states:
             propagated_points[:, :3] += (
                 state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.turbulence_model.rate_effect.T

@@ -4,7 +4,7 @@
 `accumulate_substep` call the kernel of a scheme by its number (adaptive_estimators.CompiledScheme;
 state.SCHEME_KERNEL_PATHS). The frame (loop/frame.py) calls them.
 
-fdi: of `diagnosis_dtype`; t s.
+fdi: of `fdi_dtype`; t s.
 """
 
 from importlib import import_module
@@ -31,9 +31,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
-def diagnosis_dtype(
-    n_surfaces: int, statistical_capacities: StatisticalRecordSize = USUAL_RECORD_SIZE
-) -> np.dtype:
+def fdi_dtype(n_surfaces: int, statistical_capacities: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; statistical_capacities: rooms of the
     statistical detector's record."""
     return record(
@@ -119,7 +117,9 @@ def record_isolated_surfaces(fdi, t):
 
 
 @kernel
-def built_in_detection_statistic(filter_bank, statistical_alarm, alarm_authority, uses_statistical_estimates):
+def built_in_detection_threshold_ratio(
+    filter_bank, statistical_alarm, alarm_authority, uses_statistical_estimates
+):
     """The largest share of its threshold that the built-in detection reaches at this frame.
 
     statistical_alarm: `ALARM` of the statistical detector; uses_statistical_estimates: whether its estimates

@@ -34,7 +34,7 @@ from beaver_ftc.scenario.diagnosis import FdiConfig
 
 
 class CompiledScheme(NamedTuple):
-    """Lazy kernels (compiled.py), called with `fdi` (`diagnosis_dtype`), and `prediction` and `measured`, the
+    """Lazy kernels (compiled.py), called with `fdi` (`fdi_dtype`), and `prediction` and `measured`, the
     records of the prediction and the sensors. A row of plugins.yaml names
     the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
@@ -154,7 +154,7 @@ def start_or_continue_isolation(fdi, measured, t, was_detected_before):
     if not was_detected_before:
         isolation.start_estimators(fdi.isolation, fdi.bound.changing_gyro_error_bound, measured.x)
         begin_isolation_variant_at_alarm(variant_index, fdi)
-    alarm_is_not_initial_sensor_error = not sensor_monitor.surface_alarm_may_be_initial_error(
+    alarm_is_not_initial_sensor_error = not sensor_monitor.surface_alarm_may_be_initial_sensor_error(
         monitor, fdi.verdict.detected_at_s
     )
     if (

@@ -305,14 +305,14 @@ def varying_types_can_be_dismissed(config, surface):
     command_independent_type_may_imitate = verdict.can_be_another_type(
         surface, verdict.sole_constant_type_or_undecided(surface), False
     )
-    another_type_is_possible = (
+    varying_type_may_imitate = (
         command_independent_type_may_imitate or verdict.short_anomaly_may_be_rest_hidden_type(config, surface)
     )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
         anomaly_spans_half_cycle
         and verdict.types_would_have_shown(config, surface)
-        and not another_type_is_possible
+        and not varying_type_may_imitate
     )
 
 

@@ -107,8 +107,12 @@ CAN_LOOK_LIKE = np.array(
 )
 MODE_SERVES_TYPE = np.array(
     [
-        [mode == row.accommodation_mode or mode in row.other_accommodation_modes for row in TYPES]
-        for mode in range(4)
+        [
+            accommodation_mode == row.accommodation_mode
+            or accommodation_mode in row.other_accommodation_modes
+            for row in TYPES
+        ]
+        for accommodation_mode in range(4)
     ]
 )
 # Types that give the deflection error of a surface, in the order in which they are used.
@@ -241,7 +245,7 @@ COMMANDS_RECORD = record(
 
 # Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
 # to zero.
-ACTUATOR_RECORD = record(
+ACTUATOR_CONFIG_RECORD = record(
     travel_low=float, travel_high=float, reachable_low=float, reachable_high=float, min_runaway_rate=float,
     approach_share_per_substep=float, max_motion_per_substep=float, min_rate_limited_motion_per_substep=float,
 )  # fmt: skip
@@ -319,7 +323,7 @@ def surface_types_dtype() -> np.dtype:
     what is concluded. position_estimator_excluded: as verdict.py keeps it."""
     memory_dtype_by_name = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
-        actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
+        actuator=ACTUATOR_CONFIG_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
         evidence=ANOMALOUS_FRAME_EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD,
         release=POSSIBLE_RELEASES_BY_TYPE_RECORD,
@@ -575,7 +579,7 @@ def add_frame_to_block(types, layout, estimators, innovation_by_axis, eta_bar):
         block.mean_innovation[i] += frame_share_of_block * innovation_by_axis[i]
         block.mean_innovation_bound[i] += frame_share_of_block * eta_bar[i]
     for estimator_index in layout.position_estimator:
-        isolation.add_to_mean_effect(
+        isolation.add_frame_to_block_mean_effect(
             estimators[estimator_index].block_mean_effect,
             estimators[estimator_index].frame_mean_effect,
             frame_share_of_block,

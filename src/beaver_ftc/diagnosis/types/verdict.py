@@ -540,7 +540,7 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
         group_has_alarm = np.ones_like(
             group_has_alarm
         )  # a statistical alarm by itself says of no plane that it is there
-    undecided_group_findings = [
+    undecided_surface_group_findings = [
         {
             **_NO_FINDINGS,
             "candidates": tuple(_remaining_candidate_texts(fdi, group_surface_indices, surface_names)),
@@ -549,15 +549,18 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
         if group_alarm and not set(group_surface_indices) & set(isolated_surface_indices)
     ]
     if faults:
-        return {**faults[0], "faults": (*faults, *undecided_group_findings)}
+        return {**faults[0], "faults": (*faults, *undecided_surface_group_findings)}
     if int(fdi["verdict"]["isolated_estimator"]) == UNANTICIPATED:
-        return {**_findings_assuming_one_fault(fdi, surface_names), "faults": tuple(undecided_group_findings)}
+        return {
+            **_findings_assuming_one_fault(fdi, surface_names),
+            "faults": tuple(undecided_surface_group_findings),
+        }
     candidate_texts = tuple(
         candidate_text
-        for group_finding in undecided_group_findings
-        for candidate_text in group_finding["candidates"]
+        for undecided_surface_group_finding in undecided_surface_group_findings
+        for candidate_text in undecided_surface_group_finding["candidates"]
     )
-    return {**_NO_FINDINGS, "candidates": candidate_texts, "faults": tuple(undecided_group_findings)}
+    return {**_NO_FINDINGS, "candidates": candidate_texts, "faults": tuple(undecided_surface_group_findings)}
 
 
 def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> FindingDict:

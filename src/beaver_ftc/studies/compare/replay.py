@@ -17,7 +17,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Detector, Measured, Verdict, informed_test
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout, switch_statistical_tests
-from beaver_ftc.loop.stepping import built_in_detection_statistic
+from beaver_ftc.loop.stepping import built_in_detection_threshold_ratio
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
@@ -113,7 +113,7 @@ def record(scenario: Scenario) -> Recording:
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         air.append(FrameReadout(frames[0]).diagnosis.gust.gust_acceleration_rad_s2)
         status = fly_frame(frames, references, log)
-        built_in.append(built_in_detection_statistic(frames))
+        built_in.append(built_in_detection_threshold_ratio(frames))
         mapped = FrameReadout(frames[0]).diagnosis.mapped_error
         known.append(mapped.is_inside_map)
         error.append(mapped.error_bound_rad_s2)

@@ -42,7 +42,7 @@ def test_the_largest_score_that_raises_alarms_is_that_of_its_block_hypothesis_an
 
 
 def test_each_fault_has_the_largest_of_its_shares_of_the_alarm_level():
-    diagnosis = SimpleNamespace(statistical_blocks=BLOCKS, statistical_alarm_level=4.0)
+    diagnosis = SimpleNamespace(statistical_filters=BLOCKS, statistical_alarm_level=4.0)
     assert chance.likelihood_shares(diagnosis, SURFACES) == {
         "right_loss_likelihood_share": 1.5, "flap_loss_likelihood_share": 3.0,
         "r_step_likelihood_share": 1.75,

@@ -266,7 +266,7 @@ def detect_runaway_speed_and_narrow_offset(config, surface, judged_offset_low, j
 
 
 @kernel
-def update_growing_bias_and_consistent_interval(config, surface, type_index, k):
+def update_growing_bias_returning_consistent_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     judged_offset_low, judged_offset_high = offset_interval_of_judged_frame(surface)
     if judged_offset_low <= judged_offset_high:
@@ -321,7 +321,7 @@ BIAS = FaultType(
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
     reset_memory=reset_growing_bias_memory, before_judging_frame=widen_offset_interval,
-    consistent_interval=update_growing_bias_and_consistent_interval,
+    consistent_interval=update_growing_bias_returning_consistent_interval,
     on_skipped_frame=forget_bias_offset_interval,
     memory_record_name="growing_bias",
     memory_dtype=record(
@@ -359,7 +359,7 @@ def add_squared_deflection_error(config, surface, type_index):
 
 
 @kernel
-def update_oscillation_and_consistent_interval(config, surface, type_index, k):
+def update_oscillation_returning_consistent_interval(config, surface, type_index, k):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
     At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
@@ -437,7 +437,7 @@ def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float 
 OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
     reset_memory=reset_oscillation_memory, before_judging_frame=add_squared_deflection_error,
-    consistent_interval=update_oscillation_and_consistent_interval,
+    consistent_interval=update_oscillation_returning_consistent_interval,
     on_skipped_frame=restart_error_sign_duration, memory_record_name="oscillatory",
     memory_dtype=record(
         error_sign=int, sign_since_frame=int,
@@ -461,7 +461,7 @@ def reset_rate_limit_memory(surface, type_index):
 
 
 @kernel
-def update_rate_limit_and_consistent_interval(config, surface, type_index, k):
+def update_rate_limit_returning_consistent_interval(config, surface, type_index, k):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
     Of several JSBSim frames in one of ours the first is the old command's.
@@ -531,7 +531,7 @@ def surface_side_of_commands(config, surface):
 
 RATE_LIMIT = FaultType(
     name="rate_limit", has_constant_parameter=False, sort_rank=3,
-    reset_memory=reset_rate_limit_memory, consistent_interval=update_rate_limit_and_consistent_interval,
+    reset_memory=reset_rate_limit_memory, consistent_interval=update_rate_limit_returning_consistent_interval,
     memory_record_name="rate_limit",
     memory_dtype=record(
         # where it can be while it stands on one side of its command, rad

@@ -245,7 +245,7 @@ def update_held_status(config, surface, type_index, held_position_min, held_posi
 
 
 @kernel
-def update_releases_and_consistent_interval(
+def update_releases_returning_consistent_interval(
     config, surface, type_index, held_position_min, held_position_max
 ):
     """The parameters that explain the judged frame: all if the surface is held there or returns from there,
@@ -344,7 +344,7 @@ def reset_stuck_memory(surface, type_index):
 
 
 @kernel
-def update_stuck_and_consistent_interval(config, surface, type_index, k):
+def update_stuck_returning_consistent_interval(config, surface, type_index, k):
     """It stays where it is."""
     held_status = update_held_status(
         config,
@@ -415,10 +415,10 @@ def stuck_deflection_range(config, surface, type_index, k):
 
 
 @kernel
-def update_float_and_consistent_interval(config, surface, type_index, k):
+def update_float_returning_consistent_interval(config, surface, type_index, k):
     """It is at neutral, or at the stop that is nearest to it."""
     neutral_position = limit_to_travel(surface, 0.0)
-    return update_releases_and_consistent_interval(
+    return update_releases_returning_consistent_interval(
         config, surface, type_index, neutral_position, neutral_position
     )
 
@@ -471,7 +471,8 @@ def float_deflection_error(surface, type_index):
 STUCK = FaultType(
     name="stuck", has_constant_parameter=True, sort_rank=2,
     parameter_range=travel_range, reset_memory=reset_stuck_memory,
-    consistent_interval=update_stuck_and_consistent_interval, feasible_set_after_frame=stuck_set_after_frame,
+    consistent_interval=update_stuck_returning_consistent_interval,
+    feasible_set_after_frame=stuck_set_after_frame,
     # rad; EARLIER and LATER
     memory_record_name="stuck", memory_dtype=record(feasible_low_before_release=2,
     feasible_high_before_release=2),
@@ -486,7 +487,7 @@ STUCK = FaultType(
 )  # fmt: skip
 FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
-    reset_memory=allow_release_before_alarm, consistent_interval=update_float_and_consistent_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=update_float_returning_consistent_interval,
     on_possible_release=add_float_release, propagate_release=propagate_returns,
     possible_deflection_range=float_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
@@ -535,7 +536,7 @@ def runaway_down_upper_limit(config, surface, frame_index):
 @kernel
 def update_hardover_up_and_interval(config, surface, type_index, k):
     """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
-    return update_releases_and_consistent_interval(
+    return update_releases_returning_consistent_interval(
         config,
         surface,
         type_index,
@@ -547,7 +548,7 @@ def update_hardover_up_and_interval(config, surface, type_index, k):
 @kernel
 def update_hardover_down_and_interval(config, surface, type_index, k):
     """The same downwards."""
-    return update_releases_and_consistent_interval(
+    return update_releases_returning_consistent_interval(
         config,
         surface,
         type_index,

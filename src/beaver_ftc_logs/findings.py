@@ -290,10 +290,8 @@ def _conditional_information_per_sample(standardized_group_responses: Floats, gr
 
 def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, transition_shares_of_group = (
-        model.settings,
-        bank.transition_share[bank.is_fault_of_group(group_index)],
-    )
+    settings = model.settings
+    transition_shares_of_group = bank.transition_share[bank.is_fault_of_group(group_index)]
     if not len(transition_shares_of_group):
         return float("inf")
     level_transition_probability_per_sample = (

@@ -51,10 +51,8 @@ def fit_roll_angle_to_rates(
     """
     rate_times_s = rate_columns[0].t_s
     p, q, r = (_interpolate_column(body_rate_column, rate_times_s) for body_rate_column in rate_columns)
-    roll_at_rate_times, full_circle = (
-        _interpolate_column(roll_column, rate_times_s),
-        _full_circle(roll_column.values),
-    )
+    roll_at_rate_times = _interpolate_column(roll_column, rate_times_s)
+    full_circle = _full_circle(roll_column.values)
     # The circle is known whatever the unit.
     roll_rad_at_rate_times = roll_at_rate_times * 2.0 * np.pi / full_circle
     rate_terms, pitch_rad_at_rate_times = [p], None

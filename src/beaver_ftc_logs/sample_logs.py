@@ -64,12 +64,10 @@ def _simulate_rows(
 ) -> Iterator[list[float]]:
     """Row by row: time, rates in deg/s, commands, attitude."""
     dt_s = 1.0 / SAMPLE_RATE_HZ
-    rates, turbulence_rad_s2, roll_and_pitch_rad, demanded_roll_and_pitch_rad = (
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(2),
-        np.zeros(2),
-    )
+    rates = np.zeros(3)
+    turbulence_rad_s2 = np.zeros(3)
+    roll_and_pitch_rad = np.zeros(2)
+    demanded_roll_and_pitch_rad = np.zeros(2)
     for k in range(round(duration_s * SAMPLE_RATE_HZ)):
         t_s = k * dt_s
         if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:

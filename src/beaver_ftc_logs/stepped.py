@@ -66,10 +66,8 @@ def replay_samples(
     """The verdicts of evenly spaced samples; ordered_input_arrays: as
     `log_column_names_of_each_input`, (n, ...) each."""
     verdicts: list[Verdict] = []
-    innovation, innovation_bound = (
-        np.empty_like(ordered_input_arrays[0]),
-        np.empty_like(ordered_input_arrays[0]),
-    )
+    innovation = np.empty_like(ordered_input_arrays[0])
+    innovation_bound = np.empty_like(ordered_input_arrays[0])
     healthy_surface_effect = np.empty((*innovation.shape, ordered_input_arrays[2].shape[1]))
     for k, sample_inputs in enumerate(zip(*map(np.ascontiguousarray, ordered_input_arrays), strict=True)):
         verdicts.append(diagnosis.step(*sample_inputs))

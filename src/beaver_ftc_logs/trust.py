@@ -202,10 +202,8 @@ def _effect_and_unexplained_powers(
     response_coefficients = np.array(model.command_response)
     residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
-    effect_power, power_unexplained_by_other_regressors = (
-        np.zeros(len(group_surface_indices)),
-        np.zeros(len(group_surface_indices)),
-    )
+    effect_power = np.zeros(len(group_surface_indices))
+    power_unexplained_by_other_regressors = np.zeros(len(group_surface_indices))
     for group_index in range(len(group_surface_indices)):
         other_lagged_commands = [
             lagged_group_commands[:, other_group_index]
@@ -439,10 +437,8 @@ def _column_mistake_texts(
         gain_bounds.smallest_group_gain_lower_bounds,
         strict=True,
     ):
-        surface_group_name, relative_motion = (
-            "+".join(group),
-            _relative_group_command_motion(samples, model, group),
-        )
+        surface_group_name = "+".join(group)
+        relative_motion = _relative_group_command_motion(samples, model, group)
         command_text = f"the command of {surface_group_name}"
         motion_text = f"moves {relative_motion:.3g} times as much as in the flights of the"
         if gain_upper_bound < MAX_REVERSED_GAIN:
@@ -720,10 +716,8 @@ def rows_and_coefficients_without_own_axis(model: Model) -> dict[str, tuple[list
         rate_column_names * model.n_rate_lags
         + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(model.n_rate_lags)
     )
-    coefficients, rows_by_column_name = (
-        np.array(model.lagged_rate_and_signal_coefficients),
-        dict[str, list[int]](),
-    )
+    coefficients = np.array(model.lagged_rate_and_signal_coefficients)
+    rows_by_column_name = dict[str, list[int]]()
     for row, name in enumerate(column_name_of_row):
         rows_by_column_name.setdefault(name.removesuffix(" by airspeed"), []).append(row)
         if row < 3 * model.n_rate_lags:

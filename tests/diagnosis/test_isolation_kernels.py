@@ -35,15 +35,9 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         eta, believed, spread = eta_bar * rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(0, 0.1, 3)
         eta *= eta_share
         offset = rng.normal(size=3)
-        (
-            fie["frame_mean_effect"]["regressor"],
-            fie["frame_mean_effect"]["acceleration_at_zero_theta"],
-            fie["frame_mean_effect"]["error_bound"],
-        ) = (
-            Z,
-            offset,
-            spread,
-        )
+        fie["frame_mean_effect"]["regressor"] = Z
+        fie["frame_mean_effect"]["acceleration_at_zero_theta"] = offset
+        fie["frame_mean_effect"]["error_bound"] = spread
         fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta_bar, noise_before
         isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
         on(isolation.advance_estimators, fdi, x, believed)
@@ -101,12 +95,10 @@ def test_a_start_knows_nothing_but_the_set_of_theta():
 def test_a_correction_is_the_step_of_weighted_least_squares():
     """Information adds up: 1 / covariance grows by Omega^2 / noise, and is forgotten by a share."""
     fie = estimator(new_fdi())
-    (
-        fie["filtered_uncertainty_bound"][1],
-        fie["filtered_regressor"][1],
-        fie["theta_variance"][1],
-        fie["theta"][1],
-    ) = 0.3, 0.7, 0.05, -0.5
+    fie["filtered_uncertainty_bound"][1] = 0.3
+    fie["filtered_regressor"][1] = 0.7
+    fie["theta_variance"][1] = 0.05
+    fie["theta"][1] = -0.5
     information = 1.0 / 0.05 + 0.7**2 / 0.3**2
     step = isolation.least_squares_step(fie, 1, 0.2, 0.9, -1.0, 0.0)
     assert step == pytest.approx(0.7 / 0.3**2 * 0.2 / information)
@@ -126,12 +118,10 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
     fie = estimator(new_fdi())
     omega, noise = np.array([0.5, -0.8, 0.3]), np.array([0.2, 0.3, 0.4])
     residual = np.array([0.02, 0.03, -0.01])
-    (
-        fie["filtered_regressor"],
-        fie["filtered_uncertainty_bound"],
-        fie["residual"],
-        fie["frame_mean_effect"]["regressor"],
-    ) = omega, noise, residual, 1.0
+    fie["filtered_regressor"] = omega
+    fie["filtered_uncertainty_bound"] = noise
+    fie["residual"] = residual
+    fie["frame_mean_effect"]["regressor"] = 1.0
     fie["theta"], fie["theta_variance"] = -0.5, 0.06
     total = isolation.joint_least_squares_step(fie, 1.0)
     information = 1.0 / 0.06 + np.sum(omega**2 / noise**2)
@@ -150,12 +140,10 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
         fdi = new_fdi()
         fie = estimator(fdi, low=-0.9, high=0.2)
         fdi["isolation"]["config"]["threshold_kind"] = thresholds
-        (
-            fie["filtered_positive_regressor"],
-            fie["filtered_negative_regressor"],
-            fie["filtered_uncertainty_bound"],
-            fie["theta"],
-        ) = 0.5, -0.2, 0.03, -0.3
+        fie["filtered_positive_regressor"] = 0.5
+        fie["filtered_negative_regressor"] = -0.2
+        fie["filtered_uncertainty_bound"] = 0.03
+        fie["theta"] = -0.3
         fie["filtered_regressor"], fie["ignored_axes"][axis] = 0.3, ignored_axes
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
         limits = (lower + 0.09 - 0.03, upper + 0.09 + 0.03)
@@ -218,13 +206,8 @@ def test_the_one_left_is_the_fault(excluded, isolated):
 def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
     fdi = new_fdi()
     fdi["isolation"]["config"]["n_estimators"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
-    (
-        fdi["isolation"]["estimator"]["weakly_excluded"][1],
-        fdi["isolation"]["estimator"]["confirmed_by_likelihood"][1],
-    ) = (
-        doubted,
-        shown,
-    )
+    fdi["isolation"]["estimator"]["weakly_excluded"][1] = doubted
+    fdi["isolation"]["estimator"]["confirmed_by_likelihood"][1] = shown
     assert on(isolation.decide_isolation, fdi, 4.0) == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
     assert on(isolation.decide_isolation, fdi, 5.0) == UNANTICIPATED
@@ -356,15 +339,9 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     rng, fdi = np.random.default_rng(6), new_fdi()
     fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
     G, Gu = rng.normal(size=(2, 3, 4))
-    (
-        fdi["bound"]["has_surface_term_errors"],
-        fdi["bound"]["surface_term_error_bound_per_rad"],
-        fdi["bound"]["frame_innovation_bound"],
-    ) = (
-        errors,
-        0.3,
-        1.0,
-    )
+    fdi["bound"]["has_surface_term_errors"] = errors
+    fdi["bound"]["surface_term_error_bound_per_rad"] = 0.3
+    fdi["bound"]["frame_innovation_bound"] = 1.0
     fdi["config"]["n_substeps"] = 1
     on(isolation.update_fault_effect_and_reach, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["frame_mean_effect"]["error_bound"] > 0.1).tolist() == [wider] * 3
@@ -408,19 +385,15 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = length, 0.1
     fdi["layout"]["position_estimator"], fdi["layout"]["loss_estimator"] = range(4), range(4)
     fdi["layout"]["dominant_axis"] = (0, 1, 2, 1)
-    (
-        fdi["isolation"]["config"]["n_estimators"],
-        fdi["types"]["config"]["slowest_half_cycle_frames"],
-        fdi["config"]["n_substeps"],
-        fdi["types"]["config"]["frame_shows_single_instant"],
-    ) = 4, 9, 1, 1
+    fdi["isolation"]["config"]["n_estimators"] = 4
+    fdi["types"]["config"]["slowest_half_cycle_frames"] = 9
+    fdi["config"]["n_substeps"] = 1
+    fdi["types"]["config"]["frame_shows_single_instant"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
-        fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = (
-            POSITION_HYPOTHESIS,
-            s,
-            -1.0,
-            1.0,
-        )
+        fie["hypothesis_kind"] = POSITION_HYPOTHESIS
+        fie["surface"] = s
+        fie["theta_min"] = -1.0
+        fie["theta_max"] = 1.0
         fie["frame_mean_effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY["all", "worst-case"].isolate(
@@ -431,16 +404,12 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
 
 def test_the_axes_of_a_shared_theta_agree_after_each_step():
     fie = estimator(new_fdi())
-    fie["filtered_regressor"], fie["filtered_uncertainty_bound"], fie["residual"] = (
-        (0.5, -0.8, 0.3),
-        0.2,
-        (0.02, 0.03, -0.01),
-    )
-    fie["theta"], fie["theta_variance"], fie["frame_mean_effect"]["regressor"] = (
-        (-0.5, -0.9, -0.1),
-        (0.06, 0.01, 0.09),
-        1.0,
-    )
+    fie["filtered_regressor"] = (0.5, -0.8, 0.3)
+    fie["filtered_uncertainty_bound"] = 0.2
+    fie["residual"] = (0.02, 0.03, -0.01)
+    fie["theta"] = (-0.5, -0.9, -0.1)
+    fie["theta_variance"] = (0.06, 0.01, 0.09)
+    fie["frame_mean_effect"]["regressor"] = 1.0
     isolation.joint_least_squares_step(fie, 1.0)
     assert len(set(fie["theta"])) == len(set(fie["theta_variance"])) == 1
     alone = estimator(new_fdi())

@@ -122,11 +122,9 @@ def update_isolation_interval(conclusion, surface_index, is_isolated, t):
         withdrawn_isolation = conclusion.withdrawn_isolations[
             min(conclusion.n_withdrawn_isolations, MAX_WITHDRAWN_ISOLATIONS - 1)
         ]
-        withdrawn_isolation.surface, withdrawn_isolation.from_s, withdrawn_isolation.to_s = (
-            surface_index,
-            isolated_from_s,
-            t,
-        )
+        withdrawn_isolation.surface = surface_index
+        withdrawn_isolation.from_s = isolated_from_s
+        withdrawn_isolation.to_s = t
         conclusion.n_withdrawn_isolations += 1
         conclusion.isolated_from_s[surface_index] = -1.0
 
@@ -206,20 +204,16 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             estimated_theta = estimated_theta_of_isolated_loss(
                 config, conclusion, layout, estimators, statistical_detector, s
             )
-            assessment.effectiveness[s], assessment.apply_immediately[s] = (
-                1.0 + estimated_theta,
-                is_loss_precise,
-            )
+            assessment.effectiveness[s] = 1.0 + estimated_theta
+            assessment.apply_immediately[s] = is_loss_precise
 
 
 @kernel
 def assess_accommodated_surface(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     type_diagnosis = types.surface[s]
-    can_be_at_fault, accommodation_mode = (
-        verdict.estimator_or_deduction_allows_fault(type_diagnosis),
-        type_diagnosis.accommodation.mode,
-    )
+    can_be_at_fault = verdict.estimator_or_deduction_allows_fault(type_diagnosis)
+    accommodation_mode = type_diagnosis.accommodation.mode
     if accommodation_mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
     elif accommodation_mode == GIVE_UP:

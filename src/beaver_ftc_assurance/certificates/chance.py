@@ -168,10 +168,8 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
     for b, block in enumerate(blocks):
         for h, hypothesis in enumerate(block.hypotheses):
             if hypothesis.may_raise_alarm and hypothesis.score_in_std > best:
-                best, found = (
-                    hypothesis.score_in_std,
-                    (b, h, int(np.argmax(block.hypothesis_tests_by_onset.score[h]))),
-                )
+                best = hypothesis.score_in_std
+                found = (b, h, int(np.argmax(block.hypothesis_tests_by_onset.score[h])))
     return found
 
 

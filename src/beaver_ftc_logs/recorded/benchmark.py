@@ -121,10 +121,8 @@ def result_files(document: Document) -> Files:
 
 
 def _compare_methods(data_set: FlightDataSet) -> Document:
-    flights_with_usable_mask, is_single_flight = (
-        flights_with_usable_rows(data_set.flights),
-        len(data_set.flights) == 1,
-    )
+    flights_with_usable_mask = flights_with_usable_rows(data_set.flights)
+    is_single_flight = len(data_set.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
     whole_flight_settings = (

@@ -380,10 +380,8 @@ def fill_gaussians_and_sum_squares(axis_position, n_gaussians, first_index, out)
     The ratio of a value and the one before is exp(axis_position - j - 1/2). The ratio of two successive
     ratios is 1 / e. So two exponentials are enough for all values.
     """
-    gaussian, next_gaussian_ratio = (
-        np.exp(-0.5 * axis_position * axis_position),
-        np.exp(axis_position - 0.5),
-    )
+    gaussian = np.exp(-0.5 * axis_position * axis_position)
+    next_gaussian_ratio = np.exp(axis_position - 0.5)
     sum_of_squares = 0.0
     for j in range(n_gaussians):
         out[first_index + j] = gaussian

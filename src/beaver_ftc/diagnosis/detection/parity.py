@@ -187,10 +187,8 @@ def advance_resonators(tone_config, resonator_state, input_sum):
     add the drive."""
     decayed_rotation = tone_config.decayed_rotation_per_update
     for frequency_index in range(resonator_state.shape[1]):
-        previous_state_real, previous_state_imaginary = (
-            resonator_state[0, frequency_index],
-            resonator_state[1, frequency_index],
-        )
+        previous_state_real = resonator_state[0, frequency_index]
+        previous_state_imaginary = resonator_state[1, frequency_index]
         resonator_state[0, frequency_index] = (
             decayed_rotation[0, frequency_index] * previous_state_real
             - decayed_rotation[1, frequency_index] * previous_state_imaginary

@@ -244,10 +244,8 @@ def update_flow_evidence_since_alarm(monitor, readings):
     redundancy, memory, initial_errors = monitor.redundancy, monitor.memory, monitor.initial_errors
     config = redundancy.config
     for j in range(3):
-        flow_reading, test = (
-            readings[flow_sensor_index_of_test(SPEED_TEST + j)],
-            redundancy.test[SPEED_TEST + j],
-        )
+        flow_reading = readings[flow_sensor_index_of_test(SPEED_TEST + j)]
+        test = redundancy.test[SPEED_TEST + j]
         if memory.n_samples_since_alarm == 0:
             memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = flow_reading
             memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample

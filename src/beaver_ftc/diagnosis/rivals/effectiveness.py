@@ -121,10 +121,8 @@ class EffectivenessFilter:
         ):
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
         surface_index = self.leading_surface_indices[most_significant_axis]
-        effectiveness_change, surface_name = (
-            float(surface_effectiveness_estimates[surface_index] - 1.0),
-            self.context.surfaces[surface_index],
-        )
+        effectiveness_change = float(surface_effectiveness_estimates[surface_index] - 1.0)
+        surface_name = self.context.surfaces[surface_index]
         return Verdict(
             True,
             "pqr"[most_significant_axis],

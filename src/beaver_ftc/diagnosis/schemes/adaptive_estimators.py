@@ -383,10 +383,8 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
     )
-    has_statistical_alarm_been_raised, may_loss_end = (
-        statistical_detector.alarm.detected_at_s >= 0.0,
-        not fdi.config.abrupt,
-    )
+    has_statistical_alarm_been_raised = statistical_detector.alarm.detected_at_s >= 0.0
+    may_loss_end = not fdi.config.abrupt
     statistical.update_blocks(
         test_config,
         uncertainty_bound_rad_s2,

@@ -169,10 +169,8 @@ def locate_second_pitch_or_deduce_healthy(
     set_known_position_and_clear_anomaly(
         first_surface, first_surface_min_deflection, first_surface_max_deflection
     )
-    second_pitch_acceleration_per_rad, first_pitch_acceleration_per_rad = (
-        second_effect_record.regressor[PITCH],
-        first_effect_record.regressor[PITCH],
-    )
+    second_pitch_acceleration_per_rad = second_effect_record.regressor[PITCH]
+    first_pitch_acceleration_per_rad = first_effect_record.regressor[PITCH]
     first_fault_acceleration = first_pitch_acceleration_per_rad * last_midpoint_deflection_error(
         first_surface
     )
@@ -401,10 +399,8 @@ def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, 
     decide_pitch_isolation(types, layout, t)
     first_isolated_surface_index = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        finding_record, first_finding_record = (
-            surface.status,
-            types.surface[max(first_isolated_surface_index, 0)].status,
-        )
+        finding_record = surface.status
+        first_finding_record = types.surface[max(first_isolated_surface_index, 0)].status
         if finding_record.is_isolated and (
             first_isolated_surface_index < 0
             or finding_record.isolated_at_s < first_finding_record.isolated_at_s

@@ -358,10 +358,8 @@ def configure_fault_types(
     types_config["frames_per_block"] = frames_per_block = (
         ceil(BLOCK_DURATION_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
     )
-    types_config["frame_shows_single_instant"], types_config["block_duration_s"] = (
-        scenario.substeps == 1 and frames_per_block == 1,
-        frames_per_block * dt,
-    )
+    types_config["frame_shows_single_instant"] = scenario.substeps == 1 and frames_per_block == 1
+    types_config["block_duration_s"] = frames_per_block * dt
     types_config["slowest_half_cycle_frames"] = ceil(
         pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
     )

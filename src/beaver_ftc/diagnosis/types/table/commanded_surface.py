@@ -278,10 +278,8 @@ def update_growing_bias_returning_consistent_interval(config, surface, type_inde
         max(memory.min_growth_up, judged_offset_low),
         min(memory.min_growth_down, judged_offset_high),
     )
-    offset_has_been_positive, offset_has_been_negative = (
-        memory.min_growth_up > 0.0,
-        memory.min_growth_down < 0.0,
-    )
+    offset_has_been_positive = memory.min_growth_up > 0.0
+    offset_has_been_negative = memory.min_growth_down < 0.0
     offset_shrinks = (offset_has_been_positive and judged_offset_high < memory.min_growth_up) or (
         offset_has_been_negative and judged_offset_low > memory.min_growth_down
     )

@@ -16,7 +16,8 @@ PYTEST := env -u PYTHONDONTWRITEBYTECODE OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=
 FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
 # Kernels on plain arrays, without a compiler: to compile each by itself takes ten times as long as to try it.
-# With what compiles nothing they take about as long as tests/warm.py, for which all others wait.
+# Files whose tests compile nothing are among them: together they take about as long as tests/warm.py, for which all other
+# tests wait.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
   $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py detection/test_noise_numbers.py test_short_flights.py types/test_types_verdict.py) \
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \

@@ -211,7 +211,7 @@ TABLE = (
     ),
     Exempt(
         r"(beaver-ftc mismatch (?:fault-free|\S+ (?:--variant \S+,\S+|--map)))",
-        "half a minute with figures, which the command of the other page draws",
+        "half a minute with figures, which `mismatch engine-neglected` draws",
         r"\1 --no-report",
     ),
     Exempt(

@@ -22,7 +22,7 @@ TEXT_ONLY = re.compile(
     "power|bench|reproduce|smallest|decay|compare --|detectability|--backend|--flightgear|--search|--out|"
     "--help|schema|--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|challenge new|&&"
 )
-# By day in text alone: in JSON, tests of each command fly these with less.
+# These run by day for their text alone; the tests of each command ask smaller runs for JSON.
 IN_JSON_AT_NIGHT = re.compile(
     r"matrix|mechanisms|jet\.yaml|scenarios/|challenge grade|sweep \S+ --(junit|resume)"
 )

@@ -47,7 +47,7 @@ def fault_matrix_light() -> str:
 
 
 def fault_matrix_light_probe() -> str:
-    """As many of these."""
+    """As many of these flights, and what the informed test tells of them."""
     rows = _probed(declared=True, turbulence="light")
     return "\n".join((*map(_closely, rows), _told(beside_told(rows))))
 

@@ -81,12 +81,6 @@ def test_nothing_is_replaced(tmp_path, challenge):
     ]
 
 
-def test_hidden_flights_that_others_may_read_are_refused(challenge):
-    (challenge / "teacher" / "loss.yaml").chmod(0o640)
-    with pytest.raises(BadInput, match=r"loss\.yaml: others may read it"):
-        folders.hidden_flights(challenge)
-
-
 def test_hidden_flights_among_what_students_may_read_are_refused(challenge, monkeypatch):
     monkeypatch.setattr(folders, "readable", lambda: [str(challenge)])
     with pytest.raises(BadInput, match="lies among Python's packages"):

@@ -1,5 +1,8 @@
 """Both ends of the line, without a process between them: what the grader sends is what the pilot unpacks."""
 
+import os
+import pickle
+import struct
 from types import SimpleNamespace
 
 import numpy as np
@@ -153,3 +156,128 @@ def test_a_message_that_a_pipe_takes_in_pieces_arrives_whole():
 
     code._process.stdin.write = closed
     code._send(b"lost")
+
+
+class Told:
+    """The pilot's end: frames that it is shown, and all that it says, with the frame that it says it of."""
+
+    def __init__(self, *shown):
+        self.shown, self.said, self.frame = list(shown), [], 0
+
+    def take(self):
+        if not self.shown:
+            raise EOFError
+        return self.shown.pop(0)
+
+    def send(self, kind, content=b""):
+        self.said.append((kind, self.frame, content))
+
+
+DETECTOR = """
+import numpy as np
+from beaver_ftc.diagnosis import Verdict
+class Mine:
+    def reset(self, context):
+        self.trim = context.trim_y
+    def step(self, measured, command):
+        return Verdict(True, "r", "flap", None, measured.y[4], 2.0 * command + self.trim[1], measured.t_s)
+"""
+LAW = """
+class Mine:
+    def reset(self, context):
+        pass
+    def step(self, measured, reference, verdict):
+        said = [measured.x[0], reference.commanded[1], reference.rate[2], verdict.estimate]
+        return said[:4 - (measured.t_s > 3.0)]
+"""
+CONTEXT = SimpleNamespace(surfaces=SURFACES, trim_y=np.array([0.0, 0.25, 0.0, 0.0, 0.0]))
+
+
+def frames(*rest):
+    """Two frames as the grader packs them."""
+    every = [MEASURED, MEASURED._replace(t_s=3.5)]
+    return [np.concatenate([*line._shown(measured), *rest]).tobytes() for measured in every]
+
+
+def test_a_detector_answers_each_frame_with_its_number():
+    command = numbers(4, seed=9)
+    told = Told(*frames(command))
+    with pytest.raises(EOFError):
+        pilot.fly(told, {"source": DETECTOR, "name": "mine.py", "context": CONTEXT})
+    assert told.said[:2] == [(pilot.READY, 0, b"detector:Mine"), (pilot.BEGUN, 0, b"")]
+    assert [said[:2] for said in told.said[2:]] == [(pilot.VERDICT, 1), (pilot.VERDICT, 2)]
+    for (_, _, content), t_s in zip(told.said[2:], (2.5, 3.5), strict=True):
+        found = [1.0, 3.0, 4.0, 1.0, MEASURED.y[4], t_s, 1.0, *(2.0 * command + 0.25)]
+        np.testing.assert_array_equal(np.frombuffer(content), found)
+
+
+def test_a_law_answers_each_frame_with_a_command_of_every_surface():
+    verdict = Verdict(True, "q", "rudder", None, -0.3, None, 1.5)
+    said = pilot.verdict_numbers(verdict, SURFACES)
+    told = Told(*frames(*REFERENCE, said))
+    with pytest.raises(ValueError, match=r"the command has shape \(3,\), allowed: \(4,\)"):
+        pilot.fly(told, {"source": LAW, "name": "mine.py", "context": CONTEXT})
+    expected = [MEASURED.x[0], REFERENCE.commanded[1], REFERENCE.rate[2], -0.3]
+    ready, begun, (kind, frame, content) = told.said
+    assert (ready, begun) == ((pilot.READY, 0, b"law:Mine"), (pilot.BEGUN, 0, b""))
+    assert (kind, frame, list(np.frombuffer(content))) == (pilot.COMMAND, 1, expected)
+
+
+def test_without_a_flight_a_class_is_named_and_that_is_all():
+    told = Told()
+    pilot.fly(told, {"source": LAW.replace("class Mine:", "class Mine:\n    fault_tolerant = 1"),
+                     "name": "mine.py", "context": None})  # fmt: skip
+    assert told.said == [(pilot.READY, 0, b"fault-tolerant law:Mine")]
+
+
+def test_whatever_goes_wrong_is_said_in_a_line(monkeypatch):
+    """After the walls; an act that they refuse is told at once. Then the process ends."""
+    context = SimpleNamespace(surfaces=SURFACES, model=None)
+    told, ended = Told(pickle.dumps({"source": "1/0", "name": "mine.py", "context": context})), []
+    flown = []
+
+    def fly(of, given):
+        flown.append(given["context"].model)
+        raise SystemExit("first\n  second " + "é" * 600)
+
+    def confine(tell):
+        tell("x" * 501)
+        return ["limits", "names"]
+
+    monkeypatch.setattr(pilot, "_own_streams", lambda: told)
+    monkeypatch.setattr(pilot, "confine", confine)
+    monkeypatch.setattr(pilot, "fly", fly)
+    monkeypatch.setattr(pilot.os, "_exit", ended.append)
+    pilot.main()
+    refused, walls, error = told.said
+    assert refused == (pilot.REFUSED, 0, b"x" * 500)
+    assert walls == (pilot.WALLS, 0, b"limits names")
+    assert error == (pilot.ERROR, 0, ("SystemExit: first second " + "é" * 600).encode()[:500])
+    assert ended == [0]
+    assert (flown[0]._line, flown[0]._surfaces) == (told, 4)
+
+
+def test_a_pipe_s_pieces_are_one_message_and_its_end_ends_the_process(monkeypatch):
+    inward, into = os.pipe()
+    outward, out = os.pipe()
+    at = pilot.Line(inward, out)
+    os.write(into, struct.pack("<I", 5) + b"hello" + struct.pack("<I", 300) + b"x")
+    assert at.take() == b"hello"
+    read, pieces = os.read, iter([4, 1, 2])
+    monkeypatch.setattr(pilot.os, "read", lambda file, size: read(file, min(size, next(pieces, 7))))
+    os.write(into, b"x" * 299)
+    assert at.take() == b"x" * 300
+    at.frame = 258
+    at.send(pilot.ASKS, b"three")
+    assert read(outward, 99) == b"Q\x02\x01\x00\x00\x05\x00\x00\x00three"
+    os.close(into)
+
+    def end(status):
+        raise SystemExit(status)
+
+    monkeypatch.setattr(pilot.os, "_exit", end)
+    with pytest.raises(SystemExit) as ended:
+        at.take()
+    assert ended.value.code == 0
+    for file in (inward, outward, out):
+        os.close(file)

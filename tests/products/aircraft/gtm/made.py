@@ -15,6 +15,16 @@ _DEFLECTIONS = {  # deg, uneven steps; where the model knows of nothing to do, t
     "ail": [-20.0, -13.0, -6.0, 0.0, 5.0, 12.0, 20.0], "rud": [-30.0, -18.0, -7.0, 0.0],
     "spo": [0.0, 14.0, 45.0],
 }  # fmt: skip
+# As the source has them, not as the converter does: thrust and rotors are held against these.
+_ENGINES = {
+    "left": {"position": [-4.32525, -1.183333, -0.6425], "angles": [0, 1.98, 2.22]},
+    "right": {"position": [-4.32525, 1.183333, -0.6425], "angles": [0, 1.95, -1.18]},
+    "rpm_percent": {
+        "polynomial": [0.000033035538475, -0.008354385314499, 1.191126728328792, 31.518959847101669]
+    },
+    "thrust": {"polynomial": [0.000014847593013, 0, 0, 0.412662356277121]},
+    "rotor": {"shaft_dia": 0.0625, "shaft_len": 0.5208333, "density": 15.2},
+}
 _ROTATION = [-0.5, -0.31, -0.17, -0.06, 0.0, 0.05, 0.2, 0.33, 0.5]
 
 
@@ -84,8 +94,10 @@ def _parameters():
             "inertia": {f"I{name}": value for name, value in mass["inertia"].items()},
             "inertia_fuel_polynomials": {f"I{name}": [0.5, v] for name, v in mass["at_zero_burn"].items()},
         },
+        "geometry": {"ref_cg": {"value": [-4.775025, 0.0, -0.9401]}},
         "engines": {
             "spool": {"A": [[-damping, -stiffness], [1, 0]], "B": [1, 0], "C": engine["spool"]["c"]},
+            **_ENGINES,
         },
         "aero_shares": {
             "elevator_arm_spans": arms,

@@ -61,11 +61,12 @@ def test_what_cannot_go_together_is_refused(of, says):
 
 
 def test_the_regions_hold_the_envelope():
-    """No airspeed of it is left out, and every region is inside."""
+    """No airspeed of it is left out, and every region is inside, to the same sideslip and altitudes."""
     regions, whole = folder.regions(), folder.aircraft_file()["envelope"]
     speeds = [of.airspeed_mps for of in regions]
     assert [speeds[0][0], speeds[-1][1]] == whole["airspeed_mps"]
     assert all(before[1] >= after[0] for before, after in pairwise(speeds))
+    assert {(of.beta_rad, of.altitude_m, of.of_region) for of in regions} == {(0.2, (0.0, 1500.0), True)}
     alphas = np.degrees([of.alpha_rad for of in regions])
     assert [alphas.min(), alphas.max()] == pytest.approx(whole["alpha_deg"])
 

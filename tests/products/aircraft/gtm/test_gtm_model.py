@@ -58,7 +58,7 @@ def test_random_points_inside_and_beyond_the_tables(bench, specified, seed):
     """Angles and deflections beyond the ends, every case, surfaces at zero, equal and unequal."""
     rng = np.random.default_rng(seed)
     for k in range(40):
-        alpha, beta = radians(rng.uniform(-25, 100)), radians(rng.uniform(-70, 70))
+        alpha, beta = radians(rng.uniform(-90, 150)), radians(rng.uniform(-88, 88))
         deg = {name: rng.choice([0.0, 5.0, rng.uniform(-35, 35)]) for name in SURFACES}
         deg["STAB"] = rng.choice([0.0, rng.uniform(-12, 4)])
         case, gear, V = k % 7, bool(k % 2), rng.uniform(60, 250)
@@ -228,18 +228,27 @@ def test_the_spool_dips_and_settles(bench, specified, dt):
     assert min(found) < 29.9
 
 
-def test_an_engine_fails_like_a_surface(bench):
-    fdm = bench.fdm
-    fdm["fcs/throttle-cmd-norm"] = 0.6
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(
+    ("failures", "percent"),
+    [
+        ({"effectiveness": 0.3}, 0.3 * 64.0), ({"stuck": 1.0, "stuck-at-norm": 0.22}, 22.0),
+        ({"bias-norm": -0.1}, 54.0), ({"float": 1.0}, 0.0),
+    ],
+)  # fmt: skip
+def test_an_engine_fails_like_a_surface(bench, side, failures, percent):
+    """The one with the failure, not the other; the lever of its own adds to that of both."""
+    fdm, other = bench.fdm, {"left": "right", "right": "left"}[side]
+    usual = {name: fdm[f"failures/{side}_engine/{name}"] for name in failures}
+    fdm["fcs/throttle-cmd-norm"], fdm[f"fcs/{side}_engine-cmd-norm"] = 0.6, 0.04
+    for name, number in failures.items():
+        fdm[f"failures/{side}_engine/{name}"] = number
     bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
-    sound = fdm["engine/left_engine/thrust-lbs"]
-    fdm["failures/left_engine/effectiveness"] = 0.0
-    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
-    lost = fdm["engine/left_engine/thrust-lbs"], fdm["engine/right_engine/thrust-lbs"]
-    fdm["failures/left_engine/effectiveness"], fdm["fcs/throttle-cmd-norm"] = 1.0, 0.0
-    assert sound > 3.0
-    assert lost[0] < 0.0 + 1e-12
-    assert lost[1] == pytest.approx(sound, abs=0.2)
+    found = [fdm[f"fcs/{of}_engine-lagged-percent"] for of in (side, other)]
+    for name, number in usual.items():
+        fdm[f"failures/{side}_engine/{name}"] = number
+    fdm["fcs/throttle-cmd-norm"] = fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
+    assert found == pytest.approx([percent, 60.0], abs=1e-6)
 
 
 def test_forces_and_moments_are_the_coefficients_in_their_own_dimensions(bench):
@@ -254,3 +263,58 @@ def test_forces_and_moments_are_the_coefficients_in_their_own_dimensions(bench):
         value = fdm[f"aero/coefficient/{coefficient}"]
         assert value != 0.0
         assert fdm[f"aero/{name}"] == pytest.approx(force_lbf * length_ft * value, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("levers", "common", "case", "gear"),
+    [((0.31, 0.12), 0.27, 0, 1.0), ((0.0, 0.83), 0.0, 2, 0.0), ((0.17, -0.06), 0.4, 4, 1.0)],
+)
+def test_engines_push_and_turn_it_about_the_centre_of_gravity_that_is_left(
+    bench, specified, levers, common, case, gear
+):
+    """Each engine along its own line, at rest in time at the sum of both levers; below its ram drag, nothing.
+
+    The moments of the air are about the reference point of the tables, all about where a case leaves the
+    centre of gravity; the gear moves it 0.0025 ft aft and 0.015 ft down.
+    """
+    fdm, velocity, omega = bench.fdm, np.array([151.0, 7.0, 13.0]), np.array([0.4, -0.7, 1.1])
+    for side, lever in zip(("left", "right"), levers, strict=True):
+        fdm[f"fcs/{side}_engine-cmd-norm"] = lever
+    fdm["fcs/throttle-cmd-norm"], fdm["gear/down"] = common, gear
+    bench.damage(case)
+    bench.place(800.0, velocity, (0.1, 0.05, 0.0), omega)
+    omega = np.array([fdm[f"velocities/{axis}-rad_sec"] for axis in "pqr"])
+    cg = specified.mass(case)[1] + gear * np.array([-0.0025, 0.0, 0.015])
+    load, pressure = fdm["aero/qbar-psf"] * 5.9018, fdm["atmosphere/P-psf"]
+    c = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
+    air = load * np.array([6.8488, 0.9153, 6.8488]) * c[3:]
+    air += np.cross(np.array([-4.775025, 0.0, -0.9401]) - cg, load * c[:3])
+    forces, moments, thrusts, rotors = [], [], [], np.zeros(3)
+    for side, lever in zip(("left", "right"), levers, strict=True):
+        push, place, turning = specified._engine(side, 100.0 * (lever + common), pressure, load)
+        forces.append(push)
+        moments.append(np.cross(place - cg, push))
+        thrusts.append(float(np.linalg.norm(push)))
+        rotors += turning
+    found = {
+        kind: np.array([fdm[f"moments/{axis}-{kind}-lbsft"] for axis in "lmn"])
+        for kind in ("aero", "external")
+    }
+    pushed = np.array([fdm[f"forces/fb{axis}-external-lbs"] for axis in "xyz"])
+    each = [fdm[f"engine/{side}_engine/thrust-lbs"] for side in ("left", "right")]
+    inertia = [fdm[f"inertia/i{name}-slugs_ft2"] for name in ("xx", "yy", "zz")]
+    weight, share = fdm["inertia/weight-lbs"], fdm["aero/thrust-coefficient"]
+    for side in ("left", "right"):
+        fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
+    fdm["fcs/throttle-cmd-norm"] = fdm["gear/down"] = 0.0
+    bench.damage(0)
+    assert each == pytest.approx(thrusts, rel=1e-9)
+    assert pushed == pytest.approx(sum(forces), rel=1e-9)
+    assert share == pytest.approx(sum(thrusts) / load)
+    assert found["aero"] == pytest.approx(air, rel=1e-5)
+    assert found["external"] == pytest.approx(sum(moments) + np.cross(omega, rotors), rel=1e-5)
+    assert (thrusts[0] == 0.0) == (levers[0] + common == 0.0)
+    assert inertia == pytest.approx(
+        np.diag(specified.mass(case)[2]) + gear * np.array([0.0441, 0.0, 0.006994])
+    )
+    assert weight == pytest.approx(specified.mass(case)[0])

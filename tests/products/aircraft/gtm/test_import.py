@@ -1,7 +1,10 @@
 """`beaver-ftc import gtm`: what it refuses, and the folder it writes."""
 
 import re
+import shutil
 from collections import defaultdict
+from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,7 +19,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_aircraft.gtm import aerodynamics, conversion, elements, folder, masses, systems
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
-from beaver_ftc_aircraft.gtm.steady import Steady
+from beaver_ftc_aircraft.gtm.steady import Condition, Steady
 from products.aircraft.gtm import made
 from telling import apart
 
@@ -52,35 +55,59 @@ def test_other_bytes_are_refused_in_a_line(tmp_path, content, says):
 
 
 def test_no_file_and_a_folder_are_refused(tmp_path):
-    for path in (tmp_path / "none.mat", tmp_path):
-        with pytest.raises(BadInput, match="allowed: the data base"):
+    for path, says in (
+        (tmp_path / "none.mat", "cannot be read (No such file or directory)"),
+        (tmp_path, "is no file of this kind"),
+    ):
+        with pytest.raises(BadInput) as wrong:
             read(path)
+        assert str(wrong.value) == f"{path}: {says}, allowed: {ALLOWED}"
 
 
 VERSION = "Polynominal Fit, with damage"
+ALLOWED = "the data base of github.com/nasa/GTM_DesignSim, gtm_design/config/T2_polynomial_aerodatabase.mat"
+
+
+def test_a_file_of_more_than_50_mb_is_not_read(tmp_path):
+    """Of which nothing is on the disk."""
+    for size, says in ((50_000_000, "is no whole MATLAB file"), (50_000_001, "is no file of this kind")):
+        with (tmp_path / "x.mat").open("wb") as file:
+            file.truncate(size)
+        with pytest.raises(BadInput, match=says):
+            read(tmp_path / "x.mat")
 
 
 @pytest.mark.parametrize(
     ("content", "says"),
     [
         ({"x": 1}, "has the version ''"),
+        ({"ver": "x" * 61}, f"has the version {'x' * 60!r}"),
         ({"ver": VERSION}, "has no C6_bas.data"),
         ({"ver": VERSION, "C6_bas": 3}, "has no C6_bas.data"),
-        ({"ver": VERSION, "C6_bas": {"data": np.zeros((3, 4))}}, "is of (3, 4) values"),
-        ({"ver": VERSION, "C6_bas": {"data": "text"}}, "is no table of numbers"),
-        ({"ver": VERSION, "C6_bas": {"data": np.full((32, 27, 6), np.nan)}}, "not finite"),
+        (
+            {"ver": VERSION, "C6_bas": {"data": np.zeros((3, 4))}},
+            "C6_bas.data is of (3, 4) values, not (32, 27, 6)",
+        ),
+        ({"ver": VERSION, "C6_bas": {"data": "text"}}, "C6_bas.data is no table of numbers"),
+        (
+            {"ver": VERSION, "C6_bas": {"data": np.full((32, 27, 6), np.nan)}},
+            "C6_bas.data has values that are not finite",
+        ),
         (
             {"ver": VERSION, "C6_bas": {"data": np.zeros((32, 27, 6)), "alpha": np.zeros(32)}},
             "C6_bas.alpha does not rise",
         ),
+        (
+            {"ver": VERSION, "C6_bas": {"data": np.zeros((32, 27, 6)), "alpha": np.arange(27.0)}},
+            "C6_bas.alpha is of (27,) values, not (32,)",
+        ),
     ],
-)  # fmt: skip
+)
 def test_other_contents_are_refused_in_a_line(tmp_path, content, says):
     savemat(tmp_path / "x.mat", content)
     with pytest.raises(BadInput) as wrong:
         read(tmp_path / "x.mat")
-    assert says in str(wrong.value)
-    assert "\n" not in str(wrong.value)
+    assert str(wrong.value) == f"{tmp_path / 'x.mat'}: {says}, allowed: {ALLOWED}"
 
 
 @pytest.mark.parametrize(
@@ -253,3 +280,123 @@ def test_an_actuator_has_its_servo_in_radians_unless_it_is_set_on_the_ground(sur
     assert numbers[f"actuators/{surface}/bandwidth-rad_sec"] == (servo["bandwidth_rad_s"] if moves else 0.0)
     assert (f"fcs/{surface}-cmd-late-rad" in text) == moves
     assert ("stabiliser-stands" in text) == (not moves)
+
+
+FLOWN = Steady(165.0, 91.04, 3.0, 0.7, 1.3, 3.5, 2.4163, -0.4172, 0.25, 39.816, 1e-10)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+@pytest.mark.parametrize("agreed", [False, True])
+def test_what_is_imported_is_trimmed_at_3_deg_derived_by_regions_and_put_where_it_is_looked_for(
+    kept, agreed, tmp_path, monkeypatch
+):
+    """With model, trim and derivation made up: what each gets, what is said of them, and the folder at the
+    end. With the agreement if it is beside the data base; what was imported before is gone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    out = None if kept else tmp_path / "out"
+    target = (tmp_path / "cache" / "beaver-ftc" / "imported" if kept else out) / "gtm"
+    target.mkdir(parents=True)
+    (target / "LICENSE.md").write_text("of an import before")
+    (target / "old.txt").write_text("of an import before")
+    (tmp_path / "data").mkdir()
+    if agreed:
+        (tmp_path / "data" / "LicenseAgreement.pdf").write_bytes(b"terms")
+    said, trimmed, derived = [], [], []
+
+    class Bench:
+        def __init__(self, model):
+            trimmed.append(model.read_text())
+
+        def steady(self, condition):
+            trimmed.append(condition)
+            return FLOWN
+
+    def write_model(base, folder):
+        (folder / "gtm.xml").write_text(f"model of {base}")
+        return folder / "gtm.xml"
+
+    def derive(reference, out, envelope=None, tell=print, regions=(), moves=None, engines=False):
+        files = {path.name for path in Path(reference).iterdir()}
+        derived.append((Path(reference).name, files, envelope, regions, moves, engines))
+        tell("derive it")
+        shutil.copytree(reference, out / "gtm")
+        return SimpleNamespace(aircraft=SimpleNamespace(surfaces=("one", "other")))
+
+    for name, instead in (("Bench", Bench), ("write_model", write_model), ("derive", derive)):
+        monkeypatch.setattr(conversion, name, instead)
+    monkeypatch.setattr(conversion, "read", lambda database: f"what {database.name} has")
+    monkeypatch.setattr(conversion, "perf_counter", iter([7.25, 20.5]).__next__)
+    found = conversion.convert(tmp_path / "data" / "x.mat", out, said.append)
+    assert found == conversion.Imported(target, ("one", "other"), FLOWN, 13.25)
+    assert said == ["read", "write the model", "trim", "derive it"]
+    assert trimmed == ["model of what x.mat has", Condition(alpha_deg=3.0)]
+    assert derived == [
+        ("gtm", {"gtm.xml", "aircraft.yaml"}, None, folder.regions(), folder.MOVES, False),
+    ]
+    scripts = {"doublets.xml", *(f"{case}.xml" for case in cases())}
+    files = {"gtm.xml", "aircraft.yaml", "LICENSE.md", "reset00.xml", "scripts"}
+    assert {path.name for path in target.iterdir()} == files | ({"LicenseAgreement.pdf"} if agreed else set())
+    assert {path.name for path in (target / "scripts").iterdir()} == scripts
+    assert "T2_polynomial_aerodatabase.mat" in (target / "LICENSE.md").read_text()
+    assert [path.name for path in target.parent.iterdir()] == ["gtm"]
+    if agreed:
+        assert (target / "LicenseAgreement.pdf").read_bytes() == b"terms"
+
+
+def test_what_came_of_an_import_as_a_document_and_as_text():
+    made = conversion.Imported(Path("there/gtm"), ("one", "other"), FLOWN, 13.256)
+    apart(steady=[*vars(FLOWN).values()])
+    document = conversion.document_of(made)
+    assert document == {
+        "aircraft": "gtm", "folder": "there/gtm", "surfaces": ["one", "other"],
+        "damage": [
+            "rudder-off", "fin-off", "left-outboard-flap-off", "left-wing-tip-off", "left-elevator-off",
+            "left-stabiliser-off",
+        ],
+        "trim": {
+            "airspeed_fps": 165.0, "eas_kt": 91.04, "alpha_deg": 3.0, "beta_deg": 0.7, "phi_deg": 1.3,
+            "theta_deg": 3.5, "elevator_deg": 2.4163, "aileron_deg": -0.4172, "rudder_deg": 0.25,
+            "throttle_percent": 39.816, "left": 1e-10,
+        },
+        "took_s": 13.26,
+    }  # fmt: skip
+    assert conversion.text_of(document).splitlines() == [
+        "gtm: there/gtm, written in 13.3 s",
+        " surfaces   one, other",
+        " damage     rudder-off, fin-off, left-outboard-flap-off, left-wing-tip-off, left-elevator-off, "
+        "left-stabiliser-off",
+        " trim       3 deg, 91.0 kt: elevator 2.416 deg, aileron -0.417 deg, throttle 39.82 %",
+        " the licence of NASA's data is in LICENSE.md of the folder",
+    ]
+
+
+def test_a_gear_that_is_down_shifts_the_centre_of_gravity_by_its_own_and_adds_its_inertia():
+    """Beside what a case leaves, the tip of the left wing lost: 0.81 lbf less, the moment as before."""
+    up, down = masses.mass_of(4), masses.mass_of(4, gear_down=True)
+    assert (up.weight_lbf, down.weight_lbf) == pytest.approx((56.94, 56.94))
+    left = 57.75 * np.array([-4.74747447, -0.0118, -0.9761]) / 56.94 + np.array([0.148, 0.628, 0.032]) / 12.0
+    assert up.cg_ft == pytest.approx(left)
+    assert down.cg_ft - up.cg_ft == pytest.approx([-0.0025, 0.0, 0.015])
+    assert down.inertia - up.inertia == pytest.approx(np.diag([0.0441, 0.0, 0.006994]))
+    assert np.diag(up.inertia) == pytest.approx(
+        [1.221 + 0.001076938 - 0.25821, 4.655 + 0.002102173 - 0.01727, 5.587 + 0.001301532 - 0.274]
+    )
+    products = up.inertia[0, 1], up.inertia[0, 2], up.inertia[1, 2]
+    assert products == pytest.approx((0.05998 - 0.006, 0.00295 - 0.274, 0.01346))
+
+
+def test_a_scenarios_errors_of_mass_are_a_metre_from_the_centre_of_gravity_in_pairs():
+    """In JSBSim's frame, inches aft, right and up, before the ten masses of damage."""
+    made = ElementTree.fromstring(masses.mass_balance())
+    (cg,) = made.findall("location")
+    points = [point.find("location") for point in made.iter("pointmass")]
+    off = [[float(of.findtext(axis)) - float(cg.findtext(axis)) for axis in "xyz"] for of in points]
+    metre = 100.0 / 2.54 * np.eye(3)
+    pairs = [way for axis in metre for way in (axis, -axis)]
+    assert off[0] == [0.0, 0.0, 0.0]
+    for k in (1, 3, 5):
+        assert sorted(off[k : k + 2]) == pytest.approx(np.array(sorted(map(list, pairs[k - 1 : k + 1]))))
+    assert len(off) == masses.FIRST + len(masses._PLACES) == 17
+    assert [float(cg.findtext(axis)) for axis in "xyz"] == pytest.approx(
+        [12 * 4.74747447, -12 * 0.0118, 12 * 0.9761]
+    )

@@ -1,14 +1,19 @@
 """Which aircraft is meant, where it goes, and how many terms there is room for."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from beaver_ftc.aircraft import THRUST_TERM
 from beaver_ftc.aircraft import aircraft as loading
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc_aircraft.derive import derivation, outline
 from beaver_ftc_aircraft.derive.derivation import Source, source_of
+from beaver_ftc_aircraft.derive.sample import AGES_OF_WORST, EVERY_AGE, FRESH, Moves
+from telling import numbers
 
 from .known import TRAINER
 
@@ -190,3 +195,188 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
         monkeypatch.setattr(derivation, names[0], lambda model, seen=seen: seen)
         with pytest.raises(BadInput, match=f"^mine: its aerodynamics depend {says}, allowed: aileron"):
             derivation._prepared(source, folder, wish, [], told.append)
+
+
+@pytest.mark.parametrize("regions", [1, 3])
+@pytest.mark.parametrize("effectors", [{}, {"engine_1": "left", "engine_2": "right"}])
+def test_errors_are_measured_where_the_fit_has_not_been_and_declared_as_the_worst_region_has_them(
+    regions, effectors, monkeypatch
+):
+    """Of one envelope the worst is searched for; of regions random states count, of every age. The declared
+    error is that of a fresh aircraft, whole travel, in the outermost box of any region."""
+    asked, apart_from = [], []
+    moves, about = Moves((0.2, 1.0), 0.1, 0.7), [f"region {k}" for k in range(regions)]
+    plant = SimpleNamespace(aircraft=SimpleNamespace(effectors=effectors))
+
+    def sample_all(plant, about, n, seed, properties, ages=EVERY_AGE, moves=None, errors=None):
+        asked.append((about, n, seed, properties, ages, moves, errors and errors("these states")))
+        return f"states {seed}"
+
+    tables = np.abs(numbers(4 * regions, 3, 3, 2, seed=4))
+    boxes = [{f"error_{axis}_rad_s2": of[i].tolist() for i, axis in enumerate("pqr")} for of in tables]
+
+    def map_of(aircraft, sets, flown, n, of_moves):
+        assert (aircraft, sets, flown, n, of_moves) == (
+            "aircraft", ("first", "states 2"), "flown", regions, moves,
+        )  # fmt: skip
+        return {"boxes": boxes}, ("of the fit", "of the check", "of flights")
+
+    monkeypatch.setattr(derivation, "sample_all", sample_all)
+    monkeypatch.setattr(derivation, "map_of", map_of)
+    monkeypatch.setattr(derivation, "errors_of", lambda aircraft, samples: (aircraft, samples))
+    monkeypatch.setattr(derivation, "set_engines_apart", lambda *of: apart_from.append(of))
+    monkeypatch.setattr(outline, "aircraft_of", lambda data, folder: "aircraft")
+    data = {}
+    found = derivation._check(data, plant, about, moves, Path(), "properties", ("first", "flown"))
+    assert found == ("of the fit", "of the check")
+    of_one = 8000, 2, "properties", AGES_OF_WORST, moves, ("aircraft", "these states")
+    of_many = 18000, 2, "properties", EVERY_AGE, moves, None
+    alike = 6000, 3, "properties", EVERY_AGE, replace(moves, apart=0.0), None
+    assert asked == [(about, *(of_one if regions == 1 else of_many))] + [(about, *alike)] * bool(effectors)
+    assert apart_from == [(boxes, plant.aircraft, "states 3")] * bool(effectors)
+    largest = {axis: tables[-regions:, i, 0, -1].max() for i, axis in enumerate("pqr")}
+    assert data == {"model_error_map": {"boxes": boxes}, "model_error_rad_s2": largest}
+
+
+@pytest.mark.parametrize("regions", [1, 2])
+@pytest.mark.parametrize("declared", [{}, {"mach": {"property": "of/mach"}}])
+@pytest.mark.parametrize("thrust_term", [False, True])
+@pytest.mark.parametrize("effectors", [{}, {"engine_1": "left"}])
+def test_what_is_sampled_is_fitted_checked_and_given_its_thrust(
+    regions, declared, thrust_term, effectors, monkeypatch
+):
+    """Signals of its own file are kept, else those of use are chosen among what JSBSim has, those of engines
+    in any case. Terms of regions hold best near neutral. Thrust is measured unless a term has it."""
+    told, asked = [], {}
+    terms = {THRUST_TERM: "a term"} if thrust_term else {}
+    aircraft = SimpleNamespace(effectors=effectors, terms=terms)
+    plant = SimpleNamespace(aircraft=aircraft, has=lambda name: name != "lacks/it")
+    about, moves = ["region"] * regions, Moves((0.3, 1.0))
+
+    def keep(name, returns):
+        def called(*of):
+            asked[name] = of
+            return returns
+
+        return called
+
+    class Forks:
+        def __enter__(self):
+            self.given = []
+            return self
+
+        def __exit__(self, *of):
+            pass
+
+        def give(self, what):
+            self.given.append(what)
+
+        def results(self):
+            return [what() for what in self.given]
+
+    monkeypatch.setattr(
+        derivation, "SIGNAL_PROPERTIES", {"alpha_rate": "of/a", "lacking": "lacks/it", "thrust": "of/t"}
+    )
+    for name, returns in (
+        ("fly_about_all", "flown"), ("sample_all", "first"), ("engine_signals", ["engines_n"]),
+        ("signals_of_use", ["thrust", "alpha_rate"]), ("nearness", "weight"), ("_moments", "moments"),
+        ("_check", ("fit", "check")), ("thrust_of", {"lag_s": 0.4}), ("Forks", Forks()),
+    ):  # fmt: skip
+        monkeypatch.setattr(derivation, name, keep(name, returns))
+    monkeypatch.setattr(outline, "named_as", keep("named_as", "named moments"))
+    monkeypatch.setattr(outline, "plant_of", lambda data, folder: ("plant of", folder))
+    data = {"signals": dict(declared), "engine": {"start": "off"}}
+    made = derivation._derived(data, plant, "trim", about, moves, Path("in"), told.append)
+    assert made == ("fit", "check")
+    known = {"mach": "of/mach"} if declared else {"alpha_rate": "of/a", "thrust": "of/t"}
+    assert asked["fly_about_all"] == (plant, about, 3, known)
+    assert asked["sample_all"] == (plant, about, 6000, 1, known, FRESH, moves)
+    if declared:
+        assert "signals_of_use" not in asked
+        assert data["signals"] == declared
+    else:
+        wanted = ["engines_n", *(["thrust"] if effectors else [])]
+        assert asked["engine_signals"] == ("first", "flown", aircraft)
+        assert asked["signals_of_use"] == ("first", aircraft, 6, wanted)
+        assert data["signals"] == {"thrust": {"property": "of/t"}, "alpha_rate": {"property": "of/a"}}
+    weight = "weight" if regions > 1 else None
+    assert asked.get("nearness") == (("first", 2, moves) if regions > 1 else None)
+    assert asked["_moments"] == ("first", data, Path("in"), weight)
+    assert asked["named_as"] == (aircraft, "moments")
+    assert data["moments"] == "named moments"
+    assert asked["_check"] == (data, plant, about, moves, Path("in"), known, ("first", "flown"))
+    measured = {} if thrust_term else {"thrust": {"lag_s": 0.4}}
+    assert data["engine"] == {"start": "off", **measured}
+    assert asked.get("thrust_of") == (None if thrust_term else (("plant of", Path("in")), "trim"))
+    assert told == ["sample", "fit", "check", *([] if thrust_term else ["engines"])]
+
+
+ENGINES = {
+    "engine_1": {"throttle": "left", "share": 0.4, "right_m": -1.7, "down_m": 0.3},
+    "engine_2": {"throttle": "right", "share": 0.6, "right_m": 0.1, "down_m": 0.2},
+}
+
+
+def with_engines(monkeypatch, thrust, effectors):
+    """(what is known of an aircraft with its engines as effectors, its data)."""
+    monkeypatch.setattr(derivation, "thrust_of", lambda plant, trim: thrust)
+    monkeypatch.setattr(derivation, "effectors_of", lambda plant, trim: effectors)
+    monkeypatch.setattr(outline, "plant_of", lambda data, folder: ("plant of", dict(data), folder))
+    data = {"engine": {"start": "steady"}}
+    return derivation._with_engines(
+        Source("mine", Path("mine.xml")), (data, "plant", "trim"), Path("in")
+    ), data
+
+
+def test_an_aircraft_with_its_engines_as_effectors_has_their_arms_their_thrust_and_their_failures(
+    monkeypatch,
+):
+    thrust = {"force_n": [[0.0, 0.0], [0.0, 3.0]], "lag_s": 0.7}
+    (of, plant, trim), data = with_engines(monkeypatch, thrust, ENGINES)
+    assert of is data
+    assert data == {
+        "engine": {"start": "steady", "thrust": thrust},
+        "effectors": ENGINES,
+        "damage": {
+            "engine_1-at-idle": {"property": "failures/engine-0-at-idle"},
+            "engine_2-at-idle": {"property": "failures/engine-1-at-idle"},
+        },
+    }
+    assert (plant, trim) == (("plant of", data, Path("in")), "trim")
+
+
+@pytest.mark.parametrize(
+    ("thrust", "right_m"),
+    [({"force_n": [[0.0, 3.0]]}, 0.2), ({"force_n": [[0.0, 0.0], [0.0, 0.0]]}, 1.7), (None, 1.7)],
+)
+def test_engines_less_than_0_2_m_beside_the_middle_or_without_thrust_are_no_effectors(
+    thrust, right_m, monkeypatch
+):
+    engines = {name: of | {"right_m": right_m} for name, of in ENGINES.items()}
+    with pytest.raises(BadInput, match=r"^mine: its engines do not yaw it, allowed: engines beside one anot"):
+        with_engines(monkeypatch, thrust, engines)
+
+
+@pytest.mark.parametrize(
+    ("altitude_m", "span_m", "ends"),
+    [(4000.0, 20.0, [2600.0, 5500.0]), (1500.0, 20.0, [200.0, 3000.0]), (1500.0, 80.0, [260.0, 3000.0]),
+     (120.0, 20.0, [200.0, 1620.0])],
+)  # fmt: skip
+def test_altitudes_are_1500_m_about_trim_above_the_ground(altitude_m, span_m, ends):
+    """What is sampled goes 100 m on, but not below 100 m, nor below two spans."""
+    trim = SimpleNamespace(altitude_m=altitude_m)
+    assert derivation._altitudes_about(trim, span_m) == ends
+
+
+def test_terms_of_several_regions_are_as_many_as_a_file_may_have_of_one_moment(monkeypatch):
+    asked = []
+
+    def fitted(samples, aircraft, most, weight):
+        asked.append((most, weight))
+        return "terms"
+
+    monkeypatch.setattr(derivation, "fitted", fitted)
+    monkeypatch.setattr(derivation, "design_record", lambda of: None)
+    monkeypatch.setattr(outline, "aircraft_of", lambda data, folder: None)
+    assert derivation._moments("samples", {"surfaces": {"aileron": {}}}, Path(), "weight") == "terms"
+    assert asked == [(derivation.MAX_TERMS_OF_ONE, "weight")]

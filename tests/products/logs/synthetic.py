@@ -149,16 +149,19 @@ def write_ardupilot(path, columns, name="RATE"):
     return path
 
 
+_DATAFLASH_TYPE = {"TimeUS": "Q", "I": "B", "C": "B", "Instance": "B", "Count": "i"}
+
+
 def write_dataflash(path, messages):
     """An ArduPilot dataflash log (binary form) of (kind, row) in order; a row's names are its fields. TimeUS,
-    I and C are whole numbers, the others floats of eight bytes."""
+    I, C, Instance and Count are whole numbers, the others floats of eight bytes."""
     data, kinds = b"", {}
 
     def message(number, body):
         return b"\xa3\x95" + bytes([number]) + body
 
     for kind, row in messages:
-        layout = "".join({"TimeUS": "Q", "I": "B", "C": "B"}.get(field, "d") for field in row)
+        layout = "".join(_DATAFLASH_TYPE.get(field, "d") for field in row)
         if kind not in kinds:
             kinds[kind] = 130 + len(kinds)
             size = 3 + struct.calcsize(f"<{layout}")

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
@@ -15,7 +16,7 @@ from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.units import nearest_unit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import limited, synthetic
-from products.logs.test_signals import T_S, turning
+from products.logs.test_signals import T_S, turning, yawed
 
 PHI, THETA, RATES = turning()
 KINEMATIC = {
@@ -107,6 +108,158 @@ def test_a_mis_scaled_column_is_refused_with_the_factor_that_fits(tmp_path, fact
         run("identify", path, "--vehicle", tmp_path / "v.yaml", "--out", tmp_path / "m.json")
     assert says in str(error.value)
     assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.fixture
+def whole_log(tmp_path):
+    """The flight with a gap of 3 s, angles in degrees, a gyro that reads 1.1 and two that read 0.8 times."""
+    (tmp_path / "k.yaml").write_text(
+        "name: k\nrates: {p: gx, q: gy, r: gz}\ncommands: [roll_cmd, pitch_cmd]\n"
+        "surfaces: {a: {roll_cmd: 1}, e: {pitch_cmd: 1}}\n"
+        "attitude: {roll: {column: phi, unit: deg}, pitch: {column: theta, unit: deg}, "
+        "yaw: {column: psi, unit: deg}}\nacceleration: az_m_s2\n"
+    )
+    columns = dict(KINEMATIC)
+    angles = dict(zip(("phi", "theta", "psi"), np.rad2deg([PHI, THETA, yawed()]), strict=True))
+    rates = dict(zip(("gx", "gy", "gz"), RATES * [[1.1], [0.8], [0.8]], strict=True))
+    for name in ("p_rad_s", "q_rad_s", "r_rad_s", "roll_rad", "pitch_rad"):
+        del columns[name]
+    kept = (T_S < 20.0) | (T_S >= 22.95)
+    return {name: values[kept] for name, values in (columns | angles | rates).items()}, tmp_path
+
+
+def of_level_nose(line, columns):
+    """The line that is to be found, where a log has no pitch angle: by sums over windows of a second."""
+    if line not in ("roll by p alone", "yaw of a level nose"):
+        return line
+    t_s, roll = columns["t_s"], np.deg2rad(columns["phi"])
+    of, by = ("phi", "gx") if line.startswith("roll") else ("psi", "gz")
+    rate = columns["gx"] if by == "gx" else columns["gy"] * np.sin(roll) + columns["gz"] * np.cos(roll)
+    changes, sums = [], []
+    for k in range(0, len(t_s) - 20, 20):
+        if t_s[k + 20] - t_s[k] < 2.0:
+            changes.append((columns[of][k + 20] - columns[of][k] + 180.0) % 360.0 - 180.0)
+            sums.append(np.trapezoid(rate[k : k + 21], t_s[k : k + 21]))
+    changes, sums = np.deg2rad(changes), np.array(sums)
+    slope = np.linalg.norm(changes) / np.linalg.norm(sums)
+    correlation = changes @ sums / np.linalg.norm(changes) / np.linalg.norm(sums)
+    how = f"{slope:.3f} times the integral of {by} (correlation {correlation:.2f}): they agree"
+    return f"the change of {of} is {how}"
+
+
+SIZE_TEXT = "1141 samples at 20 Hz over 59.95 s; gaps: 1, the longest of 3 s"
+
+
+@pytest.mark.parametrize(("change", "lines"), [
+    ({}, [
+        "the change of phi is 0.909 times the integral of gx (correlation 1.00): they agree",
+        "the change of theta is 1.250 times the integral of gy (correlation 1.00): they agree",
+        "the change of psi is 1.250 times the integral of gz (correlation 1.00): they agree",
+    ]),
+    ({"theta": None, "psi": None, "phi": None},
+     ["no roll angle is named: whether the rates are in rad/s is not checked"]),
+    ({"phi": 0.0, "theta": None, "psi": None}, ["too little moves to compare the rates with the roll angle"]),
+    ({"theta": None, "psi": None}, ["roll by p alone"]),
+    ({"theta": None}, ["roll by p alone", "yaw of a level nose"]),
+    ({"phi": None}, ["no roll angle is named: whether the rates are in rad/s is not checked"]),
+])  # fmt: skip
+def test_what_a_check_says_of_a_log_whole(whole_log, change, lines):
+    columns, folder = whole_log
+    for name, factor in change.items():
+        columns[name] = np.full(len(columns[name]), factor) if factor is not None else None
+    columns = {name: values for name, values in columns.items() if values is not None}
+    lines = [of_level_nose(line, columns) for line in lines]
+    path, vehicle = synthetic.write_csv(folder / "k.csv", columns), load_vehicle(folder / "k.yaml")
+    assert check.check_log(path, vehicle, None) == {
+        "log": str(path), "usable": True, "lines": [SIZE_TEXT, *lines], "vehicle": None,
+    }  # fmt: skip
+    head = f"{path}: can be used"
+    assert check.as_text(check.check_log(path, vehicle, None)).splitlines() == [
+        head, *(f"  {line}" for line in [SIZE_TEXT, *lines]),
+    ]  # fmt: skip
+
+
+def test_a_rate_without_some_numbers_that_does_not_move_is_told_after_the_other_remarks(whole_log):
+    columns, folder = whole_log
+    columns["gz"] = np.full(len(columns["gz"]), 0.25)
+    columns["gz"][[3, 9]] = np.nan
+    del columns["phi"]
+    path = synthetic.write_csv(folder / "k.csv", columns)
+    found = check.check_log(path, load_vehicle(folder / "k.yaml"), None)
+    assert (found["usable"], found["lines"]) == (False, [
+        SIZE_TEXT,
+        "gz: rows without a number: 2 of 1141",
+        "gz: frozen, the same to the last bit for 59.5 s",
+        "gz: clipped at 0.25 in 1129 rows",
+        "no roll angle is named: whether the rates are in rad/s is not checked",
+        "rate r does not move: nothing can be identified or diagnosed",
+    ])  # fmt: skip
+    assert check.as_text(found).startswith(f"{path}: cannot be used so\n  {SIZE_TEXT}\n")
+
+
+def test_of_several_logs_each_is_told_and_the_first_guess_is_proposed(tmp_path):
+    """Of one nothing is guessed, two are read by the reader that is asked for; one that cannot be used is
+    enough for a status of its own."""
+    none = synthetic.write_csv(
+        tmp_path / "none.xyz", {"t_s": T_S, "p": RATES[0], "q": RATES[1], "r": RATES[2]}
+    )
+    good = logged(tmp_path / "good.xyz")
+    other = logged(tmp_path / "other.xyz", names={"roll_cmd": "aileron_cmd"})
+    out = tmp_path / "below" / "proposed.yaml"
+    asked = ["identify", "--check", "--reader", "table"]
+    done = run(*asked, none, good, other, "--out", out)
+    assert done.exit_code == 2
+    says = (
+        f"{none}: no column looks like a command, allowed: a vehicle file that names it; the log has p, q, r"
+    )
+    lines = done.stdout.splitlines()
+    assert lines[:3] == [f"{none}: cannot be used so", f"  {says}", f"{good}: can be used"]
+    assert lines[-1] == f"vehicle file: {out}"
+    assert f"{other}: can be used" in lines
+    document = json.loads(run(*asked, none, good, other, "--format", "json").stdout)
+    assert [(one["log"], one["usable"]) for one in document["logs"]] == [
+        (str(none), False), (str(good), True), (str(other), True),
+    ]  # fmt: skip
+    assert document["vehicle"] == document["logs"][1]["vehicle"]
+    assert document["vehicle"]["name"] == "good"
+    assert document["logs"][2]["vehicle"]["surfaces"] == {
+        "aileron_cmd": {"aileron_cmd": 1.0}, "pitch_cmd": {"pitch_cmd": 1.0},
+    }  # fmt: skip
+    assert run(*asked, good, other, "--vehicle", out).exit_code == 2  # of one a command is missing
+    assert run(*asked, good).exit_code == 0
+    with pytest.raises(BadInput, match=r"^identify: --check --out: a vehicle file is given already$"):
+        run(*asked, good, "--vehicle", out, "--out", tmp_path / "new.yaml")
+
+
+def test_a_proposed_vehicle_file_says_what_was_found_and_which_keys_there_are_besides(tmp_path):
+    path = logged(tmp_path / "good.csv")
+    told = json.loads(run("identify", "--check", path, "--format", "json").stdout)["vehicle"]
+    assert told == {
+        "name": "good", "reader": "table", "rates": {axis: f"{axis}_rad_s" for axis in "pqr"},
+        "commands": ["roll_cmd", "pitch_cmd"],
+        "surfaces": {"roll_cmd": {"roll_cmd": 1.0}, "pitch_cmd": {"pitch_cmd": 1.0}},
+        "attitude": {"roll": "roll_rad", "pitch": "pitch_rad"}, "acceleration": "az_m_s2",
+    }  # fmt: skip
+    text = check.vehicle_file_text(told)
+    assert text in run("identify", "--check", path).stdout
+    assert yaml.safe_load(text) == told
+    keys = [line[2:].partition(":")[0] for line in text[text.index("# Further keys:") :].splitlines()[1:]]
+    assert keys == [
+        "time", "signals", "labels", "airspeed", "energy", "flow", "full_deflection_rad",
+        "reference_airspeed_mps", "airspeed_powers", "outputs", "false_alarms_per_hour", "faults",
+        "other_laws", "moving_air", "max_rate_hz",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("rates", [1.0, 180.0 / np.pi, 1000.0])
+@pytest.mark.parametrize("angles", [1.0, 180.0 / np.pi, 18000.0 / np.pi])
+def test_the_unit_of_rates_is_told_by_the_roll_angle_whatever_its_unit(rates, angles):
+    """Against the name of the first rate, which says another."""
+    columns = {name: Column(T_S, rates * one) for name, one in zip(("dps", "y", "z"), RATES, strict=True)}
+    unit = check._guess_rate_unit(
+        RecordedFlight("log", columns), list(columns), Column(T_S, angles * PHI), 1.0 / angles
+    )
+    assert unit == {1.0: "rad/s", 1000.0: "mrad/s"}.get(rates, "deg/s")
 
 
 def test_a_log_whose_gyro_is_dead_cannot_be_used(tmp_path):

@@ -137,6 +137,11 @@ def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
     still = {name: one for name, one in columns.items() if name.startswith("ground")}
     alfa._add_airspeed_from_wind(still)
     assert "airspeed_by_wind_m_s" not in still
+    for name in ("wind_north_m_s", "wind_east_m_s"):
+        calm = columns | {name: Column(np.empty(0), np.empty(0))}
+        del calm["airspeed_by_wind_m_s"]
+        alfa._add_airspeed_from_wind(calm)  # a topic of which no row is left
+        assert "airspeed_by_wind_m_s" not in calm
 
 
 def test_an_engine_is_no_surface_that_was_named():

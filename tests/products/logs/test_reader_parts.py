@@ -14,6 +14,7 @@ from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text
 from beaver_ftc_logs.recording import columns_and_time_origin
 from products.logs import synthetic
 
+GYRO_HEADER = "%time,field.angular_velocity.x"
 ORIGIN_NS = 1_538_768_543_780_097_959
 
 
@@ -61,11 +62,24 @@ def test_failures_of_alfa_in_their_order(folder):
     head = "%time,field.data"
     write(folder, "failure_status-aileron", (9.0, 2.0), (9.5, 2.0), (10.0, 1.0), (11.0, "nan"), header=head)
     write(folder, "failure_status-engines", (8.0, 1.0), header=head)
-    write(folder, "failure_status-rudder", (12.0, 1.0), (np.nan, 2.0), header=head)
+    write(folder, "failure_status-rudder", (7.0, 1.0), (np.nan, 2.0), header=head)
     write(folder, "failure_status-elevator", header=head)
     write(folder, "failure_status-aileron", (9.0, 2.0), (9.5, 2.0), (10.0, 1.0), header=head)
     events = [(round(event.t_s, 6), event.surface) for event in read_flight(folder).logged_failures]
-    assert events == [(8.0, "engine"), (9.0, "left_aileron"), (10.0, "right_aileron"), (12.0, "rudder")]
+    assert events == [(7.0, "rudder"), (8.0, "engine"), (9.0, "left_aileron"), (10.0, "right_aileron")]
+
+
+def test_time_of_alfa_counts_from_the_first_row_of_the_gyro_that_is_in_order(folder):
+    """Whose own first row has a stamp from far ahead; a failure counts from there too."""
+    write(folder, "mavros-imu-data_raw", (99.0, 1.0), (2.0, 2.0), (2.5, 3.0), header=GYRO_HEADER)
+    write(folder, "failure_status-rudder", (9.0, 1.0), header="%time,field.data")
+    recording = read_flight(folder)
+    gyro, roll = recording.columns["p_rad_s"], recording.columns["roll_rad"]
+    np.testing.assert_allclose(gyro.t_s, [0.0, 0.5], atol=1e-6)
+    assert gyro.values.tolist() == [2.0, 3.0]
+    assert gyro.note == "mavros-imu-data_raw: row 1: its stamp is out of order, the row is left out"
+    np.testing.assert_allclose(roll.t_s, [-1.999, -1.499], atol=1e-6)
+    assert [(round(event.t_s, 6), event.surface) for event in recording.logged_failures] == [(7.0, "rudder")]
 
 
 def test_what_is_no_flight_of_alfa(tmp_path):
@@ -131,6 +145,165 @@ def test_why_the_system_does_not_open_a_table_is_said_without_its_numbers(tmp_pa
         table.column_names(tmp_path / name)
     says = f"is no table that can be read ({says}), allowed: CSV or Parquet"
     assert str(caught.value) == f"{tmp_path / name}: {says}"
+
+
+NAN = np.nan
+TABLES = {
+    "numbers as they may be written": (
+        "t_s,p,q\n+0.5,.5,5.\n1,-1.5e3,+2E-2\n2, 7 ,inf\n3,nan,-8\n",
+        {"p": [0.5, -1500.0, 7.0, NAN], "q": [5.0, 0.02, NAN, -8.0]},
+        [0.5, 1.0, 2.0, 3.0], (), {},
+    ),
+    "a mark and a mark of bytes before the names": (
+        "\ufeff# t_s , p \n1,2\n2,3\n", {"p": [2.0, 3.0]}, [1.0, 2.0], (), {},
+    ),
+    "bars": (
+        "t_s|p, of roll|word\n1|2|a\n2|3|b\n", {"p, of roll": [2.0, 3.0], "word": [NAN, NAN]}, [1.0, 2.0],
+        ("cells are parted by bars",), {},
+    ),
+    "a decimal comma below other lines, with text and a short line": (
+        "a logger; of 3\n\nt_s;p;q\n1,5;oops, a word longer than thirty letters;3\n2,75;3,5;worse\n"
+        + "".join(f"{k};{k},25;{-k}\n" for k in range(3, 12))
+        + "12;4,5\n",
+        {"p": [NAN, 3.5, *(k + 0.25 for k in range(3, 12))], "q": [3.0, NAN, *range(-3, -12, -1)]},
+        [1.5, 2.75, *range(3, 12)],
+        (
+            "names are in line 3, what is above is left out",
+            "cells are parted by semicolons, with a decimal comma",
+            "lines with too few or too many cells, left out: 1",
+        ),
+        {
+            "p": "p: 1 cell holds no number, the first in row 1: 'oops. a word longer than thirt'",
+            "q": "q: 1 cell holds no number, the first in row 2: 'worse'",
+        },
+    ),
+    "two rows of units below the names, of a table with tabs": (
+        "t_s\tp\ns\trad/s\n-\t-\n1\t2\n2\t3\n3\t4\n4\t5\n", {"p": [2.0, 3.0, 4.0, 5.0]}, [1.0, 2.0, 3.0, 4.0],
+        ("cells are parted by tabs", "t_s: rows without a number, left out: 2 of 6"),
+        {"p": "p: 2 cells hold no number, the first in row 1: 'rad/s'"},
+    ),
+    "more commas in a line of text than names below it": (
+        "made by a, b, c, d\nt_s;p\n1;2\n2;3\n", {"p": [2.0, 3.0]}, [1.0, 2.0],
+        ("names are in line 2, what is above is left out", "cells are parted by semicolons"), {},
+    ),
+    "as many rows without a time as with one": (
+        "t_s,p\n,1\n1,2\n,3\n2,4\n", {"p": [2.0, 4.0]}, [1.0, 2.0],
+        ("t_s: rows without a number, left out: 2 of 4",), {},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_read_whole_as_it_is_written(tmp_path, name):
+    """Every column but the time, the stamps, and each remark on the whole and on a column."""
+    written, columns, t_s, notes, remarks = TABLES[name]
+    (tmp_path / "log.txt").write_text(written)
+    found = read_flight(tmp_path / "log.txt")
+    assert (found.name, found.notes, list(found.columns)) == ("log", notes, list(columns))
+    for column_name, column in found.columns.items():
+        np.testing.assert_array_equal(column.values, columns[column_name])
+        np.testing.assert_array_equal(column.t_s, t_s)
+        assert column.note == remarks.get(column_name, "")
+
+
+NO_TABLES = {
+    "UTF-16 of the other order": (
+        b"\xfe\xff" + "t_s,p\n1,2\n".encode("utf-16-be"), "is written in UTF-16, not in UTF-8",
+    ),
+    "nothing": (b"  \n\n", "it is empty"),
+    "numbers alone": (b"1;2;3\n2;3;4\n", "its first line holds numbers and no names: '1;2;3'"),
+    "more than a tenth broken": (
+        b"t_s,p\n" + b"".join(b"%d,1\n" % k for k in range(17)) + b"18\n19,a line of " + 60 * b"x" + b",3\n",
+        "2 of 19 lines have another number of cells than the header, 2: the first '18'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NO_TABLES)
+def test_what_is_no_table_is_told_by_what_it_is(tmp_path, name):
+    content, says = NO_TABLES[name]
+    path = tmp_path / "log.csv"
+    path.write_bytes(content)
+    with pytest.raises(BadInput) as refused:
+        read_flight(path)
+    assert str(refused.value) == f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet"
+
+
+def test_a_tenth_of_the_lines_may_be_broken(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t_s,p\n" + "".join(f"{k},1\n" for k in range(18)) + "18\n19,2,3\n")
+    assert read_flight(path).notes == ("lines with too few or too many cells, left out: 2",)
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "says"),
+    [
+        (
+            "ms,p\n1,2\n2,3\n2,4\n1,5\n", "ms",
+            "ms: row 3: time does not increase, allowed: increasing seconds",
+        ),
+        ("ms,p\n1,2\n", "ms", "has 1 rows, allowed: at least 2"),
+        ("ms,p\n,1\n,2\n3,4\n", "ms", "ms: 2 of 3 rows hold no number, allowed: increasing time"),
+        (
+            "time,p\n1,2\n2,3\n", "s",
+            "no column ms, allowed: a table with t_s in seconds, or its `time` in the vehicle file; it has "
+            "time, p",
+        ),
+    ],
+)  # fmt: skip
+def test_why_the_rows_of_a_table_cannot_be_used_is_said_whole(tmp_path, written, unit, says):
+    path = tmp_path / "log.csv"
+    path.write_text(written)
+    with pytest.raises(BadInput) as refused:
+        read_flight(path, None, ("ms", unit))
+    assert str(refused.value) == f"{path}: {says}"
+
+
+@pytest.mark.parametrize(("unit", "in_s"), [("s", 1.0), ("ms", 0.001), ("us", 0.000001), ("ns", 0.000000001)])
+def test_the_time_of_a_table_is_in_its_unit_and_no_column_of_its_own(tmp_path, unit, in_s):
+    (tmp_path / "log.tsv").write_text("clock\tp\n5\t2\n8\t3\n")
+    found = read_flight(tmp_path / "log.tsv", None, ("clock", unit)).columns
+    assert list(found) == ["p"]
+    np.testing.assert_allclose(found["p"].t_s, [5.0 * in_s, 8.0 * in_s], rtol=1e-14)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_of_more_rows_than_a_flight_has_is_refused_where_it_is_read_whole(
+    tmp_path, monkeypatch, suffix
+):
+    monkeypatch.setattr(table, "_MAX_ROWS", 6)
+    write = {"csv": synthetic.write_csv, "parquet": synthetic.write_parquet}[suffix]
+    for rows in (6, 7):
+        path = write(tmp_path / f"{rows}.{suffix}", {"t_s": np.arange(float(rows)), "p": np.ones(rows)})
+        if rows == 6:
+            assert len(read_flight(path).columns["p"].values) == 6
+        else:
+            with pytest.raises(BadInput, match=r"has (more than 6|7) rows, allowed: up to 6$"):
+                read_flight(path)
+
+
+def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_file(tmp_path, monkeypatch):
+    """In parts of 20 rows, read 7 at a time; 24 rows are one part, 25 are two."""
+    monkeypatch.setattr(table, "_BATCH_ROWS", 7)
+    for rows, begins in (
+        (24, [(0, 24)]),
+        (25, [(0, 20), (18, 25)]),
+        (61, [(0, 20), (18, 38), (36, 56), (54, 61)]),
+    ):
+        t_s = np.arange(float(rows))
+        path = synthetic.write_parquet(tmp_path / f"log{rows}.parquet", {"t_s": t_s, "p": 3.0 * t_s})
+        parts = [*table.read_parts(path, rows_per_part=20)]
+        names = (
+            [f"log{rows}-part-{k}" for k in range(1, len(begins) + 1)] if len(begins) > 1 else [f"log{rows}"]
+        )
+        assert [part.name for part in parts] == names
+        for part, (begin, end) in zip(parts, begins, strict=True):
+            assert part.columns["p"].values.tolist() == [3.0 * k for k in range(begin, end)]
+            assert part.columns["p"].t_s.tolist() == [float(k) for k in range(begin, end)]
+    t_s[40] = t_s[45] = 1.0
+    path = synthetic.write_parquet(tmp_path / "back.parquet", {"t_s": t_s, "p": t_s})
+    with pytest.raises(BadInput, match=r"back\.parquet: t_s: row 41: time does not increase"):
+        [*table.read_parts(path, rows_per_part=20)]
 
 
 def test_two_columns_of_a_name_are_refused(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
+from beaver_ftc_logs.recording import package_errors_as_bad_input
 from beaver_ftc_logs.samples import _latest_values_and_mean_age, load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
@@ -154,7 +155,7 @@ def test_a_log_in_another_format_gives_the_same_samples(tmp_path, wing):
     np.testing.assert_array_equal(one.rates, other.rates)
 
 
-@pytest.mark.parametrize("number", ["I", "C"])
+@pytest.mark.parametrize("number", ["I", "C", "Instance"])
 def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
     """Two gyros that log in turn, the second with its own bias, a tenth of a step later."""
     pytest.importorskip("pymavlink")
@@ -171,22 +172,156 @@ def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
         assert columns[name].note == ""
 
 
+def ulog_message(kind, body):
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+ULOG_HEAD = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "kept", "begins_s"),
+    [
+        (None, {"gyro.x", "gyro.n", "gyro_1.x", "gyro_1.n", "baro_2.x", "baro_2.n"}, 2.0),
+        (["gyro_1.x", "baro_2.n", "gyro.y"], {"gyro_1.x", "baro_2.n"}, 2.0),
+        (["baro_2.x"], {"baro_2.x"}, 2.02),
+    ],
+)
+def test_every_instance_of_a_topic_of_a_ulog_and_of_each_what_is_wanted(tmp_path, wanted, kept, begins_s):
+    """Two gyros and a topic whose own name ends in a number, interleaved; a whole number beside a float. Time
+    counts from the first message of the topics that are read."""
+    pytest.importorskip("pyulog")
+    layout = "uint64_t timestamp;double x;int32_t n;"
+    data = ULOG_HEAD + b"".join(ulog_message("F", f"{name}:{layout}".encode()) for name in ("gyro", "baro_2"))
+    topics = (("gyro", 0, "gyro"), ("gyro", 1, "gyro_1"), ("baro_2", 0, "baro_2"))
+    for number, (name, instance, _) in enumerate(topics):
+        data += ulog_message("A", struct.pack("<BH", instance, number) + name.encode())
+    for k in range(3):
+        for number in range(len(topics)):
+            stamp = 2_000_000 + 100_000 * k + 10_000 * number
+            data += ulog_message(
+                "D", struct.pack("<HQdi", number, stamp, 7.5 + k + 10 * number, 3 + k - 20 * number)
+            )
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(data)
+    recording = read_flight(path, columns=wanted)
+    assert (recording.name, set(recording.columns)) == ("flight", kept)
+    assert recording.notes == (f"time counts from {begins_s:.3f} s of the autopilot's clock",)
+    for number, (*_, name) in enumerate(topics):
+        for field, begins, step in (("x", 7.5, 10), ("n", 3, -20)):
+            if (column := recording.columns.get(f"{name}.{field}")) is not None:
+                assert column.values.tolist() == [begins + k + step * number for k in range(3)]
+                at_s = 2.0 - begins_s + 0.01 * number
+                np.testing.assert_allclose(column.t_s, [at_s, at_s + 0.1, at_s + 0.2], atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", ["bin", "BIN"])
+@pytest.mark.parametrize(
+    ("wanted", "kept"),
+    [
+        (None, {"IMU.GyrX", "IMU.Count", "IMU.I", "IMU1.GyrX", "IMU1.Count", "IMU1.I", "AHR.GyrX"}),
+        (["IMU1.Count", "AHR.GyrX", "PARM.Value"], {"IMU1.Count", "AHR.GyrX"}),
+    ],
+)
+def test_every_message_of_a_dataflash_log_that_is_of_the_flight(tmp_path, suffix, wanted, kept):
+    """With a stamp, whole numbers too; parameters and texts are none, wherever a stamp stands in them."""
+    pytest.importorskip("pymavlink")
+    rows = [("PARM", {"TimeUS": 1_000_000, "Value": 5.0}), ("MSG", {"TimeUS": 1_100_000, "Value": 6.0})]
+    for k in range(3):
+        for i in (0, 1):
+            stamp = 3_000_000 + 100_000 * k + 10_000 * i
+            rows.append(("IMU", {"TimeUS": stamp, "I": i, "GyrX": 0.5 * k + i, "Count": k - 7 * i}))
+        rows.append(("AHR", {"TimeUS": 3_050_000 + 100_000 * k, "GyrX": -2.0 * k}))
+        rows.append(("OLD", {"GyrX": 9.0}))
+    recording = read_flight(synthetic.write_dataflash(tmp_path / f"flight.{suffix}", rows), columns=wanted)
+    assert (recording.name, set(recording.columns), recording.notes) == ("flight", kept, ())
+    expected = {
+        "IMU.GyrX": [0.0, 0.5, 1.0], "IMU.Count": [0, 1, 2], "IMU.I": [0] * 3, "IMU1.GyrX": [1.0, 1.5, 2.0],
+        "IMU1.Count": [-7, -6, -5], "IMU1.I": [1] * 3, "AHR.GyrX": [0.0, -2.0, -4.0],
+    }  # fmt: skip
+    for name, column in recording.columns.items():
+        assert column.values.tolist() == expected[name]
+        late_s = {"IMU": 0.0, "IMU1": 0.01, "AHR": 0.05}[name.partition(".")[0]]
+        np.testing.assert_allclose(column.t_s, [late_s, late_s + 0.1, late_s + 0.2], atol=1e-9)
+
+
+def test_a_field_that_a_later_message_lacks_is_no_number_there(tmp_path):
+    """As in a log as text, whose writer says the format of a message again, with fewer fields."""
+    pytest.importorskip("pymavlink")
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        "FMT, 140, 19, RATE, Qff, TimeUS,P,Q",
+        "RATE, 1000000, 1.5, 2.5",
+        "FMT, 140, 15, RATE, Qf, TimeUS,Q",
+        "RATE, 1100000, 4.5",
+        "RATE, 1200000, 5.5",
+    ]
+    path = tmp_path / "flight.LOG"
+    path.write_text("\n".join(lines) + "\n")
+    columns = read_flight(path).columns
+    assert columns.keys() == {"RATE.P", "RATE.Q"}
+    np.testing.assert_array_equal(columns["RATE.P"].values, [1.5, np.nan, np.nan])
+    assert columns["RATE.Q"].values.tolist() == [2.5, 4.5, 5.5]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "own"), [("ulg", ("timestamp", "us")), ("log", ("TimeUS", "us")), ("alfa", ("%time", "ns"))]
+)
+def test_a_log_that_says_its_time_itself_may_be_told_that_time_and_no_other(tmp_path, suffix, own):
+    pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
+    columns = {name: values[:5] for name, values in synthetic.fly(2.0).items()}
+    path = tmp_path / f"flight.{suffix}"
+    if suffix == "alfa":
+        synthetic.write_alfa(path, duration_s=2.0)
+    else:
+        {"ulg": synthetic.write_ulog, "log": synthetic.write_ardupilot}[suffix](path, columns)
+    told, plain = read_flight(path, None, own), read_flight(path)
+    assert list(told.columns) == list(plain.columns)
+    assert plain.columns
+    for other in ((own[0], "ms"), ("t", own[1])):
+        with pytest.raises(BadInput) as refused:
+            read_flight(path, None, other)
+        says = f"{path}: time: {other[0]} in {other[1]} is not its time, allowed: {own[0]} in {own[1]}"
+        assert str(refused.value) == says
+
+
+def stumble(error):
+    print("what a package prints stays here")
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (ValueError("a header\n  of no\tsense"), "a header of no sense"),
+        (struct.error(""), "error"),
+        (KeyError(140), "140"),
+    ],
+)
+def test_what_a_package_stumbles_over_is_one_line(tmp_path, capsys, error, reason):
+    with (
+        pytest.raises(BadInput) as refused,
+        package_errors_as_bad_input(tmp_path, "logbook", "pylogbook", "a .book of a ship"),
+    ):
+        stumble(error)
+    says = f"{tmp_path}: is no logbook that can be read ({reason}), allowed: a .book of a ship"
+    assert str(refused.value) == says
+    assert capsys.readouterr().out == ""
+
+
 def test_a_ulogs_messages_without_a_stamp_are_left_out(tmp_path):
     """Of three one has no stamp, and one never came."""
     pytest.importorskip("pyulog")
 
-    def message(kind, body):
-        return struct.pack("<HB", len(body), ord(kind)) + body
-
-    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    data = ULOG_HEAD
     names = {"good": "uint64_t timestamp;", "timeless": "", "silent": "uint64_t timestamp;"}
     for name, stamp in names.items():
-        data += message("F", f"{name}:{stamp}double x;".encode())
+        data += ulog_message("F", f"{name}:{stamp}double x;".encode())
     for number, name in enumerate(names):
-        data += message("A", struct.pack("<BH", 0, number) + name.encode())
+        data += ulog_message("A", struct.pack("<BH", 0, number) + name.encode())
     for k in range(3):
-        data += message("D", struct.pack("<HQd", 0, 1_000_000 + 100_000 * k, 7.0 + k))
-    data += message("D", struct.pack("<Hd", 1, 9.0))
+        data += ulog_message("D", struct.pack("<HQd", 0, 1_000_000 + 100_000 * k, 7.0 + k))
+    data += ulog_message("D", struct.pack("<Hd", 1, 9.0))
     path = tmp_path / "flight.ulg"
     path.write_bytes(data)
     (column,) = read_flight(path).columns.values()

@@ -250,3 +250,145 @@ def test_a_spike_is_larger_than_forty_usual_steps():
         assert signals.find_spike_rows(values).tolist() == rows
     values[[100, 150, 200, 250]] = 50.0
     assert not len(signals.find_spike_rows(values))  # four of 300 rows are more than 1 %
+
+
+AGREES, ROUND, FAST = 0.9, 6.5, 12.5  # a correlation, an angle round and round, a rate of no vehicle
+FIT_OF = "the change of roll is {} times the integral of gx: "
+
+
+@pytest.mark.parametrize(("fit", "says"), [
+    ((2.0, 0.69, 30, ROUND, FAST), None),
+    ((1.49, AGREES, 20, 1.0, 1.0), None), ((0.67, AGREES, 20, 1.0, 1.0), None),
+    ((1.79, AGREES, 19, 1.0, 1.0), None), ((0.56, AGREES, 19, 1.0, 1.0), None),
+    ((-1.49, -0.71, 20, ROUND, FAST), "-1.49;one of them has the other sign, `scale: -1` fits"),
+    ((1.51, AGREES, 20, 1.0, 1.0), "1.51;a factor of 1.51 on gx fits, or of 0.6623 on roll"),
+    ((-0.25, -AGREES, 19, 6.4, 12.0), "-0.25;a factor of 0.25 on gx fits, or of 4 on roll"),
+    ((60.0, AGREES, 20, ROUND, FAST), "60;roll is in deg, a factor of 0.01745 fits"),
+    ((-5000.0, -AGREES, 20, ROUND, 1.0), "-5000;roll is in cdeg, a factor of 0.0001745 fits"),
+    ((0.02, AGREES, 20, 6.4, FAST), "0.02;gx is in deg/s, a factor of 0.01745 fits"),
+    ((0.0008, AGREES, 20, ROUND, FAST), "0.0008;gx is in mrad/s, a factor of 0.001 fits"),
+    ((0.02, AGREES, 20, 6.4, 12.0), "0.02;a factor of 0.02 on gx fits, or of 50 on roll"),
+    ((0.0131, AGREES, 20, 1.0, FAST), "0.0131;a factor of 0.0131 on gx fits, or of 76.34 on roll"),
+    ((4.0, AGREES, 20, ROUND, FAST), "4;a factor of 4 on gx fits, or of 0.25 on roll"),
+])  # fmt: skip
+def test_what_is_said_of_an_angle_and_its_rate(fit, says):
+    """By slope, correlation, windows, largest angle and largest rate; on either side of each bound."""
+    said = physics.angle_rate_factor_remark(physics.AngleRateFit(*fit), "gx", "roll")
+    slope, _, rest = (says or "").partition(";")
+    assert said == (None if says is None else FIT_OF.format(slope) + rest)
+
+
+@pytest.mark.parametrize(("correlation", "windows", "is_rate", "least"), [
+    (0.39, 20, True, 0.7), (-0.39, 20, True, 0.7), (0.41, 20, True, 0.95), (0.39, 20, False, 0.95),
+    (0.19, 19, True, 0.7), (0.21, 19, True, 0.95), (0.69, 19, False, 0.95), (0.71, 20, True, 0.99),
+    (-0.94, 20, False, 0.99), (0.96, 20, True, np.inf), (-0.96, 19, False, np.inf),
+])  # fmt: skip
+def test_how_well_another_column_must_agree_with_an_angle(correlation, windows, is_rate, least):
+    fit = physics.AngleRateFit(1.0, correlation, windows, 1.0, 1.0)
+    assert physics._min_correlation_to_replace_rate(fit, is_rate) == least
+
+
+@pytest.mark.parametrize(("largest", "circle"), [
+    (6.40, 2.0 * np.pi), (6.42, 360.0), (367.1, 360.0), (367.3, 36000.0), (None, 2.0 * np.pi),
+])  # fmt: skip
+def test_the_circle_of_angles_is_the_least_that_holds_them(largest, circle):
+    """A fiftieth more than a circle may be logged; of no number nothing is known."""
+    angles = np.array([np.nan, 1.0, np.nan if largest is None else -largest])
+    assert physics._full_circle(angles if largest else angles[:1]) == circle
+
+
+def test_the_unit_of_a_pitch_angle_is_that_of_roll_or_what_a_right_angle_allows():
+    """4 and 5 may be radians of a roll angle, but never of a pitch angle; in cdeg roll says so."""
+    for roll, pitch, to_rad in ((5.0, 4.0, np.pi / 180), (2.0, 1.6, 1.0), (400.0, 1.6, np.pi / 18000)):
+        found = physics._interpolated_pitch_rad(
+            Column(np.arange(2.0), np.array([0.1, -roll])), Column(np.arange(2.0), np.array([-pitch, 0.4])),
+            np.array([0.0, 0.5]),
+        )  # fmt: skip
+        np.testing.assert_allclose(found, [-pitch * to_rad, (0.2 - 0.5 * pitch) * to_rad])
+
+
+@pytest.mark.parametrize(("largest", "says"), [
+    (1.601, None), (1.603, "it is in deg, a factor of 0.01745 fits"),
+    (91.7, "it is in deg, a factor of 0.01745 fits"), (91.9, "it is in cdeg, a factor of 0.0001745 fits"),
+    (9179.0, "it is in cdeg, a factor of 0.0001745 fits"), (9181.0, "no unit fits"),
+])  # fmt: skip
+def test_no_pitch_angle_is_more_than_a_right_angle(largest, says):
+    pitch = Column(np.arange(4.0), np.array([0.3, np.nan, -largest, 1.0]))
+    told = f"theta reaches {largest:.4g} rad, a pitch angle at most 1.571: {says}; look at the rates' too"
+    assert physics.pitch_angle_unit_remark(pitch, "theta") == (None if says is None else told)
+
+
+@pytest.mark.parametrize(("down", "says"), [
+    ([-4.91, 19.6, 4.91, np.nan], None), ([19.60, -19.60, 1.0], None),
+    ([-4.89, 4.89, 30.0], "4.89;no unit fits: is 1 g in it?"),
+    ([0.7, -0.7, 0.7], "0.7;it is in g, a factor of 9.807 fits"),
+    ([np.nan, np.nan], "0;no unit fits: is 1 g in it?"),
+])  # fmt: skip
+def test_what_is_said_of_an_acceleration_by_the_middle_of_its_sizes(down, says):
+    said = physics.gravity_remark(Column(np.arange(float(len(down))), np.array(down)), "acc")
+    size, _, rest = (says or "").partition(";")
+    told = f"acc: is {size} m/s2 on the middle of the flight, 1 g is 9.807: {rest}"
+    assert said == (None if says is None else told)
+
+
+def test_angles_with_stamps_of_their_own_are_taken_between_their_rows():
+    """Later and rarer than the rates', in degrees, with a row that is no number; what is before says nothing.
+
+    The rates are of one unit and the angles of another, so that each slope is 180 / pi times the factor.
+    """
+    phi, theta, rates = turning()
+    columns = [Column(T_S, factor * one) for factor, one in zip((0.5, 0.25, 0.25), rates, strict=True)]
+    rows = np.arange(100, 1200, 2)
+    spoilt = np.where(rows == 500, np.nan, 1.0)
+    roll, pitch, yaw = (
+        Column(T_S[rows], np.rad2deg(angle[rows]) * spoilt)
+        for angle in (phi, theta, np.unwrap(yawed()) % 6.283185307)
+    )
+    deg = 180.0 / np.pi
+    for found, slope, largest in (
+        (physics.fit_roll_angle_to_rates(columns, roll, pitch), 2.0, phi),
+        (physics.fit_pitch_angle_to_rates(columns, roll, pitch), 4.0, theta),
+        (physics.fit_yaw_angle_to_rates(columns, roll, pitch, yaw), 4.0, None),
+    ):
+        assert found.slope == pytest.approx(slope * deg, rel=5e-3)
+        assert found.correlation == pytest.approx(1.0, abs=2e-3)
+        assert 50 <= found.n_windows <= 54
+        if largest is not None:
+            assert found.max_angle_magnitude == pytest.approx(deg * np.abs(largest[rows]).max(), rel=1e-3)
+    found = physics.fit_roll_angle_to_rates(columns, roll, pitch)
+    assert found.max_rate_magnitude == pytest.approx(0.5 * np.abs(rates[0]).max())
+
+
+def test_without_a_pitch_angle_the_nose_is_taken_to_be_level():
+    """Of a body that is level the yaw rate follows from roll alone: psi' = q sin(phi) + r cos(phi)."""
+    phi, psi_dot = 0.9 * np.sin(0.8 * T_S), 0.4 + 0.3 * np.sin(0.3 * T_S)
+    psi = 0.4 * T_S - np.cos(0.3 * T_S)
+    rates = [0.72 * np.cos(0.8 * T_S), psi_dot * np.sin(phi), psi_dot * np.cos(phi)]
+    columns, roll = [Column(T_S, one) for one in rates], Column(T_S, phi)
+    for found in (
+        physics.fit_yaw_angle_to_rates(columns, roll, None, Column(T_S, psi % 6.283185307)),
+        physics.fit_roll_angle_to_rates(columns, roll, None),
+    ):
+        assert found.slope == pytest.approx(1.0, rel=2e-3)
+        assert found.correlation > 0.999
+
+
+def test_an_exchange_is_told_whole_with_how_well_each_agrees():
+    phi, theta, (p, q, r) = turning()
+    angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), ("yaw", Column(T_S, yawed()))]
+    other = Column(T_S, np.sin(2.1 * T_S))
+    columns = {name: Column(T_S, one) for name, one in (("gx", p), ("gy", q), ("gz", r))}
+    for axis, (of, title, angle) in enumerate(
+        (("gx", "roll rate", "roll"), ("gy", "pitch rate", "pitch"), ("gz", "yaw rate", "yaw"))
+    ):
+        rates = {name: other if name == of else one for name, one in columns.items()}
+        said = physics.find_attitude_mistake(rates, angles, {"spare": columns[of]})
+        fit = physics._fit_angle_of_axis(list(rates.values()), angles, axis)
+        assert said == (
+            f"{angle} does not follow {of} (correlation {fit.correlation:.2f}) but spare (1.00): "
+            f"spare is the {title}"
+        )
+        assert abs(fit.correlation) < 0.7
+        without_it = [None if k == axis else one for k, one in enumerate(angles)]
+        if axis:
+            assert physics.find_attitude_mistake(columns, without_it, {"spare": other}) is None

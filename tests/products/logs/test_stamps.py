@@ -188,6 +188,7 @@ def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
         ([1, 2, 3, 4], [0, 1, 2, 3], ""),
         ([1, 2, 2, 3], [0, 1, 3], ""),  # a stamp twice: the first, and no word
         ([1, 2, 9e9, 3, 4], [0, 1, 3, 4], "x: row 3: its stamp is out of order, the row is left out"),
+        ([7, 1, 2, 7], [1, 2, 3], "x: row 1: its stamp is out of order, the row is left out"),
         ([1, 2, 3, 2.5, 4], [0, 1, 2, 4], "x: row 4: its stamp is out of order, the row is left out"),
         ([1, 2, np.nan, 3], [0, 1, 3], "x: row 3: its stamp is out of order, the row is left out"),
         (

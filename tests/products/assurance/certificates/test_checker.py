@@ -1,0 +1,760 @@
+"""The checker by itself, on a log made by hand: what it computes by plain sums over rows, and each of its
+conditions by a statement that breaks this one alone."""
+
+import copy
+from hashlib import sha256
+from math import erfc, exp, pi, radians, sqrt
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from beaver_ftc_assurance.certificates import check_certificate as checker
+from beaver_ftc_assurance.certificates.check_certificate import Declared, Frames, Refused
+from telling import apart, numbers
+
+ROWS, DT, EARTH = 13, 0.02, 0.3
+DECLARED_BY_LETTER = {
+    "c": [0.21, 0.23, 0.29], "b": [0.43, 0.47, 0.53], "g": [1.1, 1.3, 1.7], "o": [0.03, 0.05, 0.07],
+    "B": [0.01, 0.02, 0.04], "m": [0.11, 0.13, 0.17],
+}  # fmt: skip
+DOCUMENT = {
+    "omega_E": EARTH,
+    "declared": {name: dict(zip("pqr", of, strict=True)) for name, of in DECLARED_BY_LETTER.items()},
+}
+LOW, HIGH = -0.6, 0.35  # of theta
+TRAVEL = -0.4, 0.5
+ALARM = 4
+
+
+def made_log(healthy=(1, 2)):
+    """All of a flap, in no two rows alike; in the rows `healthy` the rates follow the design model."""
+    x, model = 0.3 * numbers(ROWS, 3, seed=1), numbers(ROWS, 3, seed=2)
+    for k in healthy:
+        x[k] = x[k - 1] + DT * model[k]
+    by_axis = {
+        "{}_measured_rad_s": x, "{}_design_rad_s2": model, "{}_eta_bar_rad_s2": 4 + abs(numbers(ROWS, 3)),
+    } | {
+        f"{name}_{{}}_{of}": abs(values) if "spread" in of else values
+        for seed, name in ((10, "fie_flap"), (20, "fie_flap_position"))
+        for of, values in (("offset_rad_s2", numbers(ROWS, 3, seed=seed)),
+                           ("slope", numbers(ROWS, 3, seed=seed + 1)),
+                           ("spread_rad_s2", 0.1 * numbers(ROWS, 3, seed=seed + 2)))
+    }  # fmt: skip
+    log = {name.format(axis): of[:, i] for name, of in by_axis.items() for i, axis in enumerate("pqr")}
+    ends = {"fie_flap_theta": (LOW, HIGH), "flap_travel": TRAVEL}
+    for name, (low, high) in ends.items():
+        unit = "_rad" if name == "flap_travel" else ""
+        log |= {f"{name}_low{unit}": np.full(ROWS, low), f"{name}_high{unit}": np.full(ROWS, high)}
+    flags = {"detected": ALARM, "fie_flap_excluded": 9, "flap_stuck_excluded": 12}
+    log |= {name: (np.arange(ROWS) >= k).astype(float) for name, k in flags.items()}
+    return log | {"t_s": DT * np.arange(ROWS)}
+
+
+SCENARIO: dict[str, Any] = {
+    "fdi": {"fault_profile": "abrupt", "thresholds": "adaptive", "slowest_oscillation_rad_s": 25.0,
+            "statistical": {"false_alarms_per_h": 0.1}},
+    "actuators": {"flap": {"rate_limit_deg_s": 80.0}},
+}  # fmt: skip
+
+
+def declared(instants=1, **changes):
+    given = {"dt": DT, "instants": instants, "gyro_errors": {}, "constant_bounds": {}, "inertia_shares": {},
+             "start_row": 0, "scenario": SCENARIO}  # fmt: skip
+    return Declared(**(given | changes))
+
+
+def frames_of(log, instants=1, block=None, **changes):
+    return Frames(DOCUMENT, log, declared(instants, **changes), block)
+
+
+class Row:
+    """What a row of the log says, axis by axis, by scalars (docs/explanation/detection.md)."""
+
+    def __init__(self, log, instants=1):
+        self.log, self.instants = log, instants
+
+    def of(self, name, k, i):
+        return self.log[name.format("pqr"[i])][k]
+
+    def rate(self, k, i):
+        x, o, m = abs(self.of("{}_measured_rad_s", k, i)), *(DECLARED_BY_LETTER[name][i] for name in "om")
+        return x + (o + m * x) / (1 - m)
+
+    def noise(self, k, i):
+        o, B, m = (DECLARED_BY_LETTER[name][i] for name in "oBm")
+        return o - B + m * self.rate(k, i)
+
+    def stated(self, k, i):
+        """As the frame began: by the rates of the row before."""
+        c, b, g = (DECLARED_BY_LETTER[name][i] for name in "cbg")
+        one, other = (self.rate(k - 1, j) for j in range(3) if j != i)
+        earth = EARTH * ((1 + g) * sum(self.rate(k - 1, j) for j in range(3)) + g * EARTH)
+        return (c * one * other + b + earth + 1e-11) / self.instants
+
+
+@pytest.mark.parametrize("instants", [1, 3])
+@pytest.mark.parametrize("block", [None, (3, 2, 11), (1, 4, 12)])
+def test_a_frame_is_a_row_or_a_block_of_rows(instants, block):
+    """Of a block all is a mean, but rates and errors of gyros, which are those of its last row."""
+    log = made_log(healthy=(1, 2, 6))
+    log["q_eta_bar_rad_s2"][10] = 0.1  # less than the declared bounds explain: such a frame shows nothing
+    of, found = Row(log, instants), frames_of(log, instants, block)
+    length, begin, end = block or (1, 0, ROWS)
+    count, dt = (end - begin) // length, DT * length
+    assert (found.dt, found.late_frames) == (pytest.approx(dt), int(instants * length > 1))
+    shows = np.zeros(count, bool)
+    for n in range(count):
+        rows = range(begin + n * length, begin + (n + 1) * length)
+        assert found.row_of(n) == rows[-1]
+        beyond, explained = False, True
+        for i in range(3):
+            rate, noise = of.of("{}_measured_rad_s", rows[-1], i), of.noise(rows[-1], i)
+            model, eta = (np.mean([of.of(name, k, i) for k in rows])
+                          for name in ("{}_design_rad_s2", "{}_eta_bar_rad_s2"))  # fmt: skip
+            assert found.rates_rad_s[n, i] == rate
+            assert found.gyro_change_rad_s[n, i] == pytest.approx(noise)
+            assert [found.model_rad_s2[n, i], found.eta_bar_rad_s2[n, i]] == pytest.approx([model, eta])
+            stated = np.mean([of.stated(k, i) for k in rows]) if rows[0] else np.nan
+            assert found.stated_bound_rad_s2[n, i] == pytest.approx(stated, nan_ok=True)
+            if n == 0:
+                assert np.isnan(found.innovation_rad_s2[0, i])
+                explained = False
+                continue
+            nu = (rate - of.of("{}_measured_rad_s", rows[0] - 1, i)) / dt - model
+            most = eta + (noise + of.noise(rows[0] - 1, i)) / dt
+            assert found.innovation_rad_s2[n, i] == pytest.approx(nu)
+            assert found.innovation_bound_rad_s2[n, i] == pytest.approx(most)
+            beyond, explained = beyond or abs(nu) > most, explained and bool(stated <= eta)
+        shows[n] = beyond and explained
+    beside = [*shows[1:], False], [False, *shows[:-1]]
+    expected = shows & beside[0] & beside[1] if instants * length > 1 else shows
+    assert found.is_unexplained.tolist() == expected.tolist()
+    if length == 1:
+        assert 0 < expected.sum() < count - 1
+
+
+@pytest.mark.parametrize("block", [(0, 2, 11), (3, -1, 11), (3, 2, 10), (3, 11, 11), (3, 2, 14)])
+def test_blocks_are_whole_and_within_the_log(block):
+    with pytest.raises(Refused, match="the block has other rows"):
+        frames_of(made_log(), block=block)
+
+
+D = [0.7, -0.2, 0.5]
+
+
+def made_term(log, instants=1, d=D, block=None, **fields):
+    """A term with all that the log has of its frames; fields: among them first and frame."""
+    seen, rows = frames_of(log, instants, block), slice(fields["first"], fields["frame"] + 1)
+    logged = {"x": seen.rates_rad_s, "F": seen.model_rad_s2, "eta_bar": seen.eta_bar_rad_s2}
+    logged["rest"] = seen.eta_bar_rad_s2 - seen.stated_bound_rad_s2
+    return {"weight": 1.0, "d": d, **{name: of[rows].tolist() for name, of in logged.items()}, **fields}
+
+
+def filtered(decay, inputs):
+    """A filter's state after these inputs, rad/s."""
+    state = 0.0
+    for value in inputs:
+        state = decay * state + DT * value
+    return state
+
+
+@pytest.mark.parametrize("theta", ["any", "constant", "of health"])
+@pytest.mark.parametrize("pole", [None, 0.5, 20.0])
+def test_a_sum_over_filters_is_held_against_the_worst_of_all_errors_and_the_fault(theta, pole):
+    """From frame 4, at which it is zero, to 9: errors of the model in each frame, of gyros at both of its
+    ends, the largest effect of the fault in the frames written, and before them what is stated."""
+    log, what = made_log(), None if theta == "of health" else "flap"
+    of, decay = Row(log), exp(-pole * DT) if pole else 0.0
+    frames, size = range(5, 10) if pole else range(9, 10), np.abs(D)
+    written = range(7, 10) if pole else frames
+    past = {"pole_per_s": pole, "since": frames[0] - 1} if pole else {}
+    past |= {"fault": 0.9} if pole and what else {}
+    term = made_term(log, first=written[0], frame=9, **past)
+    other = made_term(log, weight=0.3, d=[0.0, -1.0, 0.0], first=8, frame=8)
+    said = {"what": what, "theta": "any" if what is None else theta, "frame": 9, "terms": [term, other]}
+    value, limit = checker.sides_of_terms(said, frames_of(log), declared())
+
+    def along(name, k, d):
+        return sum(d[i] * of.of(name, k, i) for i in range(3))
+
+    expected, most, slope = 0.0, 0.0, 0.0
+    for weight, d, its, shown, a in (
+        (1.0, np.array(D), frames, written, decay),
+        (0.3, np.array([0.0, -1.0, 0.0]), range(8, 9), range(8, 9), 0.0),
+    ):
+        size = np.abs(d)
+        nu = [
+            (along("{}_measured_rad_s", k, d) - along("{}_measured_rad_s", k - 1, d)) / DT
+            - along("{}_design_rad_s2", k, d)
+            for k in its
+        ]
+        expected += weight * filtered(a, nu)
+        worst = filtered(a, [along("{}_eta_bar_rad_s2", k, size) for k in its])
+        for j in range(its[0] - 1, its[-1] + 1):
+            driven = filtered(a, [((k == j) - (k - 1 == j)) / DT for k in its])
+            worst += abs(driven) * sum(size[i] * of.noise(j, i) for i in range(3))
+        if what:
+            h, Z = (
+                [along(f"fie_flap_{{}}_{name}", k, d) for k in shown] for name in ("offset_rad_s2", "slope")
+            )
+            r = [along("fie_flap_{}_spread_rad_s2", k, size) for k in shown]
+            if theta == "any":
+                h = [max(0.0, one + LOW * by, one + HIGH * by) for one, by in zip(h, Z, strict=True)]
+            else:
+                slope += weight * filtered(a, Z)
+            worst += filtered(a, np.add(h, r)) + a ** len(shown) * (0.9 if a else 0.0)
+        most += weight * worst
+    most += max(LOW * slope, HIGH * slope)
+    assert (value, limit) == (pytest.approx(expected), pytest.approx(most))
+
+
+def of_terms(log, changes=None, instants=1, block=None, **given):
+    """A statement of one frame, 9, unless it says otherwise; of the fault's past no more than it can be."""
+    span = {"first": 9, "frame": 9} | {name: given.pop(name) for name in (
+        "first", "frame", "since", "pole_per_s", "fault", "h", "d") if name in given}  # fmt: skip
+    term = made_term(log, instants, block=block, **span)
+    said = {"what": "flap", "theta": "any", "frame": 9, "terms": [term | (changes or {})], **given}
+    return said | ({"block": list(block)} if block else {})
+
+
+PAST = {"pole_per_s": 5.0, "since": 6, "first": 9, "fault": 50.0}
+SUMS: dict[str, tuple[dict[str, Any], str]] = {  # a statement; why it is refused, "" if it is right
+    "right": ({}, ""),
+    "with a past": (PAST, ""),
+    "ends": ({"least": LOW, "most": HIGH}, ""),
+    "another end": ({"least": LOW - 0.1}, "least is not the end of theta's range in the log"),
+    "another most": ({"most": HIGH + 0.1}, "most is not the end of theta's range in the log"),
+    "a course": ({"what": "flap bias"}, "a sum of frames says nothing of this type"),
+    "one number": ({"theta": "constant"}, ""),
+    "one number, from the alarm on": (
+        {"theta": "constant", "pole_per_s": 5.0, "since": ALARM, "first": 5, "fault": 0.0}, "",
+    ),
+    "one number, before the alarm": (
+        {"theta": "constant", "pole_per_s": 5.0, "since": ALARM - 1, "first": 4},
+        "a frame before the alarm may be healthy",
+    ),
+    "one number of health": (
+        {"what": None, "theta": "constant"}, "the scenario does not declare a constant parameter",
+    ),
+    "one number where it shows": ({"what": "flap stuck", "theta": "constant while it shows"}, ""),
+    "one number of no type": (
+        {"theta": "constant while it shows"}, "only a fault type is at fault where health fails",
+    ),
+    "one number that varies": (
+        {"what": "flap loss_of_effectiveness that varies", "theta": "constant while it shows"},
+        "theta of this type is not one number",
+    ),
+    "where health explains": (
+        {"what": "flap stuck", "theta": "constant while it shows", "first": 2, "frame": 2},
+        "health explains a frame",
+    ),
+    "any where health explains": ({"what": "flap stuck", "first": 2, "frame": 2}, ""),
+    "a frame after the event": ({"frame": 10, "first": 10}, "a frame after the event cannot have caused it"),
+    "the last frame of the log": ({"said": {"frame": 12}, "frame": 12, "first": 12}, ""),
+    "since the first frame written": ({**PAST, "since": 9}, "the frames of a term are not in order"),
+    "without a pole": ({"first": 8}, "the frames of a term are not in order"),
+    "a fault of health": ({"what": None, "h": [0.0]}, "an alarm has no effect of a fault"),
+    "another rate": ({"changes": {"x": [[0.1, 0.2, 0.3]]}}, "x is not that of the log"),
+    "a rest below zero": ({"changes": {"rest": [[-1.0, 0.0, 0.0]]}}, "rest: a part of a bound is below zero"),
+    "another rest": ({"changes": {"rest": [[0.1, 0.2, 0.3]]}}, "the declared bounds are not the log's"),
+    "another h": ({"h": [7.0]}, "h is not that of the log"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SUMS)
+def test_a_sum_is_refused_in_words_where_one_thing_is_wrong(name):
+    given, says = copy.deepcopy(SUMS[name])
+    more, log = given.pop("said", {}), made_log()
+    said = of_terms(log, **given) | more
+    refused_with(says, lambda: checker.sides_of_terms(said, frames_of(log), declared()))
+
+
+def refused_with(says, call):
+    """Refused with these words at the beginning; accepted if there are none."""
+    if not says:
+        call()
+        return
+    with pytest.raises(Refused) as refused:
+        call()
+    assert str(refused.value).startswith(says)
+
+
+@pytest.mark.parametrize(("profile", "thresholds", "allowed"), [
+    ("abrupt", "adaptive", True), ("incipient", "published", True), ("incipient", "adaptive", False),
+])  # fmt: skip
+def test_one_constant_parameter_is_what_a_profile_or_published_thresholds_declare(
+    profile, thresholds, allowed
+):
+    log = made_log()
+    fdi = SCENARIO["fdi"] | {"fault_profile": profile, "thresholds": thresholds}
+    says = "" if allowed else "the scenario does not declare a constant parameter"
+    its = declared(scenario=SCENARIO | {"fdi": fdi})
+    refused_with(says, lambda: checker.sides_of_terms(of_terms(log, theta="constant"), frames_of(log), its))
+
+
+@pytest.mark.parametrize(("what", "theta", "says"), [
+    (None, "any", "an alarm is raised by frames, not by blocks"),
+    ("flap", "constant", "a frame before the alarm may be healthy"), ("flap stuck", "any", ""),
+])  # fmt: skip
+def test_blocks_say_nothing_of_an_alarm_nor_of_a_constant(what, theta, says):
+    log = made_log()
+    said = of_terms(log, what=what, theta=theta, first=2, frame=2, block=(3, 2, 11)) | {"frame": 10}
+    frames = frames_of(log, block=(3, 2, 11))
+    refused_with(says, lambda: checker.sides_of_terms(said, frames, declared()))
+    early = said | {"frame": 9}  # the block ends with row 10
+    if not says:
+        refused_with("a frame after the event", lambda: checker.sides_of_terms(early, frames, declared()))
+
+
+def test_no_filter_is_older_than_the_diagnosis_that_runs_it():
+    """Restarted with row 6; by blocks nothing is filtered longer than a block."""
+    log = made_log()
+    for since, says in ((6, ""), (5, "the frames of a term are not in order")):
+        said = of_terms(log, **PAST | {"since": since})
+        refused_with(says, lambda said=said: checker.sides_of_terms(
+            said, frames_of(log), declared(start_row=6)))  # fmt: skip
+
+
+def test_where_the_log_does_not_say_what_a_fault_does_nothing_is_proved():
+    for name in ("slope", "offset_rad_s2", "spread_rad_s2"):
+        gap = made_log()
+        gap[f"fie_flap_q_{name}"][8] = np.nan
+        said = of_terms(gap, **PAST | {"first": 8})
+        with pytest.raises(Refused, match="the log has no effect of this fault in these rows"):
+            checker.sides_of_terms(said, frames_of(gap), declared())
+    for what, column in (
+        ("flap", "fie_flap_theta_low"),
+        ("flap", "fie_flap_p_slope"),
+        ("flap stuck", "flap_travel_low_rad"),
+        ("flap stuck", "fie_flap_position_p_slope"),
+    ):
+        less = {name: of for name, of in made_log().items() if name != column}
+        with pytest.raises(Refused, match=f"the log has no columns of {what}: it was not written with this"):
+            checker.effect_of_fault(what, frames_of(less))
+    with pytest.raises(Refused, match="neither this checker nor the log says what creep is"):
+        checker.effect_of_fault("flap creep", frames_of(made_log()))
+
+
+@pytest.mark.parametrize("travel", [(-0.4, 0.5), (0.1, 0.5), (-0.5, -0.2)])
+def test_what_a_fault_does_is_the_logs_effect_of_a_position_or_of_its_own(travel):
+    """-G u and G of the position of the flap: of p - u, p what the type says."""
+    log = made_log() | {"flap_travel_low_rad": np.full(ROWS, travel[0])}
+    log |= {"flap_travel_high_rad": np.full(ROWS, travel[1])}
+    own, at = ({name: np.column_stack([log[f"{of}_{axis}_{name}"] for axis in "pqr"])
+                for name in ("offset_rad_s2", "slope", "spread_rad_s2")}
+               for of in ("fie_flap", "fie_flap_position"))  # fmt: skip
+    gone, G, none = at["offset_rad_s2"], at["slope"], np.zeros((ROWS, 3))
+    rest = min(max(0.0, travel[0]), travel[1])
+    for what, offset, slope, low, high, is_constant in (
+        ("flap", own["offset_rad_s2"], own["slope"], LOW, HIGH, False),
+        ("flap stuck", gone, G, *travel, True), ("flap float", gone + rest * G, none, 0.0, 0.0, True),
+        ("flap loss_of_effectiveness", none, -gone, -1.0, 0.0, True),
+        ("flap loss_of_effectiveness that varies", none, -gone, -1.0, 0.0, False),
+        ("flap bias", gone, G, *travel, False), ("flap oscillatory", none, G, *travel, False),
+    ):  # fmt: skip
+        found = checker.effect_of_fault(what, frames_of(log))
+        spread = (at if " " in what else own)["spread_rad_s2"]
+        for value, expected in ((found.offset, offset), (found.slope, slope), (found.spread, spread)):
+            np.testing.assert_allclose(value, expected, err_msg=what)
+        assert (found.theta_low, found.theta_high, found.theta_is_constant) == (low, high, is_constant)
+
+
+def test_what_a_fault_has_done_before_is_at_least_what_the_log_adds_up_to():
+    """Of frames 7 and 8 at 5 per s; of frames of which the log has nothing it may be any number."""
+    log, a = made_log(), exp(-5.0 * DT)
+    d, size = np.array(D), np.abs(D)
+    least = 0.0
+    for k in (7, 8):
+        h, Z, r = (sum(by[i] * log[f"fie_flap_{'pqr'[i]}_{name}"][k] for i in range(3))
+                   for by, name in ((d, "offset_rad_s2"), (d, "slope"), (size, "spread_rad_s2")))  # fmt: skip
+        least = a * least + DT * (max(0.0, h + LOW * Z, h + HIGH * Z) + r)
+    assert least > 0.0
+    for share, says in ((1.0001, ""), (0.9999, "the effect before the written frames is too small")):
+        said = of_terms(log, **PAST | {"fault": share * least})
+        refused_with(says, lambda said=said: checker.sides_of_terms(said, frames_of(log), declared()))
+    log["fie_flap_p_offset_rad_s2"][:9] = np.nan
+    said = of_terms(log, **PAST | {"fault": 0.0})
+    checker.sides_of_terms(said, frames_of(log), declared())
+
+
+# --- Courses
+
+
+def position(log, k, i, side, sign, of_swing=False):
+    """Bound on the position that frame k gives by axis i, rad, and the command; upwards if sign is 1."""
+    of = Row(log)
+    nu = (of.of("{}_measured_rad_s", k, i) - of.of("{}_measured_rad_s", k - 1, i)) / DT
+    nu -= of.of("{}_design_rad_s2", k, i)
+    offset, slope, spread = (of.of(f"fie_flap_position_{{}}_{name}", k, i)
+                             for name in ("offset_rad_s2", "slope", "spread_rad_s2"))  # fmt: skip
+    offset = 0.0 if of_swing else offset
+    most = of.of("{}_eta_bar_rad_s2", k, i) + (of.noise(k, i) + of.noise(k - 1, i)) / DT + spread
+    return sign * (nu - offset) / slope - side * most / abs(slope), -sign * offset / slope
+
+
+def bound(log, frames, i, side, sign, of_swing=False):
+    """The same as a certificate states it."""
+    said = {"d": [0.0, 0.0, 0.0], "first": frames[0], "frame": frames[-1], "h": [], "Z": [], "r": []}
+    column = {name: log[f"fie_flap_position_{'pqr'[i]}_{name}"] for name in (
+        "offset_rad_s2", "slope", "spread_rad_s2")}  # fmt: skip
+    along = said["d"][i] = float(side * sign * np.sign(column["slope"][frames[0]]))
+    for k in frames:
+        said["h"].append(0.0 if of_swing else along * column["offset_rad_s2"][k])
+        said["Z"].append(along * sign * column["slope"][k])
+        said["r"].append(column["spread_rad_s2"][k])
+    return said
+
+
+def course_log():
+    """On q the slope keeps its sign, so that frames that follow one another bound the surface likewise."""
+    log = made_log()
+    log["fie_flap_position_q_slope"] = -abs(log["fie_flap_position_q_slope"])
+    return log
+
+
+Q, R = 1, 2
+STOPS = {1: TRAVEL, -1: (-TRAVEL[1], -TRAVEL[0])}
+PACE = radians(80.0) / 2
+
+
+def course(kind, sign, **fields):
+    """Frame 6 from below by q, and frame 9 from above by r; of an oscillation and an approach 6 to 8."""
+    log, swing = course_log(), kind == "oscillatory"
+    several = swing or kind == "rate_limit"
+    bounds = [bound(log, range(6, 9) if several else range(6, 7), Q, 1, sign, swing)]
+    if not swing:
+        above = 6 if kind == "rate_limit" else 9
+        bounds.append(bound(log, range(above, above + 1), R, -1, sign))
+    return log, {"what": f"flap {kind}", "theta": "course", "bounds": bounds, **fields}
+
+
+def pairs_of(log, said, instants=1):
+    return checker.course_pairs(said, frames_of(log, instants), declared(instants))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_a_course_compares_is_what_single_frames_say_of_the_position(sign):
+    """Of each type, pair by pair, from the innovation of each frame along one axis."""
+    stops = [STOPS[sign][0] + 0.01, STOPS[sign][1] - 0.02]
+    log, said = course("bias", sign, stops=stops)
+    (least, command), (most, commanded) = position(log, 6, Q, 1, sign), position(log, 9, R, -1, sign)
+    apart(bounds=[least, command, most, commanded, *stops])
+    offsets = [(least - command, most - commanded), (least, stops[0]), (stops[1], most)]
+    np.testing.assert_allclose(pairs_of(log, said), offsets)
+    log, said = course("bias that grows", sign, stops=stops)
+    np.testing.assert_allclose(pairs_of(log, said), [(least - command, 0.0), *offsets, (9, 6)])
+    way = "up" if sign > 0 else "down"
+    log, said = course(f"hardover {way}", sign, stops=[STOPS[sign][1]], pace_rad_s=PACE)
+    for instants, passed in ((1, 3), (2, 2)):
+        went = least + PACE * DT * passed
+        found = pairs_of(log, said, instants)
+        np.testing.assert_allclose(found, [(STOPS[sign][1], most), (9, 6), (went, most)])
+    log, said = course("oscillatory", sign, slowest_rad_s=25.0)
+    off = [position(log, k, Q, 1, sign, True)[0] for k in (6, 7, 8)]
+    np.testing.assert_allclose(pairs_of(log, said), [(2, pi / 25.0 / DT), (min(off), 0.0), (sum(off), 0.0)])
+    ordered = [0.03, 0.07, 0.05]
+    log, said = course("rate_limit", sign, ordered=ordered, near=0.09, step=0.011)
+    reached, top = [position(log, k, Q, 1, sign)[0] for k in (6, 7, 8)], position(log, 6, R, -1, sign)[0]
+    _, still = course("rate_limit", sign, ordered=ordered, near=0.09)
+    assert pairs_of(log, still)[2] == (pytest.approx(reached[2]), pytest.approx(top))
+    ahead = np.subtract(reached, ordered)
+    expected = [(min(ahead), 0.0), (sum(ahead), 0.0), (reached[2], top - 0.011), (reached[2], 0.09), (1, 0)]
+    np.testing.assert_allclose(pairs_of(log, said), expected)
+
+
+def wrong_courses():
+    """Statements that break one condition each, and the words of it."""
+    log, bias = course("bias", 1, stops=[*TRAVEL])
+    below, above = bias["bounds"]
+    _, up = course("hardover up", 1, stops=[TRAVEL[1]], pace_rad_s=PACE)
+    _, swing = course("oscillatory", 1, slowest_rad_s=25.0)
+    _, near = course("rate_limit", 1, ordered=[0.0, 0.1, 0.2], near=0.2)
+    other = bound(log, range(8, 9), Q, 1, 1)
+    yield bias | {"what": "flap stuck"}, "this is no type with a course"
+    yield bias | {"bounds": [below, bound(log, range(9, 10), R, -1, -1)]}, "a surface deflects one way"
+    yield bias | {"bounds": [below, above, other]}, "the frames do not follow one another"
+    yield bias | {"bounds": [above]}, "the frames do not follow one another"
+    yield bias | {"bounds": [below]}, "one frame bounds the deflection from above"
+    two = [below, above, bound(log, range(10, 11), R, -1, 1)]
+    yield bias | {"bounds": two}, "one frame bounds the deflection from above"
+    yield (
+        swing | {"bounds": [*swing["bounds"], bound(log, range(9, 10), R, -1, 1, True)]},
+        "one frame bounds the deflection from above",
+    )
+    for stops in ([TRAVEL[0]], [TRAVEL[0] - 1e-9, TRAVEL[1]], [TRAVEL[0], TRAVEL[1] + 1e-9]):
+        yield bias | {"stops": stops}, "stops"
+    yield up | {"what": "flap hardover down"}, "the surface runs the other way"
+    yield up | {"stops": [TRAVEL[1] + 1e-9]}, "the stop is not that of the log"
+    yield up | {"pace_rad_s": PACE * (1 + 1e-9)}, "pace_rad_s is not half the rate limit"
+    yield swing | {"slowest_rad_s": 24.0}, "slowest_rad_s is not that of the scenario"
+    yield near | {"bounds": [near["bounds"][0], bound(log, range(7, 8), R, -1, 1)]}, "approach is no known"
+    yield near | {"ordered": [0.0, 0.1]}, "ordered: frames are missing"
+    yield near | {"near": 0.19}, "near is nearer than the order itself"
+    yield bias | {"bounds": [bound(log, range(2, 3), Q, 1, 1), above]}, "health explains a frame"
+    late = dict(above, first=ROWS, frame=ROWS)
+    yield bias | {"bounds": [below, late]}, "health explains a frame"
+    for name in "hZr":
+        shifted = below | {name: [1.001 * below[name][0]]}
+        yield bias | {"bounds": [shifted, above]}, "h, Z or r is not that of the log"
+
+
+def test_a_course_is_refused_in_words_where_one_thing_is_wrong():
+    log, cases = course_log(), [*wrong_courses()]
+    assert len(cases) == 22
+    for said, says in cases:
+        refused_with(says, lambda said=said: pairs_of(log, said))
+
+
+def test_an_actuator_without_a_rate_limit_runs_away_at_60_deg_a_second():
+    log, said = course("hardover up", 1, stops=[TRAVEL[1]], pace_rad_s=pi / 6)
+    still = SCENARIO | {"actuators": {"flap": {"rate_limit_deg_s": 0.0}}}
+    checker.course_pairs(said, frames_of(log), declared(scenario=still))
+
+
+# --- Chance
+
+
+@pytest.mark.parametrize(("sense", "foreseen", "evidence"), [
+    ("either", -0.4, 7.0), ("less", -0.4, 6.6), ("less", 0.4, 7.0),
+])  # fmt: skip
+@pytest.mark.parametrize("room", [0.5, 8.0])
+def test_evidence_of_chance_is_held_against_noise_and_what_a_drift_can_do(
+    monkeypatch, sense, foreseen, evidence, room
+):
+    """N = -7, D = 4 at a level of 5; two constants of tolerance 0.5 and 0.2, with sums of -3 and 1."""
+    sums = np.array([-7.0, 4.0, -3.0, 1.0, foreseen])
+    monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (sums, room))
+    log = {"flap_loss_likelihood_share": np.array([0.0, 0.1, 0.6, 0.3])}
+    said = {"what": None, "likelihood": "flap_loss_likelihood_share", "level": 5.0, "sense": sense,
+            "tolerance": [0.5, 0.2], "first": 1, "frame": 2, "frames": [{}, {}]}  # fmt: skip
+    found = checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
+    limit = max(5.0 * 2.0, room + 2.5 * 2.0)
+    left = evidence - 0.5 * 3.0 - 0.2 * 1.0
+    np.testing.assert_allclose(found, [(left, limit), (0.6 * (1 + 1e-5), left / limit)], rtol=1e-12)
+    with pytest.raises(Refused, match="the log has no column flap_loss_likelihood_share"):
+        checker.likelihood_pairs(said, SimpleNamespace(log={}), declared())
+    if sense == "less":
+        monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (-sums, room))
+        with pytest.raises(Refused, match="the evidence has a negative variance"):
+            checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
+        sums[1] = 4.0
+        turned = sums * [-1.0, 1.0, 1.0, 1.0, 1.0]
+        monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (turned, room))
+        (((found, _), _)) = checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
+        assert found == pytest.approx(-14.0 + left)
+
+
+CHANCE: dict[str, Any] = {
+    "what": None, "likelihood": "flap_likelihood_share", "level": 5.5, "first": 3, "frame": 4,
+    "frames": [{}, {}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "fdi", "says"), [
+    ({}, {}, ""), ({}, {"statistical": None}, "the scenario declares no statistical detector"),
+    ({"what": "flap"}, {}, "the scenario declares no statistical detector"),
+    ({"frame": 5}, {}, "frames are missing"), ({"frames": [{}]}, {}, "frames are missing"),
+    ({"likelihood": "flap_share"}, {}, "likelihood: this is no share of the level"),
+    ({}, {"statistical": {"false_alarms_per_h": 1e-5}}, "level: the declared rate allows no smaller one"),
+])  # fmt: skip
+def test_a_statement_of_chance_is_one_that_the_scenario_allows(changes, fdi, says):
+    its = declared(scenario=SCENARIO | {"fdi": SCENARIO["fdi"] | fdi})
+    refused_with(says, lambda: checker.check_level(CHANCE | changes, its))
+
+
+@pytest.mark.parametrize("name", ["slope", "offset_rad_s2", "spread_rad_s2"])
+@pytest.mark.parametrize(("row", "axis", "refused"), [
+    (5, 0, False), (6, 0, True), (8, 2, True), (9, 0, False), (7, 1, False),
+])  # fmt: skip
+def test_an_exclusion_by_the_alarm_is_of_a_fault_that_moves_none_of_its_axes(name, row, axis, refused):
+    """Of an alarm on p and r from row 7 to 8: from the row before it on."""
+    log = made_log()
+    for i in range(3):
+        for of in ("slope", "offset_rad_s2", "spread_rad_s2"):
+            log[f"fie_flap_{'pqr'[i]}_{of}"] = np.zeros(ROWS)
+    log[f"fie_flap_{'pqr'[axis]}_{name}"][row] = -0.1
+    alarm = {"what": None, "likelihood": "x", "first": 7, "frame": 8, "axes": [0, 2]}
+    said, whole = {"what": "flap", "frame": 9}, {"statements": [alarm]}
+    says = "this fault moves the axes of the alarm" if refused else ""
+    refused_with(says, lambda: checker.check_exclusion_by_alarm(said, whole, frames_of(log)))
+
+
+@pytest.mark.parametrize(("alarm", "said", "says"), [
+    ({"what": "flap"}, {}, "there is no statistical alarm before"), ({"frame": 10}, {}, "the alarm came"),
+    ({}, {"what": None}, "the alarm came later"), ({"frame": 9}, {}, ""),
+])  # fmt: skip
+def test_an_exclusion_by_the_alarm_comes_with_one_of_chance_before(alarm, said, says):
+    log = made_log() | {f"fie_flap_{axis}_{of}": np.zeros(ROWS) for axis in "pqr"
+                        for of in ("slope", "offset_rad_s2", "spread_rad_s2")}  # fmt: skip
+    first = {"what": None, "likelihood": "x", "first": 7, "frame": 8, "axes": [0, 2]} | alarm
+    whole, said = {"statements": [first]}, {"what": "flap", "frame": 9} | said
+    refused_with(says, lambda: checker.check_exclusion_by_alarm(said, whole, frames_of(log)))
+    plain: dict[str, Any] = {"what": None, "terms": [], "frame": 8}
+    with pytest.raises(Refused, match="there is no statistical alarm before"):
+        checker.check_exclusion_by_alarm(said, {"statements": [plain, first]}, frames_of(log))
+
+
+# --- Instruments, events, the whole document
+
+LOOKS = {"what": None, "frame": 2, "test": "alpha", "looks": [[5.0, 3.0, 0.5], [1.5, 0.25, 0.75]]}
+WATCH = {"watch_share": np.array([9.0, 9.0, 2.7, 9.0]), "watch_test": np.array([0.0, 1.0, 7.0, 3.0])}
+
+
+@pytest.mark.parametrize(("changes", "log", "says"), [
+    ({}, {}, ""), ({"what": "flap"}, {}, "instruments raise an alarm, they exclude no surface"),
+    ({"test": "V"}, {}, "the log has another test in this row"),
+    ({"frame": 1}, {}, "the log has another test in this row"),
+    ({}, {"watch_test": None}, "the log has no test between instruments"),
+    ({}, {"watch_share": None}, "the log has no test between instruments"),
+    ({"looks": [[5.0, 3.0, 1.5], [1.5, 0.25, -0.25]]}, {}, "looks: a bound is below zero"),
+    ({"looks": [[5.0, 3.0, 0.0], [1.5, 0.25, 0.0]]}, {}, "the log's share is smaller"),
+    ({}, {"watch_share": np.full(4, 2.5)}, "the log's share is smaller"),
+    ({}, {"watch_share": np.full(4, 2.6)}, ""),
+    ({"missing": [3]}, {}, "the log says that another reading is missing, or none"),
+    ({"missing": [3]}, {"watch_missing": np.array([1.0, 2.0, 4.0, 3.0])}, "the log says that another readin"),
+    ({"missing": [3]}, {"watch_missing": np.array([1.0, 2.0, 3.0, 4.0])}, ""),
+])  # fmt: skip
+def test_looks_between_instruments_are_those_of_the_logs_row(changes, log, says):
+    seen = {name: of for name, of in (WATCH | log).items() if of is not None}
+    refused_with(says, lambda: checker.instrument_sides(LOOKS | changes, seen))
+    if not says:
+        expected = (1.0, 0.0) if "missing" in changes else (3.25, 1.25)
+        assert checker.instrument_sides(LOOKS | changes, seen) == expected
+
+
+@pytest.mark.parametrize(("column", "frame", "what", "says"), [
+    ("fie_flap_excluded", 9, "flap", ""), ("detected", ALARM, None, ""),
+    ("flap_stuck_excluded", 12, "flap stuck", ""),
+    ("fie_flap_excluded", 8, "flap", "fie_flap_excluded is not set in row 8"),
+    ("fie_flap_excluded", 10, "flap", "fie_flap_excluded is not set in row 10"),
+    ("detected", 13, None, "the log has no row 13"),
+    ("rudder_excluded", 9, "rudder", "the log has no column rudder_excluded: it was not written with this"),
+    ("detected", ALARM, "flap", "detected is another column than that of this event"),
+    ("fie_flap_excluded", 9, None, "fie_flap_excluded is another column than that of this event"),
+])  # fmt: skip
+def test_an_event_is_set_from_its_row_to_the_end(column, frame, what, says):
+    said = {"what": what, "column": column, "frame": frame}
+    refused_with(says, lambda: checker.check_event(said, made_log()))
+    taken_back = made_log()
+    taken_back[column if not says else "detected"][-1] = 0.0
+    if not says and frame != ROWS - 1:
+        refused_with(f"{column} is not set", lambda: checker.check_event(said, taken_back))
+
+
+@pytest.mark.parametrize(("value", "says"), [
+    ((3.0, 2.0), ""), ((2.0, 2.0), "alarm: 2 is not more than 2"),
+    ((2.0, 3.0), "alarm: 2 is not more than 3"), ((3.0, float("nan")), "alarm: the sides are no numbers"),
+    ((1.0 + 5e-11, 1.0), "alarm: 1 is not more than 1"), ((1.0 + 2e-10, 1.0), ""),
+])  # fmt: skip
+def test_the_greater_side_is_greater_by_more_than_rounding(monkeypatch, value, says):
+    """And both are stated as they are: 1e-11 of one is another number."""
+    monkeypatch.setattr(checker, "sides_of_terms", lambda *of: value)
+    log, term = made_log(), made_term(made_log(), first=4, frame=4)
+    said = {"what": None, "column": "detected", "frame": ALARM, "theta": "any", "terms": [term]}
+    finite = [side if np.isfinite(side) else 0.0 for side in value]
+    for off, reason in ((1.0, says), (1.0 + 1e-11, says or "alarm: the stated sides are not the recomputed")):
+        found = [*refused_in(log, said | {"sides": [finite[0], off * finite[1]]})]
+        assert [one[: len(reason)] for one in found] == [reason] * bool(reason)
+
+
+GYRO = {"noise_std_deg_s": 0.1, "bias_deg_s": 0.2, "quantum_deg_s": 0.4, "scale_error": 0.05}
+TEXT = yaml.safe_dump({
+    "rate_hz": 50.0, "substeps": 1, "changes": [], **SCENARIO,
+    "fdi": SCENARIO["fdi"] | {"bounds": {
+        "sensors": dict.fromkeys("pqr", GYRO),
+        "constant_rad_s2": dict.fromkeys("pqr", 0.3), "inertia_coupling": dict.fromkeys("pqr", 0.4)}},
+})  # fmt: skip
+HEAD: dict[str, Any] = {
+    "format": 5, "scenario": "hand", "scenario_sha256": sha256(TEXT.encode()).hexdigest(), "rows": ROWS,
+    "statements": [], "without": [],
+    "declared": {name: {} for name in "cbgB"} | {
+        "o": dict.fromkeys("pqr", radians(0.4 + 0.2 + 0.2)), "m": dict.fromkeys("pqr", 0.05)},
+}  # fmt: skip
+
+
+def refused_in(log, *said, text=TEXT, **head):
+    document = HEAD | {"statements": [*said]} | head
+    document |= {"digest": checker.digest(document)}
+    return checker.failures(document, log, text)
+
+
+MISSING = {"what": None, "column": "detected", "frame": ALARM, "missing": [3], "sides": [1.0, 0.0]}
+NOT_TOGETHER = "certificate, log and scenario do not fit together: "
+
+
+@pytest.mark.parametrize(("log", "said", "head", "says"), [
+    ({}, MISSING, {}, ""), ({}, MISSING, {"text": "a: 1"}, "SHA-256 of scenario.yaml does not match: it"),
+    ({}, MISSING, {"text": "a: 1", "scenario_sha256": sha256(b"a: 1").hexdigest()},
+     "the scenario is no scenario"),
+    ({}, MISSING, {"text": "[1", "scenario_sha256": sha256(b"[1").hexdigest()}, f"{NOT_TOGETHER}ParserError"),
+    ({"t_s": 1.001 * DT * np.arange(ROWS)}, MISSING, {}, "dt_s: the log's rows are not that far apart"),
+    ({"t_s": DT * np.arange(ROWS + 1)}, MISSING, {}, f"the log has {ROWS + 1} rows, not {ROWS}: the certif"),
+    ({}, MISSING, {"format": 4}, "this checker reads format 5, not 4"),
+    ({}, MISSING | {"frame": 4.5}, {}, "statement: the field frame is missing, or no row"),
+    ({}, MISSING | {"frame": True}, {}, "statement: the field frame is missing, or no row"),
+    ({}, MISSING, {"declared": []}, "certificate: declared is not allowed, allowed: A mapping."),
+    ({"watch_missing": np.full(ROWS, 4.0)}, MISSING, {}, "alarm: the log says that another reading is"),
+    ({"watch_missing": "none"}, MISSING, {}, "alarm: the numbers do not fit the log: ValueError"),
+])  # fmt: skip
+def test_a_document_is_refused_in_words_where_one_thing_is_wrong(log, said, head, says):
+    seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)} | log
+    found = [*refused_in(seen, said, **head)]
+    assert [one[: len(says)] for one in found] == [says] * bool(says)
+
+
+def test_each_statement_that_does_not_hold_has_a_line():
+    seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)}
+    flap = {"what": "flap", "column": "fie_flap_excluded", "frame": 9, "as": "alarm"}
+    assert [*refused_in(seen, MISSING | {"missing": [2]}, MISSING, flap)] == [
+        "alarm: the log says that another reading is missing, or none",
+        "flap excluded: there is no statistical alarm before",
+    ]
+
+
+def test_what_is_declared_is_what_is_in_force_at_the_first_event():
+    """From row 6 on another noise is declared; the alarm, in row 4, is the second statement."""
+    later = dict.fromkeys("pqr", GYRO | {"noise_std_deg_s": 0.2})
+    text = yaml.safe_dump(yaml.safe_load(TEXT) | {"changes": [{"at_s": 0.12, "declared_sensors": later}]})
+    head = {"text": text, "scenario_sha256": sha256(text.encode()).hexdigest()}
+    seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)}
+    flap = {"what": "flap", "column": "fie_flap_excluded", "frame": 9, "as": "alarm"}
+    both = [*refused_in(seen, flap, MISSING, **head)]
+    assert both == ["flap excluded: there is no statistical alarm before"]
+    alone = [*refused_in(seen, flap, **head)]
+    assert alone == ["the declared error of gyro p is not that of the scenario"]
+
+
+def test_what_a_certificate_states_in_sentences():
+    document = {"statements": [
+        {"what": None, "frame": 1, "terms": [], "theta": "any", "sides": [0.12345678, 0.0987654]},
+        {"what": None, "frame": 2, "test": "V", "looks": [], "sides": [12.0, 3.5]},
+        {"what": None, "frame": 2, "missing": [7], "sides": [1.0, 0.0]},
+        {"what": None, "frame": 3, "likelihood": "x", "sides": [[7.5, 0.9], [6.25, 0.8]]},
+        {"what": "flap", "frame": 3, "as": "alarm"},
+        {"what": "flap", "frame": 4, "theta": "constant", "terms": [], "sides": [2.0, 1.0]},
+        {"what": "flap bias that grows", "frame": 4, "theta": "course", "bounds": [], "sides": [[1], [0]]},
+        {"what": "flap creep", "frame": 5, "theta": "any", "terms": [], "sides": [3.0, 2.0]},
+    ]}  # fmt: skip
+    log = {"t_s": np.arange(6) / 8}
+    assert [*checker.sentences(document, log)] == [
+        "alarm at 0.125 s (row 1): 0.1235 rad/s is more than 0.09877 rad/s, the most that bounds allow",
+        "alarm at 0.250 s (row 2): 12 is more than 3.5, the most that bounds allow",
+        "alarm at 0.250 s (row 2): instrument 7 gave no reading",
+        "alarm at 0.375 s (row 3): evidence 7.5 is more than 6.25 at the declared rate of false alarms",
+        "flap excluded at 0.375 s (row 3): the statistical alarm came on axes that this fault does not move",
+        "flap excluded at 0.500 s (row 4): 2 is more than 1, the most that bounds allow",
+        "flap bias that grows excluded at 0.500 s (row 4): the surface moved as this type cannot",
+        "flap creep excluded at 0.625 s (row 5), creep being what the log defines: 3 rad/s is more than "
+        "2 rad/s, the most that bounds allow",
+    ]
+
+
+def test_a_level_is_that_of_a_test_in_each_frame_at_the_declared_rate():
+    """A normal variable is beyond 4.7 so many times in an hour of frames."""
+    rate_per_h = 0.5 * erfc(4.7 / sqrt(2.0)) * 3600.0 / DT
+    its = declared(scenario={"fdi": {"statistical": {"false_alarms_per_h": rate_per_h}}})
+    for level, says in ((4.7 * (1 + 1e-6), ""), (4.7 * (1 - 1e-6), "level: the declared rate allows")):
+        refused_with(says, lambda level=level: checker.check_level(CHANCE | {"level": level}, its))

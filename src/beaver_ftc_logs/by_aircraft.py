@@ -141,10 +141,10 @@ def diagnose_with_aircraft_model(
 ) -> tuple[Samples, DiagnosisRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
     aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed_aircraft)
-    return aircraft_inputs.samples, *diagnose_inputs(aircraft_inputs, diagnosed_aircraft)
+    return aircraft_inputs.samples, *diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
 
 
-def diagnose_inputs(
+def diagnose_aircraft_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""

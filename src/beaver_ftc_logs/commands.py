@@ -234,7 +234,7 @@ def _check_replay_options(options: DiagnoseOptions) -> None:
 def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
     from beaver_ftc_logs.by_aircraft import (
         as_text,
-        diagnose_inputs,
+        diagnose_aircraft_inputs,
         load_aircraft_and_declared_errors,
         read_diagnosis_inputs,
     )
@@ -257,7 +257,7 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
         loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_path_beside_log))
         for recording in read_parts_for_vehicle(path, loaded_vehicle, options.reader):
             aircraft_inputs = read_diagnosis_inputs(recording, loaded_vehicle, diagnosed_aircraft)
-            rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed_aircraft)
+            rows, verdict = diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
             samples, surfaces = aircraft_inputs.samples, diagnosed_aircraft.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])

@@ -9,7 +9,7 @@ the two halves of a single flight in turn, or each of several flights in turn.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -763,37 +763,14 @@ def add_fitted_ranges_and_alarm_threshold(
     samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    max_noise_variance_scale = 1.0
-    max_sample_log_likelihood_gain_of_mistake = 0.0
-    held_out_peaks_and_hours = list[extremes.PeaksAndHours]()
-    squared_gain_deviations = list[Floats]()
-    for fold_model, held_out_flights in _fold_models_and_held_out_flights(
-        usable_flights,
-        model,
-        trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
-    ):
-        for held_out in held_out_flights:
-            held_out_max_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
-                fold_model, held_out
-            )
-            max_noise_variance_scale = max(max_noise_variance_scale, held_out_max_noise_variance_scale)
-            if len(held_out_peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
-                max_sample_log_likelihood_gain_of_mistake = max(
-                    max_sample_log_likelihood_gain_of_mistake,
-                    _max_column_mistake_log_likelihood_gain(fold_model, held_out),
-                )
-            held_out_peaks_and_hours.append(peaks_and_hours)
-            if len(usable_flights) > 1 and model.vehicle.other_laws:
-                squared_gain_deviations.append(
-                    _squared_group_gain_deviations_beyond_noise(fold_model, held_out)
-                )
+    held_out = _test_on_held_out_flights(usable_flights, model, samples_and_is_usable_by_flight)
     rate_regression = fit_least_squares_of_order(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     gain_variance_between_laws = np.zeros(len(model.groups))
     if model.vehicle.other_laws:
         gain_variance_between_laws = _gain_variance_between_laws(
-            _max_gain_bias_under_one_law(usable_flights, model), squared_gain_deviations
+            _max_gain_bias_under_one_law(usable_flights, model), held_out.squared_gain_deviations
         )
     gain_standard_errors = np.minimum(
         np.sqrt(group_gain_standard_error(rate_regression, model) ** 2 + gain_variance_between_laws),
@@ -802,18 +779,92 @@ def add_fitted_ranges_and_alarm_threshold(
     standard_error_by_rate_or_signal = rate_and_signal_gain_standard_error(
         rate_regression, model, float(gain_variance_between_laws.max())
     )
+    peak_tail = extremes.fit_peak_tail(held_out.peaks_and_hours)
     fitted_ranges = trust.compute_fitted_ranges(
-        samples_and_is_usable_by_flight, model, gain_standard_errors, max_noise_variance_scale
-    ).model_copy(update={"gain_standard_error_by_column": standard_error_by_rate_or_signal})
+        samples_and_is_usable_by_flight, model, gain_standard_errors, held_out.max_noise_variance_scale
+    ).model_copy(
+        update={
+            "gain_standard_error_by_column": standard_error_by_rate_or_signal,
+            "alarm_peak_tail": peak_tail,
+            "max_column_mistake_log_likelihood_gain": held_out.max_column_mistake_log_likelihood_gain,
+        }
+    )
+    false_alarms_per_hour, alarm_threshold = _alarm_rate_and_threshold(
+        model, peak_tail, held_out.peaks_and_hours
+    )
+    alarm_settings = {"false_alarms_per_hour": false_alarms_per_hour, "alarm_threshold": alarm_threshold}
+    return model.model_copy(
+        update={
+            "fitted_ranges": fitted_ranges,
+            "settings": model.settings.model_copy(update=alarm_settings),
+            "identification_results": dict(
+                _cross_validate_alarm_threshold(held_out.peaks_and_hours, false_alarms_per_hour, model)
+            ),
+        }
+    )
+
+
+class _HeldOutResults(NamedTuple):
+    """How models of parts of the flights did on the parts that were left out.
+
+    max_noise_variance_scale: largest variance of the residual over that of the fit.
+    max_column_mistake_log_likelihood_gain: largest gain, a sample, of reading the columns by mistake.
+    peaks_and_hours: peaks of the evidence of a fault, and hours of health, of each part.
+    squared_gain_deviations: of each part (G,), beyond what noise explains; empty under one law.
+    """
+
+    max_noise_variance_scale: float
+    max_column_mistake_log_likelihood_gain: float
+    peaks_and_hours: list[extremes.PeaksAndHours]
+    squared_gain_deviations: list[Floats]
+
+
+def _test_on_held_out_flights(
+    usable_flights: Sequence[FlightWithUsableRows],
+    model: Model,
+    samples_and_is_usable_by_flight: Sequence[tuple[Samples, NDArray[np.bool_]]],
+) -> _HeldOutResults:
+    """Fit the model without each part of the flights in turn, and test it on that part."""
+    max_noise_variance_scale, max_mistake_gain = 1.0, 0.0
+    peaks_and_hours = list[extremes.PeaksAndHours]()
+    squared_gain_deviations = list[Floats]()
+    for fold_model, held_out_flights in _fold_models_and_held_out_flights(
+        usable_flights,
+        model,
+        trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
+    ):
+        for held_out in held_out_flights:
+            noise_variance_scale, its_peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
+                fold_model, held_out
+            )
+            max_noise_variance_scale = max(max_noise_variance_scale, noise_variance_scale)
+            if len(peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
+                max_mistake_gain = max(
+                    max_mistake_gain, _max_column_mistake_log_likelihood_gain(fold_model, held_out)
+                )
+            peaks_and_hours.append(its_peaks_and_hours)
+            if len(usable_flights) > 1 and model.vehicle.other_laws:
+                squared_gain_deviations.append(
+                    _squared_group_gain_deviations_beyond_noise(fold_model, held_out)
+                )
+    return _HeldOutResults(
+        max_noise_variance_scale, max_mistake_gain, peaks_and_hours, squared_gain_deviations
+    )
+
+
+def _alarm_rate_and_threshold(
+    model: Model, peak_tail: extremes.PeakTail | None, peaks_and_hours: Sequence[extremes.PeaksAndHours]
+) -> tuple[float | None, float | None]:
+    """The rate of false alarms, 1/h, that the vehicle file asks for or that is usual, and the evidence at
+    which health reaches it. Raises BadInput if the flights are too short to tell the rate asked for."""
     requested_false_alarms_per_hour = model.vehicle.false_alarms_per_hour
     target_false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
         if requested_false_alarms_per_hour is None and not model.settings.likely_effectiveness_levels_by_group
         else requested_false_alarms_per_hour
     )
-    peak_tail = extremes.fit_peak_tail(held_out_peaks_and_hours)
     if peak_tail is None and requested_false_alarms_per_hour is not None:
-        healthy_minutes = _total_healthy_minutes(held_out_peaks_and_hours)
+        healthy_minutes = _total_healthy_minutes(peaks_and_hours)
         reason = f"{healthy_minutes:.1f} min of health left out have too few peaks of the evidence to tell"
         missing_minutes = (
             extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 60.0 / requested_false_alarms_per_hour
@@ -823,30 +874,11 @@ def add_fitted_ranges_and_alarm_threshold(
             f"identify: false_alarms_per_hour {requested_false_alarms_per_hour:g}: {reason}, allowed: "
             f"{missing_minutes:.0f} min more"
         )
-    has_tail_or_other_laws = bool(peak_tail or model.vehicle.other_laws)
-    alarm_threshold = (
-        _choose_alarm_threshold(peak_tail, target_false_alarms_per_hour, model)
-        if target_false_alarms_per_hour and has_tail_or_other_laws
-        else None
-    )
-    alarm_settings = {
-        "false_alarms_per_hour": target_false_alarms_per_hour,
-        "alarm_threshold": alarm_threshold,
-    }
-    return model.model_copy(
-        update={
-            "fitted_ranges": fitted_ranges.model_copy(
-                update={
-                    "alarm_peak_tail": peak_tail,
-                    "max_column_mistake_log_likelihood_gain": max_sample_log_likelihood_gain_of_mistake,
-                }
-            ),
-            "settings": model.settings.model_copy(update=alarm_settings),
-            "identification_results": dict(
-                _cross_validate_alarm_threshold(held_out_peaks_and_hours, target_false_alarms_per_hour, model)
-            ),
-        }
-    )
+    if target_false_alarms_per_hour and (peak_tail or model.vehicle.other_laws):
+        return target_false_alarms_per_hour, _choose_alarm_threshold(
+            peak_tail, target_false_alarms_per_hour, model
+        )
+    return target_false_alarms_per_hour, None
 
 
 def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Floats:

@@ -249,7 +249,7 @@ def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[
 def _is_rate_clipped(rate_columns: list[Column], t_s: Floats) -> NDArray[np.bool_]:
     """Whether a rate is clipped at each sample."""
     is_clipped_by_axis = [
-        _latest_values(t_s, rate_column.t_s, signals.is_clipped(rate_column.values).astype(float))
+        _latest_values(t_s, rate_column.t_s, signals.find_clipped_rows(rate_column.values).astype(float))
         for rate_column in rate_columns
     ]
     return np.asarray(np.nan_to_num(is_clipped_by_axis).any(axis=0))
@@ -286,7 +286,10 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     columns, attitude_columns, mistake = recording.columns, vehicle.attitude, None
     rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if attitude_columns and not signals.is_clipped(next(iter(rate_column_by_name.values())).values).any():
+    if (
+        attitude_columns
+        and not signals.find_clipped_rows(next(iter(rate_column_by_name.values())).values).any()
+    ):
         angle_quantities = [attitude_columns.roll, attitude_columns.pitch, attitude_columns.yaw]
         named_angle_columns_or_none = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None

@@ -32,7 +32,7 @@ def _differs_from_previous(values: Floats) -> Mask:
     return np.concatenate([[True], values[1:] != values[:-1]])[: len(values)]
 
 
-def is_clipped(values: Floats) -> Mask:
+def find_clipped_rows(values: Floats) -> Mask:
     """Rows (n,) at the largest value so far, of either sign, if it has lasted for three rows and has been
     reached in ten rows.
 
@@ -112,7 +112,7 @@ def column_defect_texts(name: str, column: Column, is_measured_rate: bool) -> li
         defect_texts.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
     if not is_measured_rate and values.size and np.nanmin(values) == np.nanmax(values):
         defect_texts.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if is_measured_rate and (is_clipped_row := is_clipped(values)).any():
+    if is_measured_rate and (is_clipped_row := find_clipped_rows(values)).any():
         defect_texts.append(
             f"{name}: clipped at {np.abs(values[is_clipped_row]).max():.4g} in {is_clipped_row.sum()} rows"
         )

@@ -135,7 +135,9 @@ class Across:
         parity.fill_view_innovations_noise_regressors(
             views, int(tests["uses_regressors"]), *parts, innovation, y[2]
         )
-        parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
+        parity.update_view_tests(
+            views, tests, record["tone_test_config"], y, fdi["config"]["dt"], frame, latched
+        )
 
     @staticmethod
     def can_surface_fault_change_view(fdi, view, s, column):

@@ -324,7 +324,7 @@ def advance_gust_estimate(gust, y, attitude, dt):
     V = gust.output.speed_relative_to_mean_air
     update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change)
     fill_axes_rate_and_fast_turn(gust, dt, V)
-    pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
+    pitching_lag_s, yawing_lag_s = gust_correlation_time_s(gust, 1, V), gust_correlation_time_s(gust, 2, V)
     previous_unmeasured_yawing_share = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_from_heading_rate(
         gust, V, heading_change / dt
@@ -572,7 +572,7 @@ def intensity_scale_for_rolling_length(gust, gust_axis):
 
 
 @kernel
-def gust_lag_s(gust, gust_axis, V):
+def gust_correlation_time_s(gust, gust_axis, V):
     """Lag of the gust about a gust axis, s, at a speed V m/s: its correlation length over V."""
     if gust_axis == 0:
         return gust.config.rolling_gust_correlation_length / V
@@ -582,7 +582,7 @@ def gust_lag_s(gust, gust_axis, V):
 @kernel
 def gust_correlation_length(gust, gust_axis):
     """Correlation length of the gust about a gust axis, m, as in `design.rotation_lengths`: lag at 1 m/s."""
-    return gust_lag_s(gust, gust_axis, 1.0)
+    return gust_correlation_time_s(gust, gust_axis, 1.0)
 
 
 @kernel
@@ -613,11 +613,11 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
     if not gust.memory.has_fast_axes_turn:
         return
     rolling_intensity_per_squared_axes_rate = (
-        0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
+        0.5 * gust_correlation_time_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
     )
     yawing_intensity_per_squared_axes_rate = (
         0.5
-        * gust_lag_s(gust, 2, V) ** 2
+        * gust_correlation_time_s(gust, 2, V) ** 2
         * gust.memory.gust_rotation_intensity_per_airspeed[2]
         * gust.memory.unmeasured_yawing_share_by_past_turns
     )
@@ -669,7 +669,7 @@ def full_gust_drift_intensity(gust, V, body_axes_rate_sensitivity, body_axes_for
     body_axes_rate_sensitivity, body_axes_force_sensitivity (3,) 1/s: gust sensitivity of the rates and of
     the forces, about the body axes.
     """
-    drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
+    drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_correlation_time_s(gust, 0, V)
     for gust_axis in range(3):
         rate_plus_force_sensitivity = abs(
             project_on_gust_axis(body_axes_rate_sensitivity, gust.output.gust_axes_in_body, gust_axis)

@@ -106,7 +106,7 @@ class GustReadout(NamedTuple):
     gust_acceleration_rad_s2: np.ndarray
 
 
-class MappedModelError(NamedTuple):
+class ModelErrorMapReadout(NamedTuple):
     """The design model's error where the aircraft is now, from the map that the aircraft declares: whether
     the map covers the place, and its bound (3,) rad/s2."""
 
@@ -305,10 +305,10 @@ class DiagnosisReadout:
         )
 
     @cached_property
-    def mapped_error(self) -> MappedModelError:
+    def mapped_error(self) -> ModelErrorMapReadout:
         """The design model's error here, where the aircraft maps it."""
         error_map = self._fdi["bound"]["error_map"]
-        return MappedModelError(
+        return ModelErrorMapReadout(
             not error_map["is_outside_all_boxes"],
             error_map["error_bound_now"].copy(),
         )

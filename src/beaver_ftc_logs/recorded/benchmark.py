@@ -344,11 +344,11 @@ def _failure_score_cells(method_scores: Document) -> list[str]:
     n_ailerons_and_rudders_within_5_s, n_aileron_and_rudder_failures = (
         sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
     )
-    rate_interval = method_scores["false_alarms_per_hour"]
+    alarms_per_hour = method_scores["false_alarms_per_hour"]
     return [
         *cells,
         f"{n_ailerons_and_rudders_within_5_s} of {n_aileron_and_rudder_failures}",
-        f"{rate_interval['value']:.1f} ({rate_interval['low']:.1f} to {rate_interval['high']:.1f})",
+        f"{alarms_per_hour['value']:.1f} ({alarms_per_hour['low']:.1f} to {alarms_per_hour['high']:.1f})",
         f"{method_scores['healthy_flights_with_an_alarm']} of {method_scores['healthy_flights']}",
         str(method_scores["wrong_group"]),
     ]

@@ -209,7 +209,7 @@ def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
         (fit_model(fitted_flights, data_set.vehicle, settings), held_out)
         for fitted_flights, held_out, _ in validation_folds(flights_with_usable_mask)
     ]
-    whole_flight_model = fit_model(flights_with_usable_mask, data_set.vehicle, settings)
+    all_flights_model = fit_model(flights_with_usable_mask, data_set.vehicle, settings)
     n_surfaces = len(data_set.vehicle.surfaces)
     days_by_kind = {
         "one change": unchanged_and_one_change_days(
@@ -221,24 +221,24 @@ def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
     scores_of_all_days = [
         one_day_scores
         for kind, days in days_by_kind.items()
-        for one_day_scores in _score_days(kind, days, models_and_held_out, whole_flight_model)
+        for one_day_scores in _score_days(kind, days, models_and_held_out, all_flights_model)
     ]
-    summaries = [
+    summary_by_kind = [
         _summarize_days(
             kind, [one_day_scores for one_day_scores in scores_of_all_days if one_day_scores["kind"] == kind]
         )
         for kind in days_by_kind
     ]
-    return {"set": data_set.name, "rows": scores_of_all_days, "summary": summaries}
+    return {"set": data_set.name, "rows": scores_of_all_days, "summary": summary_by_kind}
 
 
 def _score_days(
     kind: str,
     days: Sequence[DayChanges],
     models_and_held_out: Sequence[tuple[Model, FlightWithUsableRows]],
-    whole_flight_model: Model,
+    all_flights_model: Model,
 ) -> Iterator[Document]:
-    _, lagged_rate_coefficients, _, noise_covariance = whole_flight_model.intercept_past_response_noise()
+    _, lagged_rate_coefficients, _, noise_covariance = all_flights_model.intercept_past_response_noise()
     for day in days:
         part_scores_by_detector: dict[str, list[Document]] = {
             BANK_OF_FILTERS_DETECTOR: [],

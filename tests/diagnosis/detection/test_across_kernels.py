@@ -60,7 +60,7 @@ def fdi(rng):
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["regressor_tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
     configure_parity_views(statistical, load())
-    parity.configure_tone_tests(statistical["tone_config"], 1e-8, V, 15.0, DT)
+    parity.configure_tone_tests(statistical["tone_test_config"], 1e-8, V, 15.0, DT)
     air = statistical["gust"]
     (
         air["output"]["accounts_for_gusts"],

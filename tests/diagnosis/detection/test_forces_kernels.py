@@ -432,7 +432,7 @@ def viewed():
         statistical["test_config"]["evidence_decay_factor"],
     ) = 6.0, 0.5 * 5.0**2, 0.99
     configure_parity_views(statistical, AIRCRAFT)
-    configure_tone_tests(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
+    configure_tone_tests(statistical["tone_test_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
         update_all_force_innovations(statistical["forces"], statistical["gust"], measured(), U, DT)
     fdi["layout"]["position_estimator"] = range(4)
@@ -630,7 +630,7 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     statistical, swinging = fdi["statistical"], measured()
     statistical["test_config"]["alarm_level"], statistical["test_config"]["evidence_decay_factor"] = 6.0, 0.99
     configure_parity_views(statistical, AIRCRAFT)
-    configure_tone_tests(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
+    configure_tone_tests(statistical["tone_test_config"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
         update_all_force_innovations(statistical["forces"], statistical["gust"], swinging, U, DT)

@@ -46,18 +46,20 @@ def view(rng):
 
 
 @pytest.fixture
-def tone_config():
-    tone_config = new_fdi()["statistical"]["tone_config"]
-    parity.configure_tone_tests(tone_config, CHANCE, V, PACE, DT)
-    return tone_config
+def tone_test_config():
+    tone_test_config = new_fdi()["statistical"]["tone_test_config"]
+    parity.configure_tone_tests(tone_test_config, CHANCE, V, PACE, DT)
+    return tone_test_config
 
 
-def listen(view, tone_config, samples, regressors=None, heard=True, uses_regressors=False, alarm_level=6.0):
+def listen(
+    view, tone_test_config, samples, regressors=None, heard=True, uses_regressors=False, alarm_level=6.0
+):
     for k, sample in enumerate(samples):
         view["block"]["unscaled_white_innovation_rad_s"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        parity.update_tone_tests(view, tone_config, alarm_level, heard, uses_regressors, DT)
+        parity.update_tone_tests(view, tone_test_config, alarm_level, heard, uses_regressors, DT)
 
 
 def resonance(samples):
@@ -71,9 +73,9 @@ def as_complex(pair):
     return pair[0] + 1j * pair[1]
 
 
-def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_config, rng):
+def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_test_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_config, samples, regressors, uses_regressors=True)
+    listen(view, tone_test_config, samples, regressors, uses_regressors=True)
     found = view["tone_tests"]
     assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
@@ -85,10 +87,10 @@ def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_c
     assert not found["regressor_correlation"][3:].any()
 
 
-def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
-    listen(view, tone_config, [50.0])
+def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_test_config):
+    listen(view, tone_test_config, [50.0])
     assert (view["tone_tests"]["score"], view["tone_tests"]["correlation_variance"]) == (0.0, 0.0)
-    listen(view, tone_config, [50.0])
+    listen(view, tone_test_config, [50.0])
     assert view["tone_tests"]["score"] > 0.0
     assert (view["tone_tests"]["frames_since_update"], view["tone_tests"]["normalised_innovation_sum"]) == (
         0,
@@ -96,11 +98,11 @@ def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
     )
 
 
-def test_what_is_not_heard_lets_the_rest_fade(view, tone_config, rng):
+def test_what_is_not_heard_lets_the_rest_fade(view, tone_test_config, rng):
     samples = rng.normal(size=20)
-    listen(view, tone_config, samples)
+    listen(view, tone_test_config, samples)
     then = np.abs(as_complex(view["tone_tests"]["correlation"]))
-    listen(view, tone_config, np.full(10, 1e6), heard=False)
+    listen(view, tone_test_config, np.full(10, 1e6), heard=False)
     assert np.abs(as_complex(view["tone_tests"]["correlation"])) == pytest.approx(
         then * exp(-10 * DT / TONE_MEMORY_S)
     )
@@ -127,11 +129,11 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
-def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_config):
+def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_test_config):
     bounds = [0.05, 0.02, 0.0, 0.09] * 8
     for bound in bounds:
         view["uncertainty_bound"] = bound
-        listen(view, tone_config, np.zeros(EVERY))
+        listen(view, tone_test_config, np.zeros(EVERY))
     angle = TONE_FREQUENCIES_RAD_S * DT
     passed = np.array(
         [parity.whitened_unit_tone_amplitude(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle]
@@ -212,13 +214,15 @@ def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view,
     assert record["max_correlation_by_coefficient_errors"] == pytest.approx(np.full(N_TONE_FREQUENCIES, 0.9))
 
 
-def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_config, rng):
+def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_test_config, rng):
     """Of the largest of all frequencies, however far apart their parts are: each alone is within that."""
     noise = rng.normal(size=(4000, 300))
     loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
     age_s = EVERY * DT * np.arange(150)
     root = np.sqrt(
-        tone_config["larger_complex_part_variance_share"] * EVERY * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
+        tone_test_config["larger_complex_part_variance_share"]
+        * EVERY
+        * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
     )
     for x in (1.0, 2.0, 3.0):
         share = np.mean(loud / root > x, axis=0)
@@ -226,7 +230,7 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
     assert (np.mean(loud / root > 1.0, axis=0) > 0.4).all(), "and not much quieter"
 
 
-def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_config):
+def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_test_config):
     record = view["tone_tests"]
     record["correlation_variance"], record["correlation"][0, 3], record["correlation"][1, 3] = (
         100.0,
@@ -236,41 +240,41 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
     (
         record["max_correlation_by_coefficient_errors"][3],
         record["correlation"][0, 7],
-        tone_config["larger_complex_part_variance_share"][:],
+        tone_test_config["larger_complex_part_variance_share"][:],
     ) = (
         10.0,
         12.0,
         0.6,
     )
-    parity.fill_max_tone_score(record, tone_config, 6.0)
-    root = sqrt(100.0 * tone_config["larger_complex_part_variance_share"][3])
+    parity.fill_max_tone_score(record, tone_test_config, 6.0)
+    root = sqrt(100.0 * tone_test_config["larger_complex_part_variance_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
     record["max_correlation_by_uncertainty"][3] = 200.0
-    parity.fill_max_tone_score(record, tone_config, 6.0)
+    parity.fill_max_tone_score(record, tone_test_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["correlation"][:] = 0.0
-    parity.fill_max_tone_score(record, tone_config, 6.0)
+    parity.fill_max_tone_score(record, tone_test_config, 6.0)
     assert record["score"] == 0.0
 
 
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
-def test_a_tone_is_heard_on_the_grid_and_between(view, tone_config, frequency_rad_s):
+def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequency_rad_s):
     view["uncertainty_bound"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
-    listen(view, tone_config, samples, alarm_level=LEVEL)
+    listen(view, tone_test_config, samples, alarm_level=LEVEL)
     whole = (
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation
     assert 0.6 * whole < view["tone_tests"]["score"] < 1.1 * whole
 
 
-def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_config):
+def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_test_config):
     def flow(**changed):
         y = np.zeros(5)
         y[AIRSPEED] = V
         for place, value in changed.items():
             y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
-        return parity.is_within_envelope(tone_config, y)
+        return parity.is_within_envelope(tone_test_config, y)
 
     assert flow()
     assert flow(V=23.0)

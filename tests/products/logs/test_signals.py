@@ -32,22 +32,24 @@ def test_for_how_long_a_signal_stands_still():
 def test_a_clipped_rate_and_one_that_is_not():
     free = np.sin(T_S) * 3.0 + 0.01 * noise()
     for side in (1.0, -1.0):
-        rows = signals.is_clipped(side * np.clip(free, -9.0, 2.0))
+        rows = signals.find_clipped_rows(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
         said = signals.column_defect_texts(
             "p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_measured_rate=True
         )
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
-    assert not signals.is_clipped(free).any()
-    assert not signals.is_clipped(np.zeros(500)).any()
+    assert not signals.find_clipped_rows(free).any()
+    assert not signals.find_clipped_rows(np.zeros(500)).any()
 
 
 @settings(max_examples=samples(20), deadline=None)
 @given(cut=st.integers(20, 1199), level=st.floats(0.5, 2.9))
 def test_what_is_clipped_shows_without_what_comes_later(cut, level):
     values = np.minimum(np.sin(T_S) * 3.0 + 0.01 * noise(), level)
-    np.testing.assert_array_equal(signals.is_clipped(values)[:cut], signals.is_clipped(values[:cut]))
+    np.testing.assert_array_equal(
+        signals.find_clipped_rows(values)[:cut], signals.find_clipped_rows(values[:cut])
+    )
 
 
 def test_jumps_are_single_rows_that_come_back():
@@ -239,8 +241,8 @@ def test_a_signal_is_clipped_from_the_tenth_row_at_its_largest_value():
     """In threes: 3 * 3 rows at 5 are not enough, and a row alone is none; a larger value begins again."""
     fives = [5.0, 5.0, 5.0, 1.0]
     values = np.array([*fives, *fives, *fives, *fives, 5.0, 1.0, 6.0, 6.0, 6.0])
-    assert np.flatnonzero(signals.is_clipped(values)).tolist() == [14]
-    assert np.flatnonzero(signals.is_clipped(-values)).tolist() == [14]
+    assert np.flatnonzero(signals.find_clipped_rows(values)).tolist() == [14]
+    assert np.flatnonzero(signals.find_clipped_rows(-values)).tolist() == [14]
 
 
 def test_a_spike_is_larger_than_forty_usual_steps():

@@ -297,68 +297,92 @@ def configure_forces(
     ]
     forces["wing_span"] = geometry.span_m
     forces["sideslip_rate_coefficient"] = sum(side_force_sideslip_rate_coefficients)
+    for force_index in range(2):
+        _configure_force(fdi, declared, trim, acceleration_slopes_by_air_data, force_index, dt_s)
+
+
+def _configure_force(
+    fdi: np.void,
+    declared: Declared,
+    trim: RatesReadingsDeflections,
+    acceleration_slopes_by_air_data: np.ndarray,
+    force_index: int,
+    dt_s: float,
+) -> None:
+    """Fill the record of one force; the arguments are those of `configure_forces`."""
+    y, aircraft, sensor_errors = trim[1], declared.aircraft, declared.sensors
+    forces, gust_config = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
+    force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
+    vane_index_in_y, axis = ((BETA, 2), (ALPHA, 1))[force_index]
     chord_scaled_force_per_coefficient = (
-        y[QDYN] * gust["config"]["wing_area_per_mass"] * forces["inverse_chord_per_m"]
+        y[QDYN] * gust_config["wing_area_per_mass"] * forces["inverse_chord_per_m"]
     )
-    reading_noise_std = sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
-    slipstream_per_airspeed, slipstream_variance_from_other_readings = _slipstream_slope_and_noise_variance(
-        y, fdi["bound"]["declared_errors"], sensor_errors
+    chord_scaled_force_slopes_with_slipstream = (
+        chord_scaled_force_per_coefficient
+        * _force_coefficient_slopes(aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim)
     )
-    for force_index, (vane_index_in_y, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
-        force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
-        chord_scaled_force_slopes_with_slipstream = (
-            chord_scaled_force_per_coefficient
-            * _force_coefficient_slopes(aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim)
-        )
-        chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1]
-        chord_scaled_force_per_slipstream = chord_scaled_force_slopes_with_slipstream[-1]
-        force_record["axis_and_force_innovation_per_vane_error"] = (
-            -acceleration_slopes_by_air_data[axis, vane_index_in_y],
-            -chord_scaled_force_slopes[vane_index_in_y],
-        )
-        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index_in_y]
-        force_record["innovation_per_air_rotation"] = chord_scaled_force_slopes[3:]
-        total_chord_scaled_force_slopes = chord_scaled_force_slopes.copy()
-        total_chord_scaled_force_slopes[AIRSPEED] += (
-            chord_scaled_force_per_slipstream * slipstream_per_airspeed
-        )
-        innovation_variance_by_reading = (total_chord_scaled_force_slopes * reading_noise_std) ** 2
-        force_prediction_noise_variance = (
-            innovation_variance_by_reading.sum()
-            + chord_scaled_force_per_slipstream**2 * slipstream_variance_from_other_readings
-        )
-        force_record["trim_noise_variance_with_without_vane"] = (
-            force_prediction_noise_variance,
-            force_prediction_noise_variance - innovation_variance_by_reading[vane_index_in_y],
-        )
-        accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
-        force_record["accelerometer_innovation_variance"] = (
-            forces["inverse_chord_per_m"] * accelerometer_noise_std
-        ) ** 2
-        _configure_force_regressors_and_tolerances(
-            force_record,
-            declared,
-            terms,
-            y,
-            chord_scaled_force_slopes[vane_index_in_y] / chord_scaled_force_per_coefficient,
-            force_index,
-            forces["inverse_chord_per_m"],
-        )
-        max_chord_scaled_force_per_deflection_rad = chord_scaled_force_per_coefficient * sum(
-            abs(term.value) for term in terms if term.surface
-        )
-        force_record["deflection_error_effect_bound"] = (
-            max_chord_scaled_force_per_deflection_rad * declared.actuators.deflection_rad
-        )
-        force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
-            sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
-        )
-        flow_angle_drift_intensity = (
-            FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
-        ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[
-            vane_index_in_y
-        ] ** 2 * (flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED]))
+    chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1]
+    force_record["axis_and_force_innovation_per_vane_error"] = (
+        -acceleration_slopes_by_air_data[axis, vane_index_in_y],
+        -chord_scaled_force_slopes[vane_index_in_y],
+    )
+    force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index_in_y]
+    force_record["innovation_per_air_rotation"] = chord_scaled_force_slopes[3:]
+    force_record["trim_noise_variance_with_without_vane"] = _force_prediction_noise_variances(
+        fdi, sensor_errors, y, chord_scaled_force_slopes_with_slipstream, vane_index_in_y
+    )
+    accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
+    force_record["accelerometer_innovation_variance"] = (
+        forces["inverse_chord_per_m"] * accelerometer_noise_std
+    ) ** 2
+    _configure_force_regressors_and_tolerances(
+        force_record,
+        declared,
+        terms,
+        y,
+        chord_scaled_force_slopes[vane_index_in_y] / chord_scaled_force_per_coefficient,
+        force_index,
+        forces["inverse_chord_per_m"],
+    )
+    max_chord_scaled_force_per_deflection_rad = chord_scaled_force_per_coefficient * sum(
+        abs(term.value) for term in terms if term.surface
+    )
+    force_record["deflection_error_effect_bound"] = (
+        max_chord_scaled_force_per_deflection_rad * declared.actuators.deflection_rad
+    )
+    force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
+        sensor_errors, gust_config["gravity"], y[AIRSPEED], force_index
+    )
+    flow_angle_drift_intensity = (
+        FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
+    ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
+    force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[vane_index_in_y] ** 2 * (
+        flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
+    )
+
+
+def _force_prediction_noise_variances(
+    fdi: np.void,
+    sensor_errors: SensorErrors,
+    y: np.ndarray,
+    chord_scaled_force_slopes_with_slipstream: np.ndarray,
+    vane_index_in_y: int,
+) -> tuple[float, float]:
+    """Variance of a predicted force by the noise of all readings, and without that of its vane."""
+    chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1].copy()
+    chord_scaled_force_per_slipstream = chord_scaled_force_slopes_with_slipstream[-1]
+    slipstream_slope_per_airspeed, slipstream_variance_from_other_readings = (
+        _slipstream_slope_and_noise_variance(y, fdi["bound"]["declared_errors"], sensor_errors)
+    )
+    chord_scaled_force_slopes[AIRSPEED] += chord_scaled_force_per_slipstream * slipstream_slope_per_airspeed
+    innovation_variance_by_reading = (
+        chord_scaled_force_slopes * sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
+    ) ** 2
+    total_variance = (
+        innovation_variance_by_reading.sum()
+        + chord_scaled_force_per_slipstream**2 * slipstream_variance_from_other_readings
+    )
+    return total_variance, total_variance - innovation_variance_by_reading[vane_index_in_y]
 
 
 def _slipstream_slope_and_noise_variance(
@@ -367,13 +391,13 @@ def _slipstream_slope_and_noise_variance(
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
     if not declared_errors["has_engine_instrument_errors"]:
         return 0.0, 0.0
-    slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
+    slipstream_slope_per_airspeed, slipstream_per_pressure, slipstream_slope_per_kw = slipstream_slopes(
         y, declared_errors["power_error_kw_per_density_ratio"]
     )
     power_noise_kw = declared_errors["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
-    return slipstream_per_airspeed, float(
+    return slipstream_slope_per_airspeed, float(
         (slipstream_per_pressure * sensor_errors["qdyn"].random) ** 2
-        + (slipstream_per_kw * power_noise_kw) ** 2
+        + (slipstream_slope_per_kw * power_noise_kw) ** 2
     )
 
 

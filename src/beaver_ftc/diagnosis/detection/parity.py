@@ -136,17 +136,17 @@ def tone_tests_dtype(n_regressors: int) -> np.dtype:
 
 
 @kernel
-def is_within_envelope(tone_config, y):
+def is_within_envelope(tone_test_config, y):
     """True if airspeed and vane angles y (5,) are near those of normal flight.
 
     Outside, the tolerances of the tests, which are worked out for trim, do not hold.
     """
-    is_airspeed_within = tone_config.min_airspeed < y[AIRSPEED] < tone_config.max_airspeed
+    is_airspeed_within = tone_test_config.min_airspeed < y[AIRSPEED] < tone_test_config.max_airspeed
     return is_airspeed_within and abs(y[ALPHA]) < MAX_VANE_ANGLE_RAD and abs(y[BETA]) < MAX_VANE_ANGLE_RAD
 
 
 @kernel
-def update_tone_tests(view, tone_config, detector_alarm_level, is_inside_envelope, uses_regressors, dt):
+def update_tone_tests(view, tone_test_config, detector_alarm_level, is_inside_envelope, uses_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
     uses_regressors: whether the regressors of the block count. Without `is_inside_envelope` the frame counts
@@ -159,33 +159,33 @@ def update_tone_tests(view, tone_config, detector_alarm_level, is_inside_envelop
     for j in range(n_regressors):
         tone_tests.normalised_regressor_sums[j] += inverse_innovation_std * block.regressor_response[j, 0]
     tone_tests.frames_since_update += 1
-    if tone_tests.frames_since_update < tone_config.frames_per_update:
+    if tone_tests.frames_since_update < tone_test_config.frames_per_update:
         return
-    advance_resonators(tone_config, tone_tests.correlation, tone_tests.normalised_innovation_sum)
+    advance_resonators(tone_test_config, tone_tests.correlation, tone_tests.normalised_innovation_sum)
     for j in range(n_regressors):
         advance_resonators(
-            tone_config, tone_tests.regressor_correlation[j], tone_tests.normalised_regressor_sums[j]
+            tone_test_config, tone_tests.regressor_correlation[j], tone_tests.normalised_regressor_sums[j]
         )
         tone_tests.normalised_regressor_sums[j] = 0.0
     tone_tests.correlation_variance = (
-        tone_config.sum_decay_factor_per_update
-        * tone_config.sum_decay_factor_per_update
+        tone_test_config.sum_decay_factor_per_update
+        * tone_test_config.sum_decay_factor_per_update
         * tone_tests.correlation_variance
         + tone_tests.frames_since_update
     )
     update_max_correlation_by_uncertainty(
-        tone_tests, tone_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
+        tone_tests, tone_test_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
     )
     fill_max_correlation_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
-    fill_max_tone_score(tone_tests, tone_config, detector_alarm_level)
+    fill_max_tone_score(tone_tests, tone_test_config, detector_alarm_level)
     tone_tests.normalised_innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
 
 @kernel
-def advance_resonators(tone_config, resonator_state, input_sum):
+def advance_resonators(tone_test_config, resonator_state, input_sum):
     """Advance N at every frequency, resonator_state (2, N_TONE_FREQUENCIES), by one update: rotate, decay,
     add the drive."""
-    decayed_rotation = tone_config.decayed_rotation_per_update
+    decayed_rotation = tone_test_config.decayed_rotation_per_update
     for frequency_index in range(resonator_state.shape[1]):
         previous_state_real = resonator_state[0, frequency_index]
         previous_state_imaginary = resonator_state[1, frequency_index]
@@ -224,7 +224,7 @@ def whitened_unit_tone_amplitude(
 
 @kernel
 def update_max_correlation_by_uncertainty(
-    tone_tests, tone_config, block, uncertainty_bound_over_innovation_std, dt
+    tone_tests, tone_test_config, block, uncertainty_bound_over_innovation_std, dt
 ):
     """Update `max_correlation_by_uncertainty`: the most that a bounded uncertainty adds to |N|.
 
@@ -232,12 +232,12 @@ def update_max_correlation_by_uncertainty(
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
-    decayed_double_rotation = tone_config.decayed_double_rotation_per_update
-    sum_decay_factor = tone_config.sum_decay_factor_per_update
+    decayed_double_rotation = tone_test_config.decayed_double_rotation_per_update
+    sum_decay_factor = tone_test_config.sum_decay_factor_per_update
     normalised_bound_sum_since_update = uncertainty_bound_over_innovation_std * tone_tests.frames_since_update
     for frequency_index in range(tone_tests.max_correlation_by_uncertainty.size):
-        cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
-        sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
+        cos_phase_change = tone_test_config.phase_rotation_per_frame[0, frequency_index]
+        sin_phase_change = tone_test_config.phase_rotation_per_frame[1, frequency_index]
         whitened_bound_sum_since_update = normalised_bound_sum_since_update * whitened_unit_tone_amplitude(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
@@ -259,7 +259,7 @@ def update_max_correlation_by_uncertainty(
             + whitened_bound_sum_since_update
         )
         tone_tests.max_correlation_by_uncertainty[frequency_index] = (
-            tone_config.max_tone_mean_of_unit_uncertainty[frequency_index]
+            tone_test_config.max_tone_mean_of_unit_uncertainty[frequency_index]
             * (
                 tone_tests.filtered_bound_sum[frequency_index]
                 + np.hypot(
@@ -292,7 +292,7 @@ def fill_max_correlation_by_coefficient_errors(tone_tests, coefficient_error_bou
 
 
 @kernel
-def fill_max_tone_score(tone_tests, tone_config, detector_alarm_level):
+def fill_max_tone_score(tone_tests, tone_test_config, detector_alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
     for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
@@ -301,19 +301,20 @@ def fill_max_tone_score(tone_tests, tone_config, detector_alarm_level):
             - tone_tests.max_correlation_by_coefficient_errors[frequency_index]
         )
         larger_part_variance = (
-            tone_config.larger_complex_part_variance_share[frequency_index] * tone_tests.correlation_variance
+            tone_test_config.larger_complex_part_variance_share[frequency_index]
+            * tone_tests.correlation_variance
         )
         max_score = max(
             max_score,
             evidence_over_noise_and_uncertainty(
-                tone_config.alarm_level,
+                tone_test_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
                 tone_tests.max_correlation_by_uncertainty[frequency_index],
                 larger_part_variance,
             ),
         )
-    tone_tests.score = max_score * detector_alarm_level / tone_config.alarm_level
+    tone_tests.score = max_score * detector_alarm_level / tone_test_config.alarm_level
 
 
 def derive_max_tone_mean_of_uncertainty(
@@ -334,7 +335,7 @@ def derive_max_tone_mean_of_uncertainty(
 
 
 def configure_tone_tests(
-    tone_config: np.void,
+    tone_test_config: np.void,
     false_alarm_probability_per_test_frame: float,
     airspeed_mps: float,
     uncertainty_change_rate_per_s: float,
@@ -346,23 +347,23 @@ def configure_tone_tests(
     airspeed_mps: in trim. uncertainty_change_rate_per_s: largest rate of change of a bounded uncertainty, in
     bounds per second.
     """
-    tone_config["max_tone_mean_of_unit_uncertainty"] = derive_max_tone_mean_of_uncertainty(
+    tone_test_config["max_tone_mean_of_unit_uncertainty"] = derive_max_tone_mean_of_uncertainty(
         TONE_FREQUENCIES_RAD_S, uncertainty_change_rate_per_s
     )
-    tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_FACTOR_FROM_TRIM
-    tone_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_FACTOR_FROM_TRIM
+    tone_test_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_FACTOR_FROM_TRIM
+    tone_test_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_FACTOR_FROM_TRIM
     frames_per_update = max(round(TONE_UPDATE_INTERVAL_S / dt_s), 1)
     phase_per_frame_rad = TONE_FREQUENCIES_RAD_S * dt_s
     sum_decay_factor_per_update = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
-    tone_config["frames_per_update"] = frames_per_update
-    tone_config["sum_decay_factor_per_update"] = sum_decay_factor_per_update
-    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability_per_test_frame))
-    tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame_rad), np.sin(phase_per_frame_rad)
-    tone_config["decayed_rotation_per_update"] = (
+    tone_test_config["frames_per_update"] = frames_per_update
+    tone_test_config["sum_decay_factor_per_update"] = sum_decay_factor_per_update
+    tone_test_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability_per_test_frame))
+    tone_test_config["phase_rotation_per_frame"] = np.cos(phase_per_frame_rad), np.sin(phase_per_frame_rad)
+    tone_test_config["decayed_rotation_per_update"] = (
         sum_decay_factor_per_update * np.cos(frames_per_update * phase_per_frame_rad),
         sum_decay_factor_per_update * np.sin(frames_per_update * phase_per_frame_rad),
     )
-    tone_config["decayed_double_rotation_per_update"] = (
+    tone_test_config["decayed_double_rotation_per_update"] = (
         sum_decay_factor_per_update * np.cos(2.0 * frames_per_update * phase_per_frame_rad),
         sum_decay_factor_per_update * np.sin(2.0 * frames_per_update * phase_per_frame_rad),
     )
@@ -370,7 +371,7 @@ def configure_tone_tests(
     relative_variance_difference = (1.0 - sum_decay_factor_per_update**2) / np.abs(
         1.0 - sum_decay_factor_per_update**2 * np.exp(2j * frames_per_update * phase_per_frame_rad)
     )
-    tone_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + relative_variance_difference)
+    tone_test_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + relative_variance_difference)
 
 
 VANE_EFFECT_RELATIVE_TOLERANCE = (
@@ -743,9 +744,9 @@ def fill_view_innovations_noise_regressors(
 
 
 @kernel
-def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_alarm_latched):
+def update_view_tests(views, test_config, tone_test_config, y, dt, frame_index, is_alarm_latched):
     """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
-    is_inside_envelope = is_within_envelope(tone_config, y)
+    is_inside_envelope = is_within_envelope(tone_test_config, y)
     evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
     onset_slot = likelihood.onset_slot_restarting_at_frame(frame_index)
     for view in views:
@@ -762,7 +763,7 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_al
             not view.uses_inertial_flow_angle
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
             update_tone_tests(
-                view, tone_config, test_config.alarm_level, is_inside_envelope, uses_regressors, dt
+                view, tone_test_config, test_config.alarm_level, is_inside_envelope, uses_regressors, dt
             )
         view.decaying_peak_score = max(
             (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
@@ -979,94 +980,103 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
 def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    separable_surface_indices_by_force = [
-        aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
-        for force_index in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
-    ]
     subtracts_gust_estimate_from_rates = (
         forces["in_use"]
         and statistical["gust"]["output"]["accounts_for_gusts"]
-        and all(separable_surface_indices_by_force)
+        and all(
+            aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+            for force_index in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
+        )
     )
-    parity_directions = list(iterate_parity_directions(aircraft, bool(forces["in_use"])))[
-        : len(statistical["views"])
-    ]
-    statistical["n_views"] = len(parity_directions)
-    for view, (
-        orthogonal_to_surface,
-        initial_direction,
-        plane_axes,
-        loss_tested_surface_indices,
-        uses_inertial_flow_angle,
-        may_use_vane_gust_estimate,
-    ) in zip(statistical["views"], parity_directions, strict=False):
-        view["orthogonal_to_surface"], view["direction"], view["plane_axes"], block = (
-            orthogonal_to_surface,
-            initial_direction,
-            plane_axes,
-            view["block"],
-        )
-        view["alarm_axis"] = (
-            initial_direction.index(1.0)
-            if orthogonal_to_surface == AXIS_VIEW and not uses_inertial_flow_angle
-            else plane_axes[0]
-        )
-        rate_block = statistical["block"][
-            PITCH_BLOCK if plane_axes == PITCH_AND_NORMAL_FORCE else LATERAL_BLOCK
-        ]
-        # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
-        # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
-        is_pitch_view_in_gusts = (
-            statistical["gust"]["output"]["accounts_for_gusts"] and initial_direction[PITCH]
-        )
-        loss_surface_indices = (
-            [] if is_pitch_view_in_gusts else loss_tested_surface_indices[: len(block["hypothesis"]) - 1]
-        )
-        hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surface_indices)]
-        n_regressors_so_far = int(rate_block["n_regressors"])
-        block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(hypothesis_kinds), 1.0
-        block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
-        block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
-        for field_name in (
-            "alarm_level",
-            "noise_share_of_alarm_level",
-            "uncertainty_change_over_bound_per_frame",
-        ):
-            block[field_name] = rate_block[field_name]
-        block["regressor_tolerance"][:n_regressors_so_far] = rate_block["regressor_tolerance"][
-            :n_regressors_so_far
-        ]
-        if may_use_vane_gust_estimate and subtracts_gust_estimate_from_rates:
+    parity_directions = list(iterate_parity_directions(aircraft, bool(forces["in_use"])))
+    statistical["n_views"] = min(len(parity_directions), len(statistical["views"]))
+    for view, parity_direction in zip(statistical["views"], parity_directions, strict=False):
+        if subtracts_gust_estimate_from_rates and parity_direction.may_use_vane_gust_estimate:
             view["confirming_force_component"] = (
-                NORMAL_FORCE if plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
+                NORMAL_FORCE if parity_direction.plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
             )
-        if any(initial_direction[SIDE_FORCE:]):
-            force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
-            view["confirming_force_component"] = plane_axes[1]
-            view["always_uses_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
-            block["regressor_tolerance"][n_regressors_so_far : n_regressors_so_far + n_force_regressors] = (
-                force_record["regressor_tolerance"][:n_force_regressors]
-            )
-            n_regressors_so_far += n_force_regressors
-            if uses_inertial_flow_angle:
-                block["regressor_tolerance"][n_regressors_so_far] = force_record["flow_angle_drift_bound"]
-                n_regressors_so_far = n_regressors_so_far + 1
-        block["n_regressors"] = n_regressors_so_far + (orthogonal_to_surface != AXIS_VIEW)
-        block["regressor_tolerance"][n_regressors_so_far] = float(
-            orthogonal_to_surface != AXIS_VIEW
-        )  # of the leak, which is worked out in flight
-        hypotheses = block["hypothesis"][: len(hypothesis_kinds)]
-        hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surface_indices]
-        view["is_orthogonal_to_rolling_gust"] = (
-            orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
-            and plane_axes == YAW_AND_SIDE_FORCE
-            and statistical["gust"]["output"]["accounts_for_gusts"]
+        _configure_view(view, parity_direction, statistical)
+        rate_block = statistical["block"][
+            PITCH_BLOCK if parity_direction.plane_axes == PITCH_AND_NORMAL_FORCE else LATERAL_BLOCK
+        ]
+        _configure_view_filter(view["block"], rate_block)
+        _configure_view_regressors(view, parity_direction, rate_block, forces)
+        _configure_view_hypotheses(
+            view["block"], parity_direction, bool(statistical["gust"]["output"]["accounts_for_gusts"])
         )
-        view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
-        view["is_immune_to_vane_error"] = (
-            uses_inertial_flow_angle or orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
-        )
-        likelihood.set_supporting_correlation_signs(block, hypothesis_kinds)
+
+
+def _configure_view(view: np.void, parity_direction: ParityDirection, statistical: np.void) -> None:
+    """Fill the direction of a view, the axis that its alarm names, and which errors it does not see."""
+    is_axis_view = parity_direction.orthogonal_to_surface == AXIS_VIEW
+    is_orthogonal_to_vane_error = parity_direction.orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
+    view["orthogonal_to_surface"] = parity_direction.orthogonal_to_surface
+    view["direction"], view["plane_axes"] = parity_direction.initial_direction, parity_direction.plane_axes
+    view["alarm_axis"] = (
+        parity_direction.initial_direction.index(1.0)
+        if is_axis_view and not parity_direction.uses_inertial_flow_angle
+        else parity_direction.plane_axes[0]
+    )
+    view["is_orthogonal_to_rolling_gust"] = (
+        is_orthogonal_to_vane_error
+        and parity_direction.plane_axes == YAW_AND_SIDE_FORCE
+        and statistical["gust"]["output"]["accounts_for_gusts"]
+    )
+    view["uses_inertial_flow_angle"] = parity_direction.uses_inertial_flow_angle
+    view["is_immune_to_vane_error"] = parity_direction.uses_inertial_flow_angle or is_orthogonal_to_vane_error
+    if any(parity_direction.initial_direction[SIDE_FORCE:]):
+        view["confirming_force_component"] = parity_direction.plane_axes[1]
+        view["always_uses_regressors"] = 1
+
+
+def _configure_view_filter(block: np.void, rate_block: np.void) -> None:
+    """Fill the filter of a view's block, of one axis, from the block of the rates that the view combines."""
+    block["n_axes"], block["drift_decay_factor"] = 1, 1.0
+    block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
+    block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
+    for field_name in (
+        "alarm_level",
+        "noise_share_of_alarm_level",
+        "uncertainty_change_over_bound_per_frame",
+    ):
+        block[field_name] = rate_block[field_name]
+
+
+def _configure_view_regressors(
+    view: np.void, parity_direction: ParityDirection, rate_block: np.void, forces: np.void
+) -> None:
+    """Fill the tolerances of a view's regressors: those of its rates, of its force, of the flow angle from
+    inertial motion, and that of the leak, which is worked out in flight."""
+    tolerances = [rate_block["regressor_tolerance"][: rate_block["n_regressors"]]]
+    if any(parity_direction.initial_direction[SIDE_FORCE:]):
+        force_record = forces["component"][parity_direction.plane_axes[1] - SIDE_FORCE]
+        tolerances.append(force_record["regressor_tolerance"][: force_record["n_regressors"]])
+        if parity_direction.uses_inertial_flow_angle:
+            tolerances.append([force_record["flow_angle_drift_bound"]])
+    if parity_direction.orthogonal_to_surface != AXIS_VIEW:
+        tolerances.append([1.0])
+    every_tolerance = np.concatenate(tolerances)
+    view["block"]["n_regressors"] = len(every_tolerance)
+    view["block"]["regressor_tolerance"][: len(every_tolerance)] = every_tolerance
+
+
+def _configure_view_hypotheses(
+    block: np.void, parity_direction: ParityDirection, accounts_for_gusts: bool
+) -> None:
+    """Fill the hypotheses of a view: a step of its innovation, and a loss of each surface that it tests."""
+    # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
+    # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
+    is_pitch_view_in_gusts = accounts_for_gusts and parity_direction.initial_direction[PITCH]
+    loss_surface_indices = (
+        []
+        if is_pitch_view_in_gusts
+        else list(parity_direction.loss_tested_surface_indices[: len(block["hypothesis"]) - 1])
+    )
+    hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surface_indices)]
+    block["n_hypotheses"] = len(hypothesis_kinds)
+    hypotheses = block["hypothesis"][: len(hypothesis_kinds)]
+    hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surface_indices]
+    likelihood.set_supporting_correlation_signs(block, hypothesis_kinds)
 
 
 @kernel

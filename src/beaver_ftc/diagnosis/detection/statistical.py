@@ -220,34 +220,23 @@ def configure_statistical_detector(
     test_config, gust_estimate, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
     sensor_errors, dt_s = declared.sensors, 1.0 / rate_hz
     n_instants_per_frame = int(fdi["config"]["n_substeps"])
+    test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
     airspeed_mps = float(trim[1][AIRSPEED])
     frame_uncertainty_change_over_bound = uncertainty_change_over_bound_per_frame(
         statistical_settings, aircraft, dt_s
     )
-    test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
-    test_config["non_loss_llr_bounds_include_uncertainty"] = (
-        aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
-    )
-    statistical["forces"]["in_use"] = compares_accelerometers_with_forces = declared.uses_accelerometers
+    statistical["forces"]["in_use"] = declared.uses_accelerometers
     gust_estimate["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust_estimate, declared, mass_properties)
     uses_parity_views = fdi_config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
         aircraft,
-        *(
-            iterate_parity_directions(aircraft, compares_accelerometers_with_forces)
-            if uses_parity_views
-            else ()
-        ),
+        *(iterate_parity_directions(aircraft, declared.uses_accelerometers) if uses_parity_views else ()),
     )
-    test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
+    _configure_levels(test_config, fdi_config, aircraft, n_tests, rate_hz)
     configure_gust_velocity_and_speed_error(
         gust_estimate, declared, float(test_config["alarm_level"]), airspeed_mps
     )
-    test_config["isolation_llr_margin"] = derive_isolation_llr_margin(
-        statistical_settings.misnaming, rate_hz, aircraft
-    )
-    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * fdi_config.forgetting_time_s))
     _configure_blocks(statistical, sensor_errors, aircraft)
     _configure_uncertainty_and_loss_growth(
         statistical, fdi_config, declared, frame_uncertainty_change_over_bound, dt_s
@@ -269,62 +258,82 @@ def configure_statistical_detector(
     _configure_regressor_tolerances(statistical, aircraft, absolute_term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
-        false_alarm_probability_per_test_frame = statistical_settings.false_alarms_per_h / (
-            3600.0 * rate_hz * n_tests
-        )
         configure_tone_tests(
-            statistical["tone_config"],
-            false_alarm_probability_per_test_frame,
+            statistical["tone_test_config"],
+            statistical_settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests),
             airspeed_mps,
             frame_uncertainty_change_over_bound * rate_hz,
             dt_s,
         )
-        if compares_accelerometers_with_forces:
-            acceleration_slopes_by_air_data = jacobian(design_model, *trim)[3]
-            configure_forces(fdi, declared, trim, acceleration_slopes_by_air_data, dt_s)
-            gust_estimate["output"][
-                "uses_accelerometers"
-            ] = not declared.monitors_sensors  # the monitor may find them broken
-            statistical["inertial_gust"] = gust_estimate
-            statistical["inertial_gust"]["output"]["accounts_for_gusts"] *= gust_estimate["output"][
-                "uses_accelerometers"
-            ]
-            statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
-                np.add(MIN_UNMEASURED_GUST_INTENSITY_SHARES, UNMEASURED_SHARE_FROM_FORCE_ERROR), 1.0
-            )
+        if declared.uses_accelerometers:
+            configure_forces(fdi, declared, trim, jacobian(design_model, *trim)[3], dt_s)
+            _configure_inertial_gust_estimate(statistical, declared)
         configure_parity_views(statistical, aircraft)
+    _configure_drift_correlation_lengths(statistical, airspeed_mps, rate_hz)
+    if gust_estimate["output"]["accounts_for_gusts"]:
+        # the filters that assume no gust: they trim as the others, with a drift in any direction
+        for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
+            statistical["block"]["no_gust_filter"][field_name] = statistical["block"][field_name]
+        fill_and_add_gust_estimate_noise(statistical, sensor_errors, design_model, *trim[1:], dt_s)
+
+
+def _configure_levels(
+    test_config: np.void, fdi_config: FdiConfig, aircraft: Aircraft, n_tests: int, rate_hz: float
+) -> None:
+    """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
+    settings = fdi_config.statistical
+    assert settings is not None
+    test_config["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
+    test_config["isolation_llr_margin"] = derive_isolation_llr_margin(settings.misnaming, rate_hz, aircraft)
+    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * fdi_config.forgetting_time_s))
+    test_config["non_loss_llr_bounds_include_uncertainty"] = (
+        aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    )
+
+
+def _configure_inertial_gust_estimate(statistical: np.void, declared: Declared) -> None:
+    """Fill the gust estimate of the views that use the accelerometers in place of the vanes."""
+    gust_estimate = statistical["gust"]
+    # the monitor of the sensors may find the accelerometers broken
+    gust_estimate["output"]["uses_accelerometers"] = not declared.monitors_sensors
+    statistical["inertial_gust"] = gust_estimate
+    inertial_gust = statistical["inertial_gust"]
+    inertial_gust["output"]["accounts_for_gusts"] *= gust_estimate["output"]["uses_accelerometers"]
+    inertial_gust["memory"]["unmeasured_intensity_share"] = np.minimum(
+        np.add(MIN_UNMEASURED_GUST_INTENSITY_SHARES, UNMEASURED_SHARE_FROM_FORCE_ERROR), 1.0
+    )
+
+
+def _configure_drift_correlation_lengths(statistical: np.void, airspeed_mps: float, rate_hz: float) -> None:
+    """Fill the correlation length of the drift, m, of the block whose drift reverts to its mean and, where no
+    vane measures the gust, of the pitch block; fill how much of a gust's drift each of them then has."""
+    gust_config, gust_output = statistical["gust"]["config"], statistical["gust"]["output"]
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling_gust_correlation_length_m = (
-        float(gust_estimate["config"]["rolling_gust_correlation_length"])
-        if gust_estimate["output"]["accounts_for_gusts"]
-        else 0.0
+        float(gust_config["rolling_gust_correlation_length"]) if gust_output["accounts_for_gusts"] else 0.0
     )
     gust_correlation_lengths_m = (
-        rotation_lengths(gust_estimate["config"]["wing_span"])
-        if gust_estimate["config"]["has_only_coarse_estimate"]
+        rotation_lengths(gust_config["wing_span"])
+        if gust_config["has_only_coarse_estimate"]
         else [rolling_gust_correlation_length_m]
     )
     mean_reverting_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
         statistical, airspeed_mps, rate_hz, float(min(gust_correlation_lengths_m))
     )
-    if gust_estimate["output"]["accounts_for_gusts"]:
-        # the filters that assume no gust: they trim as the others, with a drift in any direction
-        for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
-            statistical["block"]["no_gust_filter"][field_name] = statistical["block"][field_name]
-        mean_reverting_block["gust_drift_intensity_factor"] = (
-            rolling_gust_correlation_length_m / mean_reverting_block["drift_correlation_length_m"]
-        ) ** 2
-        if not gust_estimate["output"]["is_gust_measured"]:
-            pitching_gust_correlation_length_m = float(
-                rotation_lengths(gust_estimate["config"]["wing_span"])[1]
-            )
-            pitch_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
-                statistical, airspeed_mps, rate_hz, pitching_gust_correlation_length_m
-            )
-            pitch_block["gust_drift_intensity_factor"] = (
-                pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
-            ) ** 2
-        fill_and_add_gust_estimate_noise(statistical, sensor_errors, design_model, *trim[1:], dt_s)
+    if not gust_output["accounts_for_gusts"]:
+        return
+    mean_reverting_block["gust_drift_intensity_factor"] = (
+        rolling_gust_correlation_length_m / mean_reverting_block["drift_correlation_length_m"]
+    ) ** 2
+    if gust_output["is_gust_measured"]:
+        return
+    pitching_gust_correlation_length_m = float(rotation_lengths(gust_config["wing_span"])[1])
+    pitch_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
+        statistical, airspeed_mps, rate_hz, pitching_gust_correlation_length_m
+    )
+    pitch_block["gust_drift_intensity_factor"] = (
+        pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
+    ) ** 2
 
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
@@ -543,12 +552,14 @@ def fill_signal_slopes_for_one_reading(
         for k in range(PH, RH + 1):
             signal_slopes_for_one_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
     if declared_error_record.has_engine_instrument_errors and reading_index >= AIRSPEED:
-        slipstream_per_airspeed, slipstream_per_qdyn, slipstream_per_kw = slipstream_slopes(
+        slipstream_slope_per_airspeed, slipstream_slope_per_qdyn, slipstream_slope_per_kw = slipstream_slopes(
             y, declared_error_record.power_error_kw_per_density_ratio
         )
-        slipstream_per_qdyn_or_kw = slipstream_per_qdyn if reading_index == QDYN else slipstream_per_kw
+        slipstream_slope_per_qdyn_or_kw = (
+            slipstream_slope_per_qdyn if reading_index == QDYN else slipstream_slope_per_kw
+        )
         signal_slopes_for_one_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
-            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_qdyn_or_kw
+            slipstream_slope_per_airspeed if reading_index == AIRSPEED else slipstream_slope_per_qdyn_or_kw
         )
 
 
@@ -677,7 +688,7 @@ def statistical_dtype(record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) ->
         test_config=TEST_CONFIG_RECORD, noise=NOISE_MODEL_RECORD, alarm=ALARM_RECORD,
         block=(block_dtype(record_size.rate_block_capacity), N_FILTER_BLOCKS),
         n_views=int, views=(parity_view_dtype(record_size.view_block_capacity), record_size.n_views),
-        tone_config=TONE_CONFIG_RECORD,
+        tone_test_config=TONE_CONFIG_RECORD,
         forces=MEASURED_FORCES_RECORD, gust=GUST_RECORD, inertial_gust=GUST_RECORD,
     )  # fmt: skip
 

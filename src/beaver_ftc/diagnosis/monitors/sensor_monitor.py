@@ -287,14 +287,16 @@ def update_flow_evidence_since_alarm(monitor, readings):
 def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     memory, j = monitor.memory, monitor.output.alarm_test_index - SPEED_TEST
-    reading_range = memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
+    flow_reading_range_since_alarm = (
+        memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
+    )
     max_residual_sum_without_new_error = (
         memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
     )
     return (
-        reading_range > 0.0
+        flow_reading_range_since_alarm > 0.0
         and abs(memory.flow_residual_sum_since_alarm[j])
-        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range
+        > MIN_RESIDUAL_SUM_PER_READING_RANGE * flow_reading_range_since_alarm
         + MIN_EFFECT_OVER_BOUND_TO_CLEAR * max_residual_sum_without_new_error
     )
 

@@ -418,7 +418,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity.update_view_tests(
         parity_view_records,
         test_config,
-        statistical_detector.tone_config,
+        statistical_detector.tone_test_config,
         y,
         dt,
         k,

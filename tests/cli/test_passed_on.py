@@ -228,7 +228,7 @@ BY_AIRCRAFT = {
     "beaver_ftc_logs__by_aircraft__read_diagnosis_inputs": lambda part, *_: SimpleNamespace(
         name=f"inputs of {part}", samples=f"samples of {part}"
     ),
-    "beaver_ftc_logs__by_aircraft__diagnose_inputs": lambda inputs, _: (
+    "beaver_ftc_logs__by_aircraft__diagnose_aircraft_inputs": lambda inputs, _: (
         f"rows by {inputs.name}", {"flight": inputs.samples},
     ),
     "beaver_ftc_logs__by_aircraft__as_text": lambda each: each["flight"],

@@ -524,6 +524,8 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
         is_group_effect_separable = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
             group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
+            if not len(residual):  # a part without a residual shows no gain
+                continue
             group_responses = group_responses.sum(axis=3)[:, :, is_group_effect_separable].reshape(
                 residual.size, -1
             )
@@ -565,6 +567,8 @@ def _with_noise_inflated_for_gain_errors(
         )
         for held_out in held_out_flights:
             group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
+            if not len(residual):  # a part without a residual shows no gain
+                continue
             group_responses = group_responses[:, :, is_group_effect_separable].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
@@ -922,7 +926,7 @@ def _squared_group_gain_deviations_beyond_noise(model: Model, held_out: FlightWi
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
     group_responses, residual = _standardized_centred_responses_and_residual(model, held_out)
-    group_responses = group_responses.sum(axis=3).reshape(residual.size, -1)
+    group_responses = group_responses.sum(axis=3).reshape(residual.size, len(model.groups))
     squared_deviations_beyond_noise = np.full(group_responses.shape[1], np.nan)
     is_group_effect_separable = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
     information = (

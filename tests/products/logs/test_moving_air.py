@@ -307,3 +307,85 @@ def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):
     )
     for part, cut in zip(whole, short, strict=True):
         np.testing.assert_array_equal(part[:600], cut)
+
+
+def test_noise_by_which_parts_are_compared_is_that_of_the_fit():
+    """Not that taken wider, for which a sample counts as many times less; a filtered sample is C(1) times as
+    large as what was measured."""
+    noise = np.array([[0.0031, -0.0007, 0.0006], [-0.0007, 0.0019, 0.0002], [0.0006, 0.0002, 0.0008]])
+    colour = {"average": [1.0, -0.4], "noise": noise.tolist(), "wider": 1.7}
+    model = small.model(colours=[colour], settings={"power": 0.8})
+    flight = replace(small.flight(model, 9), noise_ma_coefficients=(1.0, -0.4))
+    white, share, size = trust._whitening_sample_share_and_log_noise(flight, model)
+    np.testing.assert_allclose(white @ white.T, np.linalg.inv(noise))
+    assert (share, size) == (
+        pytest.approx(0.8 / 1.7), pytest.approx(0.5 * np.log(np.linalg.det(noise)) - 3.0 * np.log(0.6)),
+    )  # fmt: skip
+    white, share, size = trust._whitening_sample_share_and_log_noise(small.flight(model, 9), model)
+    plain = np.array(model.residual_covariance)
+    np.testing.assert_allclose(white @ white.T, np.linalg.inv(plain))
+    assert (share, size) == (0.8, pytest.approx(0.5 * np.log(np.linalg.det(plain))))
+
+
+BEFORE = np.array([[[0.4, 0.05, -0.03], [0.02, 0.3, 0.07], [-0.06, 0.01, 0.2]]])
+
+
+def by_parts(model, flight, columns, every=1):
+    """Of each quarter of the flight: least squares on trims, answers and columns, four errors either way,
+    and the squares of what is left, by the symmetric root of the noise."""
+    ok, left, answers = unexplained_rates_and_responses(flight, model)
+    shown = np.concatenate([answers, columns], axis=1)
+    rows = np.array([k for k in np.flatnonzero(ok) if k and ok[k - 1]])[::every]
+    size, turn = np.linalg.eigh(np.array(model.noise_models[0].residual_covariance))
+    root = turn @ np.diag(size**-0.5) @ turn.T
+    for part in np.array_split(rows, 4):
+        y = np.concatenate([(left[k] - left[k - 1] @ BEFORE[0]) @ root for k in part])
+        x = np.vstack([
+            np.column_stack([root, ((shown[k] - shown[k - 1] @ BEFORE[0]) @ root).T]) for k in part
+        ])  # fmt: skip
+        value = np.linalg.lstsq(x, y, rcond=None)[0]
+        squares = (y - x @ value) ** 2
+        share = model.settings.effective_sample_share / model.noise_models[0].covariance_inflation
+        errors = np.sqrt(np.diag(np.linalg.inv(x.T @ x)) * squares.mean() / share)
+        yield len(part), value[3:] - 4.0 * errors[3:], value[3:] + 4.0 * errors[3:], squares
+
+
+def test_what_answers_in_every_part_of_a_flight_is_by_least_squares_of_each(monkeypatch):
+    """The largest of upper and the least of lower bounds; of columns beside the answers, which leave the
+    bounds of these as they are. A scale by the median of three squares, which is 2.366 of a right one."""
+    model, _ = in_colour(BEFORE)
+    colours = [model.noise_models[0].model_copy(update={"covariance_inflation": 1.7})]
+    settings = model.settings.model_copy(update={"effective_sample_share": 0.8})
+    model = model.model_copy(update={"noise_models": colours, "settings": settings})
+    flight = small.flight(model, 421, gap=130, lost=((0, 0, 420, 0.7), (1, 200, 300, 0.2)))
+    flight = replace(flight, noise_ma_coefficients=(1.0,))
+    columns, names = trust._rate_contributions_and_column_names(flight, model)
+    bare = [*by_parts(model, flight, columns[:, :0])]
+    beside = [*by_parts(model, flight, columns)]
+    found = trust._bound_gains_over_flight_parts(flight, model)
+    lows, highs = (np.array([part[i] for part in bare]) for i in (1, 2))
+    np.testing.assert_allclose(found.largest_group_gain_upper_bounds, highs.max(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(found.smallest_group_gain_lower_bounds, lows.min(axis=0), rtol=1e-6)
+    tops = 1.0 + np.max([part[2][2:] for part in beside], axis=0)
+    assert found.largest_gain_upper_bound_by_column == {
+        name: pytest.approx(top, rel=1e-6) for name, top in zip(names, tops, strict=True)
+    }
+    scales = [np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366 for part in bare]
+    assert found.min_noise_variance_scale == pytest.approx(min(scales))
+    noise = 0.5 * np.linalg.slogdet(colours[0].residual_covariance)[1]
+    np.testing.assert_allclose(found.sample_log_likelihood_by_part, -noise - 1.5 * np.log(scales))
+    likely, count = trust._part_log_likelihoods_and_sample_count(flight, model)
+    np.testing.assert_allclose(likely, found.sample_log_likelihood_by_part)
+    least = min(part[0] for part in bare)
+    assert (len({part[0] for part in bare}), count) == (2, pytest.approx(least * 0.8 / 1.7))
+    monkeypatch.setattr(trust, "_MAX_COMPARED_SAMPLES", 130)  # of 413 every third
+    monkeypatch.setattr("beaver_ftc_logs.regression._MIN_PART_ROWS_FOR_BOUNDS", 34)
+    likely, count = trust._part_log_likelihoods_and_sample_count(flight, model)
+    scales = [
+        np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366
+        for part in by_parts(model, flight, columns[:, :0], 3)
+    ]
+    np.testing.assert_allclose(likely, -noise - 1.5 * np.log(scales))
+    assert count == pytest.approx(34 * 0.8 / 1.7)
+    monkeypatch.setattr("beaver_ftc_logs.regression._MIN_PART_ROWS_FOR_BOUNDS", 35)
+    assert trust._part_log_likelihoods_and_sample_count(flight, model) is None

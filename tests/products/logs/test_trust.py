@@ -427,16 +427,22 @@ def test_reasons_come_with_their_shares_the_largest_first():
     assert trust.credibility_entry({}, np.array([])) == {"share": 0.0, "reasons": []}
 
 
-@pytest.mark.parametrize(("counted", "says"), [(19.0, None), (19.01, 3), (100.0, 17)])
-def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeypatch, counted, says):
-    """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
+@pytest.mark.parametrize(("counted", "misread", "says"), [
+    (19.0, 0.0, None), (19.01, 0.0, 3), (100.0, 0.0, 17), (38.0, 0.1, None), (38.1, 0.1, 7),
+])  # fmt: skip
+def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeypatch, counted, misread, says):
+    """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit; and by
+    twice of what flights gained that were read as they are."""
     likely = np.array([0.9, 0.3, 0.5, 0.7])
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
     read = [CorrectedLog(*one) for one in (("A", "short"), ("B", "other", 0.1))]
     monkeypatch.setattr(trust, "_part_log_likelihoods_and_sample_count", lambda samples, _: parts[samples])
     monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
-    assert trust._likelier_column_mistake_text("as it is", small.model()) == told
+    model = (
+        small.model(fitted={"commands": [], "rates": [], "misread": misread}) if misread else small.model()
+    )
+    assert trust._likelier_column_mistake_text("as it is", model) == told
     parts["as it is"] = None
     assert trust._likelier_column_mistake_text("as it is", small.model()) is None
 
@@ -516,21 +522,207 @@ def test_the_power_of_a_group_s_effect_is_in_variances_of_correlated_noise(model
     """Commands that nothing else makes up: e = B u of each lag, and the mean of e' N^-1 e about its mean."""
     root = np.array([[0.05, 0.0, 0.0], [0.03, 0.03, 0.0], [-0.01, 0.01, 0.015]])
     correlated = small.model(noise=(root @ root.T).tolist())
-    flown = small.flight(correlated, n=1500, seed=6)
-    power, unexplained = trust._effect_and_unexplained_powers([(flown, np.ones(1500, bool))], correlated)
-    reach = max(correlated.n_rate_lags, correlated.n_command_lags)
+    flights = [small.flight(correlated, n=n, seed=n, lost=((0, 50, 90, 0.4),)) for n in (300, 400)]
+    used = [np.arange(len(flown.t_s)) % 50 > 7 for flown in flights]
+    power, unexplained = trust._effect_and_unexplained_powers(
+        list(zip(flights, used, strict=True)), correlated
+    )
+    rows = [(f, k) for f, use in enumerate(used) for k in np.flatnonzero(use) if k >= 3]
+    moved = [flown.commands * flown.labels for flown in flights]
+    lagged = np.array([[moved[f][k - j] for j in (1, 2, 3)] for f, k in rows])
+    past = np.array([[*flights[f].rates[k - 1], *flights[f].rates[k - 2]] for f, k in rows])
+    inverse = np.linalg.inv(correlated.residual_covariance)
     for g in range(2):
-        lagged = [flown.commands[reach - j : 1500 - j] for j in range(1, 4)]
-        effect = sum(
-            np.outer(u[:, g], b) for u, b in zip(lagged, correlated.command_response[g], strict=True)
-        )
+        effect = lagged[:, :, g] @ np.array(correlated.command_response[g])
         effect -= effect.mean(axis=0)
-        weighted = np.einsum("ki,ij,kj->k", effect, np.linalg.inv(correlated.residual_covariance), effect)
-        assert power[g] == pytest.approx(weighted.mean(), rel=1e-9)
-        assert 0.0 < unexplained[g] <= power[g]
+        others = np.column_stack([np.ones(len(rows)), past, lagged[:, :, 1 - g]])
+        left = effect - others @ np.linalg.lstsq(others, effect, rcond=None)[0]
+        for found, shown in ((power, effect), (unexplained, left)):
+            weighted = np.einsum("ki,ij,kj->k", shown, inverse, shown)
+            assert found[g] == pytest.approx(weighted.mean(), rel=1e-9)
+    both = list(zip(flights, used, strict=True))
+    np.testing.assert_array_equal(
+        trust.effect_power_unexplained_by_other_regressors(both, correlated), unexplained
+    )
+
+
+def test_of_a_strong_effect_a_fiftieth_that_is_left_counts_as_that_of_one_of_12_variances(monkeypatch):
+    """Powers of an effect, and of what is left; one that is left whole, one that did not move."""
+    powers = np.array([30.0, 5.0, 30.0, 1e-7, 1.1e-6]), np.array([0.25, 0.05, 20.0, 0.0, 0.88e-6])
+    monkeypatch.setattr(trust, "_effect_and_unexplained_powers", lambda of, model: powers)
+    found = trust.effect_share_explained_by_other_regressors([], None)
+    np.testing.assert_allclose(found, [0.98, 0.99, 0.0, 1.0, 0.2])
 
 
 def test_a_value_that_is_missing_is_not_outside():
     values = np.array([1.9, 2.0, 3.0, 5.0, 5.1, np.nan])
     within = trust._is_within_or_unknown(values, 2.0, 5.0)
     assert within.tolist() == [False, True, True, True, False, True]
+
+
+def test_what_a_model_was_fitted_on_is_of_the_rows_in_use(monkeypatch):
+    """Two flights at other rates, of which one has an airspeed; every figure by numpy's own functions."""
+    model, rng = small.model(small.TAIL), np.random.default_rng(9)
+    one, other = (small.flight(model, n=n, seed=n) for n in (300, 200))
+    commands = one.commands + rng.uniform(-0.3, 0.5, (300, 3))
+    rates = np.where(rng.uniform(size=(300, 3)) < 0.1, np.nan, one.rates + np.arange(1.0, 4.0))
+    speeds = np.where(np.arange(300) % 7 == 3, np.nan, 20.0 + 0.01 * np.arange(300))
+    climbs = np.linspace(-4.0, 7.0, 200) ** 3
+    one = replace(one, commands=commands, rates=rates, airspeed=speeds)
+    still = {"roll": np.array([0.3, 0.7])}
+    other = replace(other, dt_s=0.25, energy_height_rate_mps=climbs, time_since_change_s_by_column=still)
+    used = [np.arange(300) > 40, np.arange(200) % 3 > 0]
+    monkeypatch.setattr(
+        trust, "effect_share_explained_by_other_regressors", lambda of, its: np.array([0.31, 0.42])
+    )
+    flights = list(zip((one, other), used, strict=True))
+    found = trust.compute_fitted_ranges(flights, model, np.array([0.05, 0.06]), 2.5)
+    rates, commands = (
+        np.vstack([getattr(flight, what)[use] for flight, use in flights]) for what in ("rates", "commands")
+    )
+
+    def reach(values):
+        known = values[np.isfinite(values)]
+        return pytest.approx(np.quantile(known, [0.001, 0.999]))
+
+    assert found.command_ranges == [reach(column) for column in commands.T]
+    assert found.rate_ranges_rad_s == [reach(column) for column in rates.T]
+    assert found.airspeed_range_mps == reach(speeds[used[0]])
+    known = [column[np.isfinite(column)] for column in rates.T]
+    assert found.rate_sd_rad_s == pytest.approx([column.std() for column in known])
+    groups = np.column_stack([commands[:, 0] + commands[:, 2], commands[:, 1]])
+    np.testing.assert_allclose(found.group_command_correlation, np.corrcoef(groups.T))
+    assert (found.effect_share_explained_by_other_regressors, found.group_gain_standard_error) == (
+        [0.31, 0.42], [0.05, 0.06],
+    )  # fmt: skip
+    assert (found.longest_unchanged_time_s_by_column, found.max_noise_variance_scale) == ({"roll": 0.7}, 2.5)
+    assert found.unpowered_energy_height_rate_mps == pytest.approx(np.quantile(climbs[used[1]], 0.15))
+    assert found.fitted_minutes == pytest.approx((259 * 0.1 + used[1].sum() * 0.25) / 60.0)
+    assert trust.compute_fitted_ranges(flights[1:], model, np.ones(2), 1.0).airspeed_range_mps is None
+
+
+SD = np.array([0.7, 1.3, 0.4])
+
+
+@pytest.mark.parametrize(("factors", "says"), [
+    ([57.3 * 2.5] * 3, r"143 times .* rad/s; a factor of 0\.01745 \(`unit: deg/s`\) fits"),
+    ([57.3 * 2.6] * 3, None), ([57.3 / 2.6] * 3, None),
+    ([57.3 / 2.5] * 3, r"22\.9 times .* a factor of 0\.01745 \(`unit: deg/s`\) fits"),
+    ([5730.0] * 3, r"5\.73e\+03 times .* a factor of 0\.0001745 \(`unit: cdeg/s`\) fits"),
+    ([1000.0] * 3, r"1e\+03 times .* a factor of 0\.001 \(`unit: mrad/s`\) fits"),
+    ([2.5 / 57.3] * 3, r"0\.0436 times .* a factor of 57\.3 fits: the model's own were in deg/s\?"),
+    ([2.6 / 57.3] * 3, None),
+    ([1.0 / 5730.0] * 3, r"a factor of 5730 fits: the model's own were in cdeg/s\?"),
+    ([0.0009] * 3, r"a factor of 1000 fits: the model's own were in mrad/s\?"),
+    ([57.3, 9.9 * 57.3, 57.3], r"123 times .*deg/s`\) fits"), ([57.3, 10.1 * 57.3, 57.3], None),
+    ([0.1 / 57.3, 1.0 / 57.3, 1.1 / 57.3], None), ([0.12 / 57.3, 1.1 / 57.3, 1.1 / 57.3], "in deg/s"),
+])  # fmt: skip
+def test_rates_are_in_another_unit_where_all_axes_spread_by_about_its_factor(factors, says):
+    """Within 2.56 of it, in the geometric mean of the axes, which are within ten of one another."""
+    rates = np.random.default_rng(3).standard_normal((300, 3))
+    rates = (rates - rates.mean(axis=0)) / rates.std(axis=0) * SD * factors + 5.0
+    fitted = FittedRanges(commands=[], rates=[], spread=SD.tolist())
+    flight = small.flight(small.model(), 300, rates=rates)
+    if says is None:
+        trust.refuse_rates_in_other_unit(flight, fitted)
+        return
+    with pytest.raises(BadInput, match=f"^small: rates spread .*{says}"):
+        trust.refuse_rates_in_other_unit(flight, fitted)
+
+
+@pytest.mark.parametrize(("value", "credible"), [
+    (16.9, False), (17.1, True), (34.4, True), (34.6, False), (np.nan, True),
+])  # fmt: skip
+def test_the_airspeed_may_be_15_percent_beyond_either_end(value, credible):
+    model = small.model(fitted={"commands": [], "rates": [], "airspeed": [20.0, 30.0]})
+    flight = small.flight(model, 20, airspeed=np.full(20, value))
+    says = "airspeed is outside 20 to 30, where the model was fitted"
+    assert list(trust.rows_not_credible_by_reason(flight, model)) == ([] if credible else [says])
+    assert trust.rows_not_credible_by_reason(replace(flight, airspeed=None), model) == {}
+
+
+def test_of_a_column_that_stands_still_the_rates_are_not_read():
+    model = small.model()
+    still = {"p_rad_s": np.where(np.arange(9) == 4, 1.6, 0.0)}
+    flight = small.flight(model, 9, time_since_change_s_by_column=still)
+    found = trust.with_rates_unknown_where_frozen_or_clipped(flight, model)
+    assert np.flatnonzero(np.isnan(found.rates).all(axis=1)).tolist() == [4]
+    np.testing.assert_array_equal(np.delete(found.rates, 4, axis=0), np.delete(flight.rates, 4, axis=0))
+    moving = replace(flight, time_since_change_s_by_column={})
+    assert trust.with_rates_unknown_where_frozen_or_clipped(moving, model) is moving
+
+
+@pytest.mark.parametrize(("laws", "tied", "known"), [
+    (True, [0.3, 0.4], [True, False]), (True, [0.99, 0.4], [False, False]),
+    (False, [0.3, 0.99], [True, False]), (False, [0.3, 0.4], [True, True]),
+])  # fmt: skip
+def test_under_any_law_a_gain_is_known_where_four_errors_are_less_than_it(laws, tied, known):
+    fitted = {"commands": [], "rates": [], "tied": tied, "gain_sd": [0.249, 0.25]}
+    assert trust.is_group_gain_known(small.model(small.WING | {"other_laws": laws}, fitted=fitted)) == known
+    del fitted["gain_sd"]
+    bare = small.model(small.WING | {"other_laws": laws}, fitted=fitted)
+    assert trust.is_group_gain_known(bare) == [share < 0.98 for share in tied]
+
+
+@pytest.mark.parametrize(("sd", "least"), [
+    (None, 0.5), ({}, 0.5), ({"V": 0.1}, 0.5), ({"V": 0.15}, 0.4), ({"V": 0.25}, -np.inf), ({"p": 0.2}, 0.5),
+])  # fmt: skip
+def test_a_column_is_another_below_half_of_its_gain_and_below_what_errors_explain(sd, least):
+    model = small.model(**({} if sd is None else {"fitted": {"commands": [], "rates": [], "column_sd": sd}}))
+    assert trust._min_plausible_column_gain(model, "V") == pytest.approx(least)
+
+
+def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
+    """The likelier of the model's two colours is asked; of the others those that are likelier still have a
+    say, and what all of them find is told."""
+    colours = [{"average": [1.0, c], "noise": (s * np.eye(3)).tolist()} for c, s in ((0.1, 2.0), (0.2, 3.0))]
+    model = small.model(colours=colours)
+    likely = {
+        (1.0, 0.1): [1.0, 2.0, 3.0, 4.0], (1.0, 0.2): [2.0, 2.0, 2.0, 5.0], "another": [2.8] * 4,
+        "likelier": [0.0, 0.0, 0.0, 11.2], "less": [9.0, 0.0, 0.0, 2.0], "too short": None,
+    }  # fmt: skip
+    wrong = {
+        (1.0, 0.1): {}, (1.0, 0.2): {name: name.upper() for name in "abcd"}, "less": {},
+        "likelier": dict.fromkeys("dce", "no"), "another": dict.fromkeys("bcd", "no"),
+    }  # fmt: skip
+    monkeypatch.setattr(trust, "NOISE_MA_CANDIDATES", ["too short", "likelier", "less", "another"])
+    monkeypatch.setattr(
+        trust,
+        "whiten_samples",
+        lambda of, by: SimpleNamespace(name="log", by=by if isinstance(by, str) else tuple(by)),
+    )
+    asked = []
+
+    def bounds(flight, of):
+        asked.append((flight.by, len(of.noise_models)))
+        parts = likely[flight.by]
+        return parts and trust._GainBoundsOverFlight([], [], {"by": flight.by}, 1.0, np.array(parts))
+
+    monkeypatch.setattr(
+        trust, "_part_log_likelihoods_and_sample_count", lambda flight, of: (np.array(likely[flight.by]), 9.0)
+    )
+    monkeypatch.setattr(trust, "_bound_gains_over_flight_parts", bounds)
+    monkeypatch.setattr(
+        trust,
+        "_column_mistake_texts",
+        lambda flight, of, by: wrong[by.largest_gain_upper_bound_by_column["by"]],
+    )
+    told = []
+    monkeypatch.setattr(
+        trust,
+        "_likelier_column_mistake_text",
+        lambda flight, of: told.append((flight.by, of.noise_models[0].ma_coefficients)) or "exchanged",
+    )
+    log = small.flight(small.model(), 9, name="log")
+    with pytest.raises(
+        BadInput, match=r"^log: C, allowed: columns, signs and units as in the flights of the"
+    ):
+        trust.refuse_columns_not_as_identified(log, model)
+    assert asked == [((1.0, 0.2), 1), *((name, 2) for name in trust.NOISE_MA_CANDIDATES)]
+    assert told == []
+    wrong["another"] = {}
+    with pytest.raises(BadInput, match=r"^log: exchanged, allowed: "):
+        trust.refuse_columns_not_as_identified(log, model)
+    assert told == [((1.0, 0.2), [1.0, 0.2])]
+    nothing = {"commands": [], "rates": [], "tied": [1.0, 0.99]}
+    trust.refuse_columns_not_as_identified(log, small.model(colours=colours, fitted=nothing))

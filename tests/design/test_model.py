@@ -13,6 +13,7 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.design import model
 from beaver_ftc.design.model import (
     both_responses,
+    both_responses_along,
     coefficient_slopes,
     design_record,
     engine_power_kw,
@@ -62,6 +63,15 @@ def test_it_gives_the_angular_accelerations_of_fdc():
         theirs.append([row["pdot_rad_s2"], row["qdot_rad_s2"], row["rdot_rad_s2"]])
     error = np.sqrt(np.mean((np.array(ours) - theirs) ** 2, axis=0))
     assert np.all(error <= 2e-5 * np.sqrt(np.mean(np.square(theirs), axis=0)))
+
+
+def test_along_a_flight_it_gives_what_it_gives_of_each_frame():
+    design = design_record()[0]
+    y = np.array([measured(row)[1] for row in rows()[:7]])
+    f, G = np.zeros(3), np.zeros((len(y), 3, 4))
+    both_responses_along(design, np.zeros(3), y, f, G)
+    assert G.tolist() == [split(design, np.zeros(3), of)[1].tolist() for of in y]
+    assert f.tolist() == split(design, np.zeros(3), y[-1])[0].tolist()
 
 
 def moment_form(design, x, y, u):

@@ -391,6 +391,13 @@ def both_responses(design, x, y, f, G):
 
 
 @kernel
+def both_responses_along(design, x, y, f, G):
+    """The same for each row of y (n, 4 + declared): f (3,) of the last one, G (n, 3, surfaces) of all."""
+    for i in range(y.shape[0]):
+        both_responses(design, x, y[i], f, G[i])
+
+
+@kernel
 def rate_damping(design, x, y, u, scratch, out):
     """Fill out (3, 3) 1/s: what the aerodynamic moments' accelerations change by per rate of the aircraft
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""

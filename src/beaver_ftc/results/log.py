@@ -173,11 +173,13 @@ class Columns(dict[str, np.ndarray]):
 
     def write(self, rows: np.ndarray) -> None:
         """Take in rows (n, columns)."""
-        self._chunks.append(rows[:, self._places])  # a copy: the rows' memory is used again
+        # A copy, since the memory of rows is used again; at once by column: most flights need no other.
+        self._chunks.append(np.ascontiguousarray(rows.T[self._places]))
 
     def close(self) -> None:
         """The flight is over."""
-        self.update(zip(self._names, np.ascontiguousarray(np.concatenate(self._chunks).T), strict=True))
+        whole = np.concatenate(self._chunks, axis=1) if len(self._chunks) > 1 else self._chunks[0]
+        self.update(zip(self._names, whole, strict=True))
 
     def read(self, *names: str) -> np.ndarray:
         """Some columns side by side, (frames, names)."""

@@ -28,7 +28,7 @@ import numpy as np
 from beaver_ftc.aircraft import load
 from beaver_ftc.commands import AirspeedsOption, AltitudesOption, Reporter, ScenarioArgument, StudyCommand
 from beaver_ftc.control.engines import effects_of as effects_of_engines
-from beaver_ftc.design.model import AXES, N_Y, both_responses, design_of
+from beaver_ftc.design.model import AXES, N_Y, both_responses_along, design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
@@ -114,8 +114,7 @@ def moments_of(
     u = _side_by_side(log, *(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
     bound = _side_by_side(log, *(f"{axis}_eta_bar_rad_s2" for axis in AXES))
     design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
-    for row, at in zip(y, G, strict=True):
-        both_responses(design, np.zeros(3), row, np.zeros(3), at)
+    both_responses_along(design, np.zeros(3), y, np.zeros(3), G)
     moment = G * u[:, None, :]
     of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.class_of_losses}
     return of, bound, G

@@ -3,6 +3,7 @@
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -10,7 +11,7 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text
+from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text, ulog
 from beaver_ftc_logs.recording import columns_and_time_origin
 from products.logs import synthetic
 
@@ -381,6 +382,23 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
     assert columns["late.x"].note == ""
     assert set(columns) == {"late.x", "early.y", "early.z", "none.w"}
     assert columns_and_time_origin({"none": topics["none"]}, "us")[1] == 0.0
+
+
+def test_the_bytes_of_a_message_are_those_of_all_that_is_in_it():
+    """Three messages of five numbers, one number, and two of a message of five and one."""
+
+    def of(*fields):
+        return SimpleNamespace(fields=fields)
+
+    formats = {
+        "outer": of(("five", 3, "x"), ("uint8_t", 0, "y"), ("six", 2, "z")),
+        "five": of(("float", 5, "u")),
+        "six": of(("five", 0, "v"), ("int32_t", 1, "w")),
+    }
+    assert ulog._min_message_bytes(formats, "outer", ()) == 3 * 5 + 1 + 2 * (5 + 1)
+    formats["five"].fields += (("outer", 0, "again"),)
+    with pytest.raises(ValueError, match="a message outer holds itself"):
+        ulog._min_message_bytes(formats, "outer", ())
 
 
 def test_a_ulog_says_from_when_its_time_counts(tmp_path):

@@ -183,7 +183,7 @@ ULOG_HEAD = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
     ("wanted", "kept", "begins_s"),
     [
         (None, {"gyro.x", "gyro.n", "gyro_1.x", "gyro_1.n", "baro_2.x", "baro_2.n"}, 2.0),
-        (["gyro_1.x", "baro_2.n", "gyro.y"], {"gyro_1.x", "baro_2.n"}, 2.0),
+        (["gyro_1.x", "baro_2.n", "baro_2.y"], {"gyro_1.x", "baro_2.n"}, 2.0),
         (["baro_2.x"], {"baro_2.x"}, 2.02),
     ],
 )

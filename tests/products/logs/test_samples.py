@@ -1,5 +1,7 @@
 """One time base for all columns of a log: each step at its bounds, on columns made by hand."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import samples as of
 from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from products.logs import small
+from products.logs.test_signals import T_S, turning, yawed
 
 WING = small.vehicle()
 
@@ -271,3 +274,297 @@ def test_airspeed_and_energy_are_known_where_their_columns_are():
         is of._sampled_airspeed(log, WING, t_s, 1.0)
         is None
     )
+
+
+DEG, CDEG = np.pi / 180.0, np.pi / 18000.0
+IN_SI = {  # column: what its number is multiplied by, and what is added
+    "gx": (DEG * 0.1, -DEG * 2.0), "gy": (CDEG, 0.0), "gz": (1.0, 0.0), "pwm": (0.0025, -3.75),
+    "share": (0.01, 0.0), "alt": (0.3048, 0.0), "tas": (1852.0 / 3600.0, 0.0), "phi": (DEG, 0.0),
+    "theta": (1e-3, 0.0), "psi": (CDEG, 0.0),
+    "acc": (-9.80665, 9.80665 * 0.3), "wind": (0.44704, 0.0), "alpha": (-DEG, 0.0), "extra": (2.0, 7.0),
+    "left_left": (1.0, 0.0), "other": (1.0, 0.0), "out": (1.0, 0.0),
+}  # fmt: skip
+EVERYWHERE = {
+    "rates": {
+        "p": {"column": "gx", "unit": "deg/s", "scale": 0.1, "offset": -2.0},
+        "q": {"column": "gy", "unit": "cdeg/s"}, "r": "gz",
+    },
+    "commands": [{"column": "pwm", "scale": 0.0025, "offset": -3.75}, {"column": "share", "unit": "%"}],
+    "surfaces": {"right": {"pwm": 0.5, "share": 0.4}, "left": {"pwm": 0.3, "share": -0.2}},
+    "signals": [{"column": "wind", "unit": "mph"}],
+    "labels": {"left": {"column": "left_left", "scale": 0.01}},
+    "outputs": {"left": {"column": "out", "scale": 3.0}},
+    "attitude": {
+        "roll": {"column": "phi", "unit": "deg"}, "pitch": {"column": "theta", "unit": "mrad"},
+        "yaw": {"column": "psi", "unit": "cdeg"},
+    },
+    "acceleration": {"column": "acc", "unit": "g", "scale": -1.0, "offset": 0.3},
+    "airspeed": {"column": "tas", "unit": "kt"},
+    "energy": {"altitude": {"column": "alt", "unit": "ft"}, "airspeed": {"column": "tas", "unit": "kt"}},
+    "flow": {
+        "alpha_rad": {"column": "alpha", "unit": "deg", "scale": -1.0},
+        "dpt": {"column": "extra", "scale": 2.0, "offset": 7.0},
+    },
+}  # fmt: skip
+
+
+def test_every_column_that_a_vehicle_names_is_in_si_but_labels_and_outputs():
+    """These are converted where they are read. What it does not name is as it was, notes and stamps too."""
+    vehicle, numbers = small.vehicle(EVERYWHERE | {"name": "all"}), np.array([3.0, -5.0, np.nan])
+    given = {name: column([1.0, 2.0, 4.0], numbers, f"of {name}") for name in IN_SI}
+    found = of.convert_to_si(RecordedFlight("log", given, (LoggedFailure(1.0, "fin"),), ("noted",)), vehicle)
+    assert list(found.columns) == list(IN_SI)
+    assert (found.name, found.logged_failures, found.notes) == (
+        "log",
+        (LoggedFailure(1.0, "fin"),),
+        ("noted",),
+    )
+    for name, (factor, offset) in IN_SI.items():
+        one = found.columns[name]
+        np.testing.assert_allclose(one.values, factor * numbers + offset, rtol=1e-12, err_msg=name)
+        assert (one.t_s is given[name].t_s, one.note) == (True, f"of {name}")
+    assert set(vehicle.column_names()) == set(IN_SI) - {"other"}
+
+
+def test_what_a_reader_is_asked_for_is_what_the_vehicle_names():
+    """The option comes before the vehicle file, and the time is no column of the flight."""
+    vehicle = small.vehicle(
+        EVERYWHERE | {"name": "all", "reader": "alfa", "time": {"column": "clock", "unit": "us"}}
+    )
+    names = ["gx", "gy", "gz", "pwm", "share", "wind", "phi", "theta", "psi", "acc", "tas", "alt", "alpha"]
+    names += ["extra", "left_left", "out"]
+    assert of._positional_reader_arguments(vehicle, None) == ("alfa", ("clock", "us"), names)
+    assert of._positional_reader_arguments(vehicle, "ulog") == ("ulog", ("clock", "us"), names)
+    assert of._positional_reader_arguments(WING, None)[:2] == (None, None)
+
+
+IN_G = np.where(T_S < 50.0, -1.0, 20.0)
+ATTITUDE = {"roll": "phi", "pitch": "theta", "yaw": "psi"}
+
+
+def turned(**changes):
+    """The recording of a body that turns, with all its angles; changes: columns of other numbers."""
+    phi, theta, rates = turning()
+    values = dict(zip(small.RATES.values(), rates, strict=True))
+    values |= {"phi": phi, "theta": theta, "psi": yawed(), "acc": -9.8 + 0.1 * np.sin(T_S)}
+    values |= {"roll": 0.3 * np.sin(T_S), "pitch": 0.2 * np.cos(1.3 * T_S)} | changes
+    return RecordedFlight("log", {name: column(T_S, one) for name, one in values.items()})
+
+
+@pytest.mark.parametrize(("changes", "keys", "says"), [
+    ({}, {}, None),
+    ({"psi": -yawed()}, {}, "the change of psi is -1 times the integral of r_rad_s: one of them has the "
+     "other sign, `scale: -1` fits"),
+    ({"psi": -yawed()}, {"attitude": {"roll": "phi"}}, None),
+    ({"psi": -yawed(), "phi": np.rad2deg(turning()[0])}, {}, "phi is in deg, a factor of 0.01745 fits"),
+    ({"acc": IN_G}, {}, "acc: is 1 m/s2 on the middle of the flight, 1 g is 9.807: it is in g, a factor of "
+     "9.807 fits"),
+    ({"acc": IN_G, "psi": -yawed()}, {}, "the change of psi is"),
+    ({"acc": IN_G}, {"acceleration": None}, None), ({"acc": IN_G}, {"acceleration": "elsewhere"}, None),
+    # a clipped roll rate is no integral of its angle
+    ({"p_rad_s": np.minimum(turning()[2][0], 0.3), "psi": -yawed()}, {}, None),
+    ({"q_rad_s": np.sin(2.1 * T_S), "spare": turning()[2][1]}, {}, None),
+    *((
+        {"q_rad_s": np.sin(2.1 * T_S), "spare": turning()[2][1]}, key,
+        "but spare (1.00): spare is the pitch rate",
+    ) for key in (
+        {"signals": ["spare"]}, {"flow": {"beta_rad": "spare"}}, {"commands": ["roll", "pitch", "spare"]},
+    )),
+])  # fmt: skip
+def test_rates_angles_and_gravity_that_contradict_one_another_are_refused(changes, keys, says):
+    vehicle = small.vehicle(**{"attitude": ATTITUDE, "acceleration": "acc", **keys})
+    if says is None:
+        assert of.resample(turned(**changes), vehicle).name == "log"
+        return
+    with pytest.raises(BadInput) as refused:
+        of.resample(turned(**changes), vehicle)
+    said = str(refused.value)
+    assert said.startswith("log: ")
+    assert says in said
+    assert said.endswith(", allowed: what the vehicle file says, or its `unit` mended")
+
+
+@pytest.mark.parametrize(("largest", "says"), [
+    (59.9, None), (60.1, " (deg/s would be 1.05 rad/s: `unit: deg/s`)"),
+    (3437.0, " (deg/s would be 60 rad/s: `unit: deg/s`)"), (3438.0, ""),
+])  # fmt: skip
+def test_a_rate_that_no_vehicle_turns_at_may_be_in_degrees(largest, says):
+    for name in small.RATES.values():
+        one = column(stamps(0.1), np.where(np.arange(60) == 30, -largest, 0.01 * np.sin(np.arange(60))))
+        if says is None:
+            assert of.resample(recording(**{name: one}), WING).rates.min() == -largest
+            continue
+        with pytest.raises(BadInput) as refused:
+            of.resample(recording(**{name: one}), WING)
+        assert str(refused.value) == (
+            f"log: column {name} reaches {largest:g}, allowed: rates in rad/s, up to 60{says}"
+        )
+
+
+@pytest.mark.parametrize(("spread", "says"), [(2.99, []), (3.01, ["3.01"])])
+def test_a_rate_that_spreads_as_hardly_an_aircraft_does_is_said(spread, says):
+    """Of the rates alone: a command may be anything."""
+    swings = column(stamps(0.1), spread * np.array([1.0, -1.0] * 30))
+    found = of.resample(recording(r_rad_s=swings, roll=swings), WING)
+    assert [note for note in found.notes if "spreads" in note] == [
+        f"r_rad_s: spreads {size} rad/s, as hardly an aircraft does: is it in deg/s? a factor of 0.01745 "
+        "fits (`unit: deg/s`)"
+        for size in says
+    ]
+
+
+def test_too_few_samples_of_a_fast_log_are_told_with_its_span():
+    t_s = 5.0 + stamps(0.001, 2000)
+    with pytest.raises(BadInput) as refused:
+        of._check_stamps_and_make_time_base("log", t_s, 20.0)
+    assert str(refused.value) == (
+        "log: 2000 rows within 2 s are 41 samples at 20 Hz, allowed: at least 50; is time in another unit?"
+    )
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_sample_is_clipped_where_any_of_its_rates_was_at_its_last_row(axis):
+    """Held at 2 from row 12 to 29, ten rows after it came there; sampled every third row, a row later."""
+    values = np.sin(np.arange(60.0))
+    values[12:30] = 2.0
+    rates = [column(stamps(0.1), values if k == axis else np.cos(np.arange(60.0))) for k in range(3)]
+    found = of._is_rate_clipped(rates, 0.11 + 0.3 * np.arange(19))
+    rows = 1 + 3 * np.arange(19)
+    assert found.tolist() == [21 <= row < 30 for row in rows]
+    assert not of._is_rate_clipped(rates, np.array([-1.0])).any()
+
+
+def test_how_long_a_column_has_stood_still_counts_its_age():
+    """Rows without a number stand still; before the first row nothing does."""
+    values = np.concatenate([np.arange(10.0), np.full(20, 9.5), [np.nan, np.nan, 4.0]])
+    one = column(stamps(0.5, 33), values)
+    found = of._time_since_column_change_s(one, np.array([-1.0, 4.7, 10.8, 11.2, 15.6, 16.0, 17.0]))
+    np.testing.assert_allclose(found, [0.0, 0.2, 0.3, 6.2, 10.6, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(("age_s", "stale"), [(0.69, False), (0.71, True)])
+def test_a_held_value_is_stale_three_and_a_half_usual_steps_after_its_row(age_s, stale):
+    """Of the column's own step, or that of the samples where these are rarer; of its only row, the latter."""
+    held, only = column(stamps(0.2, 60), np.arange(60.0)), column([11.8], [1.0])
+    at = np.array([11.8 + age_s])
+    assert of._is_held_value_stale(held, at, 0.1).tolist() == [stale]
+    assert of._is_held_value_stale(held, at, 0.25).tolist() == [False]
+    assert of._is_held_value_stale(column(stamps(0.1, 119), np.arange(119.0)), at, 0.2).tolist() == [stale]
+    assert of._is_held_value_stale(only, at, 0.2).tolist() == [stale]
+
+
+def filled(n=12, first=0.0, **changes):
+    """Samples of which every field says something, and no two rows alike."""
+    at = first + np.arange(float(n))
+    per_row = {
+        "t_s": 0.1 * at, "rates": at[:, None] + [0.1, 0.2, 0.3], "commands": at[:, None] - [0.4, 0.5],
+        "signals": at[:, None] * 3.0, "labels": 1.0 / (1.0 + at[:, None] + [0.0, 0.7]),
+        "stretch_number": (at >= 5.0).astype(np.int64), "airspeed": 20.0 + at, "is_rate_clipped": at % 3 == 1,
+        "energy_height_rate_mps": -2.0 - at,
+    }  # fmt: skip
+    given = {
+        "name": "all", "dt_s": 0.1, "mean_age_s_by_held_column": {"roll": 0.02},
+        "logged_failures": (LoggedFailure(3.0, "fin"),), "log_stamps_s": 0.01 * np.arange(99.0),
+        "notes": ("one",),
+        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+        "noise_ma_coefficients": (1.0, 0.5), "fit_weight": 1.5, "n_log_parts": 1,
+    }  # fmt: skip
+    assert {one.name for one in fields(of.Samples)} == {*per_row, *given}
+    return of.Samples(**(per_row | given | changes)), per_row, given
+
+
+def assert_same(found, expected):
+    """All fields of samples, as they are to be."""
+    assert {one.name for one in fields(found)} == expected.keys()
+    for name, value in expected.items():
+        one = getattr(found, name)
+        if isinstance(value, np.ndarray):
+            np.testing.assert_array_equal(one, value, err_msg=name)
+        elif name == "time_since_change_s_by_column":
+            assert one.keys() == value.keys()
+            for key in value:
+                np.testing.assert_array_equal(one[key], value[key], err_msg=key)
+        else:
+            assert one == value, name
+
+
+def test_some_rows_of_samples_are_those_rows_of_every_field():
+    whole, per_row, given = filled()
+    rows = slice(3, 8)
+    still = {name: one[rows] for name, one in given["time_since_change_s_by_column"].items()}
+    cut = {name: one[rows] for name, one in per_row.items()}
+    expected = {**given, **cut, "time_since_change_s_by_column": still, "log_stamps_s": per_row["t_s"][rows]}
+    assert_same(of._select_rows(whole, rows), expected)
+    bare = replace(whole, airspeed=None, is_rate_clipped=None, energy_height_rate_mps=None)
+    without = {"airspeed": None, "is_rate_clipped": None, "energy_height_rate_mps": None}
+    assert_same(of._select_rows(bare, rows), expected | without)
+    assert of.first_samples(whole, 12) is whole
+    assert of.first_samples(whole, 11).rates.tolist() == per_row["rates"][:11].tolist()
+
+
+def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
+    """The second has a gap of its own; remarks are said once, after what is said of the whole."""
+    (one, *_), (other, *_) = filled(4), filled(9, first=20.0, notes=("two", "one"))
+    other = replace(other, stretch_number=np.repeat([7, 9], [6, 3]), dt_s=0.3, name="other")
+    found = of._concatenate_samples("long", [one, other], 5)
+    per_row, (_, _, given) = {}, filled()
+    for name in ("t_s", "rates", "commands", "signals", "labels", "airspeed", "is_rate_clipped"):
+        per_row[name] = np.concatenate([getattr(one, name), getattr(other, name)])
+    per_row["energy_height_rate_mps"] = np.concatenate([-2.0 - np.arange(4.0), -22.0 - np.arange(9.0)])
+    note = "a long log, read in 5 parts: 13 samples of it, spread evenly, are looked at"
+    at = np.concatenate([np.arange(4.0), 20.0 + np.arange(9.0)])
+    assert_same(found, given | per_row | {
+        "name": "long", "n_log_parts": 5, "notes": (note, "one", "two"), "log_stamps_s": per_row["t_s"],
+        "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]),
+        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+    })  # fmt: skip
+
+
+def test_what_the_airspeed_makes_of_a_log_on_its_time_base():
+    """Each surface by its own power, rates and signals by the airspeed less the reference, within bounds."""
+    t_s = stamps(0.1)
+    speed = np.linspace(5.0, 80.0, 60)
+    speed[7] = np.nan
+    keys = {
+        "signals": ["wind"], "airspeed": "tas", "reference_airspeed_mps": 20.0,
+        "airspeed_powers": {"left": 3.0},
+    }  # fmt: skip
+    given = recording(tas=column(t_s, speed), wind=column(t_s, 1.0 + np.sin(t_s)))
+    found = of.resample(given, small.vehicle(**keys))
+    plain = of.resample(given, small.vehicle(signals=["wind"]))
+    ratio = np.nan_to_num(np.clip((speed / 20.0) ** 2, 0.1, 10.0), nan=1.0) ** 0.5
+    assert [(ratio**2 <= 0.1).sum(), (ratio**2 >= 10.0).sum(), (ratio == 1.0).sum()] == [2, 14, 1]
+    np.testing.assert_allclose(found.commands[:, 0], plain.commands[:, 0] * ratio**2)
+    np.testing.assert_allclose(found.commands[:, 1], plain.commands[:, 1] * ratio**3)
+    np.testing.assert_array_equal(found.rates, plain.rates)
+    before = np.column_stack([plain.rates, plain.signals])
+    np.testing.assert_allclose(found.signals, np.hstack([plain.signals, before * (ratio[:, None] - 1.0)]))
+    np.testing.assert_array_equal(found.airspeed, speed)
+    assert plain.airspeed is None
+
+
+def test_of_a_log_in_parts_every_so_many_stretch_is_kept(monkeypatch):
+    """Nine parts, each of which begins with the end of the one before, in stretches of 4 samples, of which 20
+    samples are kept at most: each stretch that is begun before is not begun again, and once there are more
+    than five every second one is left out, and of those that come."""
+    monkeypatch.setattr(of, "MAX_FIT_SAMPLES", 20)
+    monkeypatch.setattr(of, "_FIT_STRETCH_SAMPLES", 4)
+    parts = [filled(14, first=10.0 * k, stretch_number=np.zeros(14, dtype=np.int64))[0] for k in range(9)]
+    monkeypatch.setattr(of, "read_parts_for_vehicle", lambda *asked: parts)
+    monkeypatch.setattr(of, "resample", lambda recording, vehicle: recording)
+    found = of._read_flight_for_fit(of.Path("logs/long.csv"), WING, None)
+    # of the first part samples 0 to 13 in stretches of 4, 4, 4 and 2; of each other 10 new ones in 4, 4 and 2
+    begins = [(0, 4), (4, 4), (8, 4), (12, 2)]
+    begins += [(10 * k + 4 + 4 * j, min(4, 10 - 4 * j)) for k in range(1, 9) for j in range(3)]
+    kept, every = [], 1
+    for number, stretch in enumerate(begins):
+        if number % every == 0:
+            kept.append(stretch)
+        if (number - 3) % 3 == 0 and number > 3:  # the end of a part but the first
+            while len(kept) * 4 > 20:
+                kept, every = kept[::2], 2 * every
+    assert found.t_s == pytest.approx(0.1 * np.array([k for at, n in kept for k in range(at, at + n)]))
+    assert found.stretch_number.tolist() == [j for j, (_, n) in enumerate(kept) for _ in range(n)]
+    assert (found.name, found.n_log_parts) == ("long", 9)
+    monkeypatch.setattr(of, "read_parts_for_vehicle", lambda *asked: parts[:1])
+    assert of._read_flight_for_fit(of.Path("logs/short.csv"), WING, None) is parts[0]

@@ -361,6 +361,15 @@ def test_angles_with_stamps_of_their_own_are_taken_between_their_rows():
     assert found.max_rate_magnitude == pytest.approx(0.5 * np.abs(rates[0]).max())
 
 
+@pytest.mark.parametrize(("rows", "steep", "windows"), [(161, 0.99, 8), (160, 0.99, None), (161, 1.01, None)])
+def test_an_angle_wants_eight_windows_in_which_the_nose_is_not_steep(rows, steep, windows):
+    """A last window that is not over is none; one steep row in it spoils a window."""
+    t_s, rate = T_S[:rows], np.cos(T_S[:rows])
+    pitch = np.where(np.arange(rows) == 50, -steep, 0.3)
+    found = physics._fit_angle_to_rate(t_s, np.sin(t_s), [rate], None, pitch)
+    assert (found and found.n_windows) == windows
+
+
 def test_without_a_pitch_angle_the_nose_is_taken_to_be_level():
     """Of a body that is level the yaw rate follows from roll alone: psi' = q sin(phi) + r cos(phi)."""
     phi, psi_dot = 0.9 * np.sin(0.8 * T_S), 0.4 + 0.3 * np.sin(0.3 * T_S)

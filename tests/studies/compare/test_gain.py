@@ -50,6 +50,7 @@ def test_both_settings_fly_the_draws_after_the_one_that_tunes(monkeypatch, group
 
     class Cost:
         def __init__(self, name, *given):
+            assert name == "mine"
             made.append(given)
 
         def parts(self, values):
@@ -62,6 +63,15 @@ def test_both_settings_fly_the_draws_after_the_one_that_tunes(monkeypatch, group
     draws = made[0][0] if group == DETECTORS else [given[-1] for given in made]
     assert (len(made), draws) == (costs, [*range(4, 4 + JUDGED)])
     assert (found["gain"], found["flights"], found["judged"]) == (0.0, 2 * costs, JUDGED)
+    made.clear()
+    found = gain_of(group, "mine", "exact", ({"a": 0.4}, {"a": 0.3}), 3)
+    # parts of a and 2 a: their sum is 3 a, as logarithms their geometric mean is exp(1.5 a)
+    sizes = (1.2, 0.9) if group == DETECTORS else (exp(0.6), exp(0.45))
+    assert (found["built_in"], found["retuned"]) == pytest.approx(sizes)
+    assert found["gain"] == pytest.approx(1.0 - sizes[1] / sizes[0])
+    assert found["gain_low"] <= found["gain"] <= found["gain_high"]
+    given = [("exact", None, draw) for draw in range(4, 4 + JUDGED)]
+    assert group == DETECTORS or made == given
 
 
 @pytest.mark.parametrize(("cost", "measured"), [(0.9, True), (tune.INADMISSIBLE, False)])

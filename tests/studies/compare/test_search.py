@@ -2,11 +2,20 @@
 
 from math import log, sqrt
 
+import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plugins import Range
-from beaver_ftc.studies.compare.search import WIDENINGS, on_edge, on_scale, search, value_at
+from beaver_ftc.studies.compare.search import (
+    WIDENINGS,
+    _Trials,
+    on_edge,
+    on_scale,
+    search,
+    value_at,
+    widen,
+)
 
 WIDE = Range(1e-3, 1e3)
 
@@ -72,3 +81,55 @@ def test_a_range_that_holds_the_result_at_its_limit_is_widened():
 def test_a_result_that_runs_from_every_limit_is_refused():
     with pytest.raises(SimulationFailed, match=rf"on the edge of its range after {WIDENINGS} widenings: a"):
         search(lambda values: -log(values["a"]), {"a": Range(0.5, 2.0)}, {"a": 1.0}, 20, 1)
+
+
+def test_of_trials_that_cost_much_the_same_the_one_nearest_the_middle_is_taken():
+    """Within half a per cent of the lowest, whether that is above or below zero."""
+    ranges = {"a": WIDE, "b": WIDE}
+    points = np.array([[0.9, 0.5], [0.5, 0.2], [0.6, 0.3], [0.5, 0.5]])
+    for costs, nearest in (
+        ([1.0, 1.004, 1.0049, 1.0051], 2), ([1.0, 1.006, 1.0051, 2.0], 0), ([-2.0, -1.991, -1.98, -1.5], 1),
+    ):  # fmt: skip
+        tried = _Trials(lambda values: 0.0, ranges, {"a": 1.0, "b": 1.0})
+        tried.points, tried.costs = list(points), costs
+        values, lowest = tried.best()
+        assert lowest == costs[nearest]
+        assert list(values.values()) == pytest.approx(1e-3 * 1e6 ** points[nearest], rel=1e-5)
+
+
+def test_a_search_begins_where_it_is_told_fills_the_ranges_and_then_goes_downhill():
+    """Of 41 trials the first is the start, the next 20 are one in each slice of each range, the rest near the
+    best of these; the first steps are a tenth of a range, to the middle."""
+    tried = []
+
+    def cost(values):
+        places = [on_scale(WIDE, values[name]) for name in "ab"]
+        tried.append(places)
+        return 1.0 + (places[0] - 0.7) ** 2 + (places[1] - 0.2) ** 2
+
+    search(cost, {"a": WIDE, "b": WIDE}, {"a": 10.0, "b": 1e9}, 41, 5)
+    assert tried[0] == pytest.approx([2 / 3, 1.0])  # a start beyond a range is at its limit
+    spread = np.array(tried[1:21])
+    for column in spread.T:
+        assert sorted((column * 20).astype(int)) == list(range(20))
+    begin = min(tried[:21], key=lambda at: (at[0] - 0.7) ** 2 + (at[1] - 0.2) ** 2)
+    steps = [0.1 if at < 0.5 else -0.1 for at in begin]
+    assert np.array(tried[21:24]) == pytest.approx(
+        np.array([begin, [begin[0] + steps[0], begin[1]], [begin[0], begin[1] + steps[1]]]), abs=1e-5
+    )
+    assert len(tried) == 41
+
+
+def test_a_range_is_widened_by_half_of_its_scale_at_one_end():
+    assert widen(Range(1.0, 100.0), upper=True) == Range(1.0, 1000.0)
+    assert widen(Range(1.0, 100.0), upper=False) == Range(0.1, 100.0)
+    odds = widen(Range(0.5, 0.8, "odds"), upper=True)  # odds of 1 to 4, and half of that scale on: 8
+    assert (odds.low, odds.high, odds.scale) == (0.5, pytest.approx(8.0 / 9.0), "odds")
+
+
+@pytest.mark.parametrize(
+    ("place", "edge"), [(0.02, False), (0.021, None), (0.979, None), (0.98, True), (1.3, True), (-0.2, False)]
+)
+def test_what_is_within_a_fiftieth_of_a_limit_is_on_the_edge(place, edge):
+    values = {"a": 1e-3 * 1e6**place, "b": 1.0}
+    assert on_edge(values, {"a": WIDE, "b": WIDE}) == ({} if edge is None else {"a": edge})

@@ -224,8 +224,8 @@ def test_a_tuning_is_of_every_method_on_its_grade(monkeypatch):
         Method(DETECTORS, "z", "errors"),
     ]  # fmt: skip
     assert tune(methods, 24, 7, 3, 2, print, draw=5) == {
-        "procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": 24, "seed": 7, "draw": 5,
-        "flights": {"exact": 12, "errors": 21},
+        "procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": 24, "seed": 7,
+        "draw": 5, "flights": {"exact": 12, "errors": 21},
         "grades": {
             "exact": {"detectors": {"x": {"a": 1.0}}, "laws": {"y": {"a": 2.0}}},
             "errors": {"detectors": {"x": {"a": 3.0}, "z": {"a": 4.0}}},

@@ -33,6 +33,7 @@ from beaver_ftc.studies.isolability import DOUBLET_COLUMNS, LOSS_COLUMNS
 from beaver_ftc.studies.present.page import contents, write_files
 from flying import loss, scenario
 from kept import in_short, picture
+from telling import numbers
 
 AIRCRAFT = Path(__file__).parents[1] / "data" / "aircraft"
 
@@ -156,6 +157,23 @@ def test_a_surface_that_is_hardly_used_and_one_that_another_explains():
     assert judge(seen, "elevator")["isolated"] == pytest.approx(1 / 3, abs=1e-4)
 
 
+def test_of_faults_that_hide_a_total_loss_as_well_the_one_that_does_so_more_often_is_named():
+    """The elevator moves for 10 frames, the rudder for 15: of 11 windows of ten frames these explain all of
+    the aileron's loss in one and in six. Of its 2.0 the rudder leaves 0.5, in two frames 0.8."""
+    z = np.zeros((20, 3))
+    aileron, elevator, rudder = z.copy(), z.copy(), z.copy()
+    aileron[:, 0], elevator[:10, 0], rudder[:15, 0] = 2.0, 1.9, 1.5
+    rudder[[3, 8], 0] = 1.2
+    moments = {"aileron": aileron, "elevator": elevator, "rudder": rudder}
+    found = judge(Excitation(moments, np.full((20, 3), 0.5), 0.1), "aileron")
+    assert (found["isolated"], found["confused_with"]) == (None, "rudder")
+    assert found["isolated_median"] is None
+    assert found["why"] == (
+        "a fault of rudder explains even a total loss: within 1 s the difference reaches only 80 % of the "
+        "detection limit"
+    )
+
+
 def test_half_of_the_instants_and_the_worst_of_them():
     """Used from the sixth frame on, more and more: a fault is to be found in some frames from its start."""
     z = np.zeros((25, 3))
@@ -211,6 +229,175 @@ def test_elsewhere_only_the_place_and_the_references_change():
     assert (found.faults, found.expect.model_dump(exclude_none=True)) == ((), {})
     same = before.keys() - {"initial", "reference", "faults", "expect"}
     assert {key: after[key] for key in same} == {key: before[key] for key in same}
+
+
+def test_a_flight_is_weighed_from_where_it_has_settled(monkeypatch):
+    """Without its faults; two seconds are 40 frames of this one."""
+    flown, n = [], 55
+    given = scenario(duration_s=3, rate_hz=20, faults=[loss("elevator", 1.0, 0.5)])
+    moment = {name: numbers(n, 3, seed=k) for k, name in enumerate(("aileron", "rudder"))}
+    bound, G = np.abs(numbers(n, 3, seed=5)), numbers(n, 3, 4, seed=6)
+    monkeypatch.setattr(detectability, "fly", lambda healthy, log: flown.append((healthy, log)))
+    monkeypatch.setattr(
+        detectability, "moments_of", lambda of, log: flown.append((of, log)) or (moment, bound, G)
+    )
+    seen = excitation(given)
+    (healthy, log), (of, weighed) = flown
+    assert healthy == given.model_copy(update={"faults": ()}) != given
+    assert (of, weighed is log) == (given, True)
+    np.testing.assert_array_equal(seen.moment["aileron"], moment["aileron"][40:])
+    np.testing.assert_array_equal(seen.moment["rudder"], moment["rudder"][40:])
+    np.testing.assert_array_equal(seen.bound, bound[40:])
+    np.testing.assert_array_equal(seen.G, G[40])
+    assert (list(seen.moment), seen.dt) == (["aileron", "rudder"], 0.05)
+
+
+def alone(flown, **airframe):
+    """A scenario of an aircraft made up of this; flown: what is flown of it instead."""
+    made = SimpleNamespace(name="made", airframe=SimpleNamespace(**airframe))
+    made.model_copy = lambda update: flown.append(update) or made
+    return made
+
+
+def test_pairs_are_alike_from_the_deflection_that_tells_the_one_that_is_harder_to_tell(monkeypatch):
+    """Over twice the bound the columns are (20, 0, 1), (0, -25, 0), (10, 0, 2) and (0, -7.5, 0). The aileron
+    is told from the rudder by 2.5 per rad at 1.75 of the rudder, the rudder by 10/7 at 4/7 of the aileron."""
+    G = np.array([[4.0, 0.0, 2.0, 0.0], [0.0, -10.0, 0.0, -3.0], [0.5, 0.0, 1.0, 0.0]])
+    bound = np.array([[0.1, 0.2, 0.25], [7.0, 7.0, 7.0]])
+    monkeypatch.setattr(detectability, "excitation", lambda of: Excitation({}, bound, 0.01, G))
+    surfaces, flown = ("aileron", "elevator", "rudder", "flap"), []
+    by_force = {"CY": (0, 2, 3), "CZ": (1, 3)}.__getitem__
+    found = detectability.alike(alone(flown, n=4, surfaces=surfaces, separated_by_force=by_force))
+    aileron, elevator, rudder, flap = (np.degrees(1.0 / size) for size in (20.0, 25.0, 10.0, 7.5))
+    assert flown == [{"duration_s": 3.0}]
+    assert [(pair["surfaces"], pair["by_forces"]) for pair in found] == [
+        (("aileron", "rudder"), True), (("aileron", "flap"), True), (("elevator", "rudder"), False),
+        (("elevator", "flap"), True), (("rudder", "flap"), True),
+    ]  # fmt: skip
+    told = [pair["told_apart_from_deg"] for pair in found]
+    assert told[0] == pytest.approx({"aileron": np.degrees(0.4), "rudder": np.degrees(0.7)})
+    assert told[1] == pytest.approx({"aileron": aileron, "flap": flap})
+    assert told[2] == pytest.approx({"elevator": elevator, "rudder": rudder})
+    assert told[3] == {"elevator": None, "flap": None}
+    lines = detectability.geometry([*found[:1], *found[3:4], {**found[3], "by_forces": False}])
+    both = "have similar effects on the rates: the rates"
+    assert lines == [
+        f"aileron and rudder {both} distinguish them if aileron is at least 23 deg off its command or rudder "
+        "is at least 40 deg off its command",
+        f"elevator and flap {both} never distinguish them, accelerometers do",
+        f"elevator and flap {both} never distinguish them",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("signals", "error_map", "known", "held"),
+    [
+        (("dpt", "yaw_by_engines_m_s2"), SimpleNamespace(knows_engines=True), True, True),
+        (("yaw_by_engines_m_s2",), SimpleNamespace(knows_engines=False), True, False),
+        (("yaw_by_engines_m_s2",), None, True, False),
+        (("dpt",), SimpleNamespace(knows_engines=True), False, False),
+    ],
+)
+def test_an_engine_at_idle_takes_the_thrust_that_it_has_in_trim(monkeypatch, signals, error_map, known, held):
+    """At 45 m/s, between 40 and 60, all thrust is 90, 275 and 650 N at the settings 0, 0.5 and 1: 350 N at
+    0.6, which give 0.35 m/s2 to 1000 kg. Twice the bound is 0.04, 0.06 and 0.1 rad/s2."""
+    flown, released = [], []
+    thrust = SimpleNamespace(
+        airspeed_mps=(40.0, 60.0), setting=(0.0, 0.5, 1.0), force_n=((100, 300, 700), (60, 200, 500))
+    )  # fmt: skip
+    made = alone(
+        flown, engine=SimpleNamespace(thrust=thrust), mass=SimpleNamespace(mass_kg=1000.0), signals=signals,
+        effectors=("left", "right"),
+        file=SimpleNamespace(power_setting=("throttle", "mixture"), model_error_map=error_map),
+    )  # fmt: skip
+    trim = SimpleNamespace(settings={"throttle": 0.6, "mixture": 0.9}, airspeed_mps=45.0)
+    bound = np.array([[0.02, 0.03, 0.05], [9.0, 9.0, 9.0]])
+    effects = np.array([[0.01, -0.02], [0.0, 0.004], [-0.5, 0.6]])
+    monkeypatch.setattr(detectability, "ENGINE_SIGNALS", ("other_m_s2", "yaw_by_engines_m_s2"))
+    monkeypatch.setattr(detectability, "effects_of_engines", lambda of: effects)
+    monkeypatch.setattr(detectability, "excitation", lambda of: Excitation({}, bound, 0.01))
+    loop = SimpleNamespace(trim=trim, release=lambda: released.append(True))
+    monkeypatch.setattr(detectability, "Loop", lambda of: loop)
+    left, right = detectability.engine_failures(made)
+    assert flown == [{"duration_s": 3.0, "faults": ()}]
+    assert released == [True]
+    for found, name, turns, shows in (
+        (left, "left", [0.0035, 0.0, 0.175], 1.75), (right, "right", [0.007, 0.0014, 0.21], 2.1),
+    ):  # fmt: skip
+        assert found.pop("turns_rad_s2") == pytest.approx(turns)
+        assert found.pop("shows") == pytest.approx(shows)
+        assert found == {"engine": name, "known": known, "held": held}
+
+
+def test_an_engine_is_said_with_what_the_design_model_knows_of_it():
+    of = {"engine": "left", "turns_rad_s2": [0.0035, 0.2, 0.175], "shows": 0.756}
+    failed = (
+        "left failed to idle accelerates the aircraft by 0.2 rad/s2, 0.76 times the detection limit of one"
+    )
+    known = f"{failed} frame; the design model knows its moment"
+    said = [{**of, "known": known, "held": held} for known, held in ((0, 0), (1, 0), (1, 1))]
+    assert detectability.of_engines(said) == [
+        f"{failed} frame", known, f"{known} and monitors it against the thrust"
+    ]  # fmt: skip
+
+
+def test_answers_are_of_the_axis_that_the_surface_leads():
+    """All amplitudes of its references together; a reference from a file has none."""
+    given = scenario(reference={
+        "q": [{"sine": {"amplitude_deg_s": 1.25, "frequency_hz": 0.2}},
+              {"doublet": {"amplitude_deg_s": 2.0, "start_s": 1.0, "width_s": 0.5}}],
+        "r": [{"csv": {"file": "r.csv", "time_s": [0, 1], "values_deg_s": [0, 2]}}],
+    })  # fmt: skip
+    place = {"airspeed_mps": 41.5, "altitude_m": 250.0, "excitation": 2.0, "detected": 0.5, "isolated": 0.07}
+    said = detectability.answers(given, [place | {"fault": fault} for fault in ("rudder", "elevator")])
+    assert [line.partition(" a loss")[0] for line in said] == [
+        "at 41.5 m/s and 250 m, 0 deg/s of yaw:",
+        "at 41.5 m/s and 250 m, 6.5 deg/s of pitch:",
+    ]
+    assert all("of 50 % and more" in line and line.endswith("from 7 % on") for line in said)
+
+
+def test_another_aircraft_flies_the_same_references_and_nothing_else_of_the_first_ones_truth():
+    given = scenario(
+        duration_s=7, seed=9, initial={"airspeed_mps": 40.0}, actuators="servo", sensors="tactical-grade",
+        faults=[loss("elevator", 0.5, 1.0)], expect={"no_departure": True},
+    )  # fmt: skip
+    found = detectability.with_aircraft(given, "beaver-split")
+    other = scenario(
+        aircraft="beaver-split", duration_s=7, seed=9, sensors="tactical-grade", uncertainty={},
+        control=given.control.model_dump(exclude_unset=True),
+    )  # fmt: skip
+    assert found.model_dump(exclude={"aircraft"}) == other.model_dump(exclude={"aircraft"})
+    assert found.airframe.name == "beaver-split"
+
+
+def test_a_point_has_what_its_flight_shows_and_the_doublets_of_straight_flight(monkeypatch):
+    """A row a fault, and a row a pair with its own doublet; flown and asked for where the point is."""
+    asked = []
+    seen = still(aileron=[4.0, 0.0, 0.0], rudder=[2.0, 0.0, 1.6])
+    monkeypatch.setattr(detectability, "excitation", lambda of: asked.append(of) or seen)
+
+    def doublets(of, after_s):
+        asked.append((of, after_s))
+        return {(a, b): {"doublet_deg": len(a), "doublet_s": len(b), "why": a} for a, b in PAIRED}
+
+    PAIRED = [("aileron", "rudder"), ("rudder", "aileron")]
+    monkeypatch.setattr(isolability, "smallest_doublets", doublets)
+    given = scenario()
+    found = detectability._point(given, (40.0, 250.0, 1.5))
+    there, (straight, after_s) = asked
+    assert (there, straight, after_s) == (at(given, 40.0, 250.0, 1.5), at(given, 40.0, 250.0, 0.0), 2.0)
+    place = {"airspeed_mps": 40.0, "altitude_m": 250.0, "excitation": 1.5}
+    assert found["points"] == [place | {"fault": s} | judge(seen, s) for s in ("aileron", "rudder")]
+    first, second = found["pairs"]
+    assert first == place | {
+        "fault": "aileron", "other": "rudder", "magnitude": pytest.approx(0.5625, abs=1e-4),
+        "magnitude_median": pytest.approx(0.5625, abs=1e-4), "longest_s": 0.1, "median_s": 0.1,
+        "doublet_deg": 7, "doublet_s": 6, "why": "aileron",
+    }  # fmt: skip
+    assert (second["fault"], second["other"], second["doublet_deg"], second["why"]) == (
+        "rudder", "aileron", 6, "rudder"
+    )  # fmt: skip
 
 
 @pytest.fixture

@@ -1,9 +1,11 @@
 """`decay`: which truths are flown, what a flight counts for, and what the document says of them."""
 
+import csv
 import json
 import re
 from dataclasses import replace
 from math import comb, isclose
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,17 +13,19 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.studies.decay import survey
 from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
-from beaver_ftc.studies.decay.shown import _interval, as_text, sentences
+from beaver_ftc.studies.decay.shown import FILES, _interval, as_text, cells, sentences
 from beaver_ftc.studies.decay.survey import (
     FACTORS,
     TOGETHER,
     Flight,
     cases_of,
     document_of,
+    fly_one,
     median,
     row_of,
     run_decay,
@@ -189,6 +193,251 @@ def test_what_the_rows_say():
             counts = (1, 2) if row["factor"] == 1.0 else (3, 4)
             row["false_alarm"]["count"], row["misnamed"]["count"] = counts
     assert "1 of 4 flights have a false alarm and 2 of 4 a wrong name" in next(sentences(document))
+
+
+def test_only_what_is_asked_is_followed_from(monkeypatch, tmp_path):
+    """A study of another scenario or seed begins anew; a lost flight is a failed row."""
+    seen = []
+    monkeypatch.setattr(survey, "run_study", lambda study, *given: seen.append((study, given)) or {"d": 1})
+    scenario = bf.load(SHORT | {"name": "n" * 90})
+    found = run_decay(tmp_path, scenario, flights=2, seed=7, workers=3, progress=print)
+    ((study, given),) = seen
+    assert (study.name, given) == ("n" * 80 + "-decay", (tmp_path, 3, print))
+    assert found == {"d": 1, "folder": str(tmp_path / study.name)}
+    assert study.follows_from == [scenario, 7]
+    assert study.fly.args == (scenario, 7)
+    assert study.document.args[:1] + study.document.args[3:] == (scenario, 7)
+    assert (study.cases, study.lost(None, "killed")) == (cases_of(errors_of(scenario), 2), row_of(None))
+
+
+METRICS = {
+    "fault": {"at_s": 2.0}, "false_alarm": False, "departure": None,
+    "detection": {"time_s": 2.5, "delay_s": 0.5},
+    "isolation": {"fault": "elevator", "isolated": True, "correct": True},
+    "tracking": {
+        "pre_fault_rms_deg_s": {"p": 0.7, "q": 0.1, "r": 0.2},
+        "post_fault_rms_deg_s": {"p": 0.3, "q": 0.9, "r": 0.4},
+    },
+}  # fmt: skip
+GOOD = {
+    "failed": False, "false_alarm": False, "detected": True, "named": True, "misnamed": False, "lost": False,
+    "delay_s": 0.5, "tracking_deg_s": 0.9, "bound_used": 0.25,
+}  # fmt: skip
+UNNAMED = {"isolation": {"fault": None, "isolated": False, "correct": None}}
+WRONG = {"isolation": {"fault": "flap", "isolated": True, "correct": False}}
+SILENT = {"detection": {"time_s": None, "delay_s": None}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "differs"),
+    [
+        ({}, {}),
+        (UNNAMED, {"named": False}),
+        (WRONG, {"named": False, "misnamed": True}),
+        (SILENT | UNNAMED, {"named": False, "detected": False, "delay_s": None}),
+        ({"departure": {"time_s": 5.0, "signal": "beta_rad"}}, {"lost": True, "tracking_deg_s": None}),
+        (
+            {"fault": None} | SILENT | UNNAMED,  # a healthy flight tracks as it does before a fault
+            {"named": False, "detected": False, "delay_s": None, "tracking_deg_s": 0.7},
+        ),
+    ],
+)
+def test_a_row_is_of_what_was_measured(changes, differs):
+    assert row_of(Metrics.of(METRICS | changes), 0.25) == GOOD | differs
+
+
+def test_a_flight_is_flown_with_its_truth_and_counts_with_the_bound_that_it_used(monkeypatch):
+    flown = []
+
+    def fly(scenario):
+        flown.append(scenario)
+        if scenario.uncertainty.inertia_coupling.p > 0.0:
+            raise SimulationFailed("it broke")
+        return SimpleNamespace(closest_approach=(0.2, 0.75, 0.5))
+
+    monkeypatch.setattr(survey, "fly", fly)
+    monkeypatch.setattr(survey, "measure", lambda landing: Metrics.of(METRICS))
+    errors, rows = errors_of(DECLARED), []
+    for run in range(8):
+        flight = Flight("turbulence", 2.0, run)
+        rows.append(fly_one(DECLARED, 5, flight))
+        assert flown[-1] == scenario_of(DECLARED, errors, 5, flight)
+    assert {row["failed"] for row in rows} == {True, False}
+    for row, scenario in zip(rows, flown, strict=True):
+        fails = scenario.uncertainty.inertia_coupling.p > 0.0
+        assert row == (row_of(None) if fails else GOOD | {"bound_used": 0.75})
+
+
+def test_faults_come_later_together_and_end_so_much_later():
+    """At most four seconds, and five before the end at the latest; where there is no room, as declared."""
+    second = {"actuator": "rudder", "type": "bias", "bias_deg": 2.0, "at_s": 3.0, "end_s": 6.5}
+    for duration_s, most_s in ((30.0, 4.0), (10.0, 2.0), (8.0, 0.0), (7.5, 0.0)):
+        scenario = bf.load(SHORT | {"duration_s": duration_s, "faults": [LOSS, second]})
+        flown = [truth_of(scenario, TOGETHER, 1.0, run) for run in range(25)]
+        later_s = [one.faults[0].at_s - 1.5 for one in flown]
+        assert [one.faults[1].at_s - 3.0 for one in flown] == pytest.approx(later_s)
+        assert [one.faults[1].end_s - 6.5 for one in flown] == pytest.approx(later_s)
+        assert min(later_s) >= 0.0
+        assert 0.7 * most_s <= max(later_s) <= most_s
+        assert all(one.expect.model_dump(exclude_none=True) == {} for one in flown)
+
+
+@pytest.mark.parametrize(
+    ("declared", "severities"),
+    [
+        ("none", ["light", "light", "moderate", "severe"]),
+        ("light", ["light", "light", "moderate", "severe"]),
+        ("moderate", ["moderate", "severe", "severe", "severe"]), ("severe", ["severe"] * 4),
+    ],
+)  # fmt: skip
+def test_the_air_is_as_rough_as_the_size_of_its_error_allows(declared, severities):
+    scenario = bf.load(SHORT | {"fdi": {"bounds": {"turbulence": declared}}})
+    found = [truth_of(scenario, "turbulence", factor).environment.severity for factor in FACTORS]
+    assert found == severities
+    absent = truth_of(scenario, "inertia coupling", 2.0).environment
+    assert absent.severity == (None if declared == "none" else declared)
+
+
+def test_each_error_is_so_many_times_what_is_declared_of_it():
+    """Within what a scenario admits; an acceleration keeps the frequency that the scenario flies."""
+    flown = {"uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.001, "frequency_rad_s": 7.5}}}}
+    own = {"coefficients": 0.3, "inertia": 0.2, "sensors": {"q": {"bias_deg_s": 0.1, "noise_std_deg_s": 0.2}}}
+    scenario = bf.load(SHORT | flown | {"fdi": {"bounds": BOUNDS | own}})
+    says = {error.name: (error.says, error.declared) for error in errors_of(scenario)}
+    assert says == {
+        "moment coefficients": ("30 %", True), "moments of inertia": ("20 %", True),
+        "inertia coupling": ("0.2", True), "unstructured acceleration": ("0.03 rad/s2", True),
+        "sensor errors": ("as declared", True), "turbulence": ("light", True),
+    }  # fmt: skip
+    assert [error.says for error in errors_of(DECLARED)][-2:] == ["tactical-grade", "light"]
+    seen = set()
+    for run in range(9):
+        twice, four = (truth_of(scenario, TOGETHER, factor, run) for factor in (2.0, 4.0))
+        assert {round(abs(ratio - 1.0), 9) for ratio in twice.uncertainty.coefficients.values()} == {0.6}
+        assert set(four.uncertainty.coefficients.values()) == {0.1, 2.2}
+        assert {twice.uncertainty.inertia.Ix, twice.uncertainty.inertia.Iz} <= {0.6, 1.4}
+        assert {four.uncertainty.inertia.Iy, four.uncertainty.inertia.Iz} <= {0.5, 1.8}
+        for axis, size in (("p", 0.2), ("q", 0.1), ("r", 0.15)):
+            theta = getattr(twice.uncertainty.inertia_coupling, axis)
+            assert abs(theta) == pytest.approx(2.0 * size)
+            seen.add((axis, theta > 0.0))
+        waves = twice.uncertainty.sinusoid
+        sizes = [wave.amplitude_rad_s2 for wave in (waves.p, waves.q, waves.r)]
+        assert sizes == pytest.approx([0.04, 0.06, 0.02])
+        assert waves.q.frequency_rad_s == 7.5
+        assert 5.0 <= waves.p.frequency_rad_s != waves.r.frequency_rad_s <= 15.0
+        gyro = twice.sensors.q
+        assert (abs(gyro.bias_deg_s), gyro.noise_std_deg_s) == pytest.approx((0.2, 0.4))
+        seen.add(("bias", gyro.bias_deg_s > 0.0))
+        assert twice.sensors.p.is_ideal
+    assert len(seen) == 8  # of either sign
+
+
+def of_rows(**changes):
+    """Six flights of a row that can be told apart; the last could not be flown."""
+    rows = [
+        GOOD | {"delay_s": 0.1 * k, "tracking_deg_s": 0.3 * k, "bound_used": 0.01 * k, "false_alarm": k == 2}
+        for k in range(1, 6)
+    ]
+    rows[0] |= {"lost": True, "tracking_deg_s": None}
+    rows[1] |= {"detected": False, "named": False, "delay_s": None}
+    rows[2] |= {"misnamed": True, "named": False}
+    return [row | changes for row in rows] + [row_of(None)]
+
+
+def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest():
+    found = survey.summary(of_rows())
+    assert (found["flights"], found["failed"]) == (5, 1)
+    counts = {name: (found[name]["count"], found[name]["of"], found[name]["value"]) for name in
+              ("false_alarm", "detected", "named", "misnamed", "lost")}  # fmt: skip
+    assert counts == {
+        "false_alarm": (1, 5, 0.2), "detected": (4, 5, 0.8), "named": (3, 5, 0.6), "misnamed": (1, 5, 0.2),
+        "lost": (1, 5, 0.2),
+    }  # fmt: skip
+    assert found["lost"]["low"] == pytest.approx(1.0 - 0.975 ** (1 / 5))
+    assert (found["delay_s"]["value"], found["tracking_deg_s"]["value"]) == (0.4, pytest.approx(1.2))
+    assert found["bound_used"] == {"value": 0.03, "low": None, "high": None}
+
+
+@pytest.fixture(scope="module")
+def made():
+    """A document of which no two rows are alike: the failed flights aside, all of each number has it."""
+    errors = [Error("stiff", "4 %", None), Error("windy", "none; unit light", None, declared=False)]
+    cases = cases_of(errors, 6)
+    rows = []
+    for place in range(len(cases) // 6):
+        of = of_rows()
+        rows += [
+            row | ({} if row["failed"] else {"bound_used": 0.03 * place, "misnamed": place > 5}) for row in of
+        ]
+    return cases, document_of(DECLARED, errors, cases, 9, rows)
+
+
+def test_a_document_has_a_row_an_error_and_factor(made):
+    """What is declared is at its limit in the first row of all of them, which is flown once."""
+    cases, document = made
+    order = [("all together", 1.0), *(("stiff", f) for f in (1.5, 2.0, 4.0)),
+             *(("windy", f) for f in (1.0, 1.5, 2.0, 4.0)),
+             *(("all together", f) for f in (1.5, 2.0, 4.0))]  # fmt: skip
+    assert cases == [Flight(*row, run) for row in order for run in range(6)]
+    used = {row: 0.03 * place for place, row in enumerate(order)} | {("stiff", 1.0): 0.0}
+    assert [
+        (row["error"], row["declared"], row["factor"], row["bound_used"]["value"]) for row in document["rows"]
+    ] == [
+        (name, said, factor, pytest.approx(used[name, factor]))
+        for name, said in (("stiff", "4 %"), ("windy", "none; unit light"),
+                           ("all together", "all that are declared"))
+        for factor in (1.0, 1.5, 2.0, 4.0)
+    ]  # fmt: skip
+    rest = {key: value for key, value in document.items() if key not in ("rows", "versions")}
+    assert rest == {
+        "scenario": "short", "faults": 1, "seed": 9, "flights": 6, "confidence": 0.95,
+        "factors": [1.0, 1.5, 2.0, 4.0],
+        "errors": [
+            {"error": "stiff", "declared": "4 %", "is_declared": True},
+            {"error": "windy", "declared": "none; unit light", "is_declared": False},
+        ],
+    }  # fmt: skip
+
+
+def test_the_table_the_files_and_the_figure_have_every_row(made, tmp_path):
+    _, document = made
+    row = document["rows"][6]
+    assert cells(row) == (
+        "windy", "none; unit light", "2", "5", "20 (1 to 72)", "80 (28 to 99)", "60 (15 to 95)",
+        "100 (48 to 100)", "0.4", "1.2", "18",
+    )  # fmt: skip
+    read = list(csv.DictReader(FILES["decay.csv"](document).splitlines()))
+    assert len(read) == 12
+    assert (read[6]["error"], read[6]["factor"], read[6]["misnamed_count"], read[6]["failed"]) == (
+        "windy", "2.0", "5", "1"
+    )  # fmt: skip
+    assert (float(read[6]["bound_used_value"]), read[6]["delay_s_low"]) == (pytest.approx(0.18), "")
+    assert json.loads(FILES["decay.json"](document)) == json.loads(json.dumps(document))
+    for at, of in enumerate(document["rows"]):
+        of["tracking_deg_s"] |= {"low": 0.1 + at, "value": 0.5 + at, "high": 1.2 + at}
+    document["rows"][1]["tracking_deg_s"]["value"] = None  # of an aircraft that is lost
+    figure = FILES["decay.png"](document)
+    assert [axes.get_title() for axes in figure.axes] == [
+        "false alarms, %", "named rightly, %", "tracking RMS, deg/s"
+    ]  # fmt: skip
+    beside = {"stiff": 0.955, "windy": 0.97, "all together": 0.985}
+    for axes, (name, times) in zip(
+        figure.axes, (("false_alarm", 100.0), ("named", 100.0), ("tracking_deg_s", 1.0)), strict=True
+    ):  # fmt: skip
+        for curve, error in zip(axes.containers, beside, strict=True):
+            of = [r for r in document["rows"] if r["error"] == error and r[name]["value"] is not None]
+            line, _, (bars,) = curve.lines
+            places = [r["factor"] * beside[error] for r in of]
+            assert line.get_xdata() == pytest.approx(places)
+            assert line.get_ydata() == pytest.approx([times * r[name]["value"] for r in of])
+            ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
+            assert ends == [pytest.approx([times * r[name]["low"], times * r[name]["high"]]) for r in of]
+        assert [label.get_text() for label in axes.get_xticklabels()] == ["1", "1.5", "2", "4"]
+    (tmp_path / "decay.png").write_bytes(b"a picture")
+    page = FILES["decay.html"](document)(tmp_path)
+    order = [page.index(part) for part in (*sentences(document), "100 (48 to 100)", "In brackets", "<img")]
+    assert order == sorted(order)
 
 
 def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):

@@ -3,10 +3,12 @@ it."""
 
 import json
 from multiprocessing import Pipe
+from types import SimpleNamespace
 
 import pytest
 
 import beaver_ftc as bf
+from beaver_ftc_links.sitl import page as page_module
 from beaver_ftc_links.sitl.page import Shown, Watched
 from beaver_ftc_links.sitl.vehicle import Vehicle
 from beaver_ftc_live.page.session import ready_for_hands
@@ -122,3 +124,15 @@ def test_what_the_scenario_breaks_is_told_as_well():
     assert told[0] in ([], [("broken", "rudder: stuck")])
     assert told[1] == [("broken", "rudder: stuck")]
     assert told[2] == [("broken", "rudder: stuck"), ("repaired", "rudder: stuck")]
+
+
+def test_a_page_is_told_sixty_times_a_second_and_not_with_each_frame(vehicle, monkeypatch):
+    now = [50.0]
+    monkeypatch.setattr(page_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    page, told, followed = Page(vehicle), [], []
+    monkeypatch.setattr(page.shown, "_serve", lambda: told.append(now[0]))
+    monkeypatch.setattr(page.shown._pace, "follow", lambda *of: followed.append(of))
+    for now[0] in (50.0, 50.016, 50.0167, 50.02, 50.0333, 50.034):
+        page.shown.tick()
+    assert told == [50.0, 50.0167, 50.034]
+    assert followed == [(now_s, vehicle.flight.frames) for now_s in told]

@@ -18,15 +18,18 @@ import pytest
 from pymavlink.dialects.v20 import common
 from tools.autopilots import peers
 from tools.autopilots.small import Small
+from typer.testing import CliRunner
 
 import beaver_ftc as bf
+from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results import verdict
 from beaver_ftc.results.model import Metrics
 from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import Protocol
 from beaver_ftc_links.sitl import serve as serving
-from beaver_ftc_links.sitl.serve import Options, Pace, serve
+from beaver_ftc_links.sitl.serve import Endpoint, Options, Pace, serve
+from beaver_ftc_links.sitl.telling import Text
 
 CODE = "from beaver_ftc.cli.main import main; main()"
 CASE = """
@@ -293,6 +296,8 @@ def test_an_interrupted_flight_is_not_passed(protocol):
     said = []
     endpoint = serving.Endpoint(scenario(), Options(Protocol(protocol)), said.append)
     endpoint.vehicle.flight.step(frames=20)
+    endpoint.vehicle.off_rate, endpoint.pace.late_s = 7, 0.0012346
+    endpoint._teller.kept.append(Text(0.25, 4, "FDI: alarm on q"))
     endpoint.ended = True
     document = endpoint.result().metrics
     assert (document["passed"], document["interrupted_s"]) == (
@@ -302,7 +307,19 @@ def test_an_interrupted_flight_is_not_passed(protocol):
     assert verdict.title(Metrics.of(document)).endswith(
         f"INTERRUPTED at {document['interrupted_s']:.2f} s, not passed"
     )
-    assert any(line.startswith("interrupted at ") for line in said)
+    assert said == [f"interrupted at {endpoint.vehicle.flight.t_s:.2f} s of 1 s: not passed"]
+    assert document["flight"]["law"] == {"ardupilot": "ArduPilot", "px4": "PX4"}[protocol]
+    tracking = document["tracking"]
+    assert (tracking["pre_fault_rms_deg_s"], tracking["post_fault_rms_deg_s"]) == (None, None)
+    hz = 100 if protocol == "ardupilot" else 250
+    none = {"median": 0.0, "p99": 0.0, "largest": 0.0}
+    assert document["link"] == {
+        "protocol": protocol, "packets_hz": hz, "frames_hz": hz, "frames": 0, "repeated": 0, "late": 0,
+        "missed": 0, "resets": 0, "malformed": 0, "strangers": 0, "off_rate": 7, "silences": 0,
+        "latency_ms": none, "interval_ms": {"mean": 0.0, "jitter_rms": 0.0, "largest": 0.0},
+        "longest_silence_s": 0.0, "diagnosed_from_s": 0.0, "speed": 0.0 if protocol == "ardupilot" else 1.0,
+        "late_ms": 1.235, "said": [{"t_s": 0.25, "severity": 4, "text": "FDI: alarm on q"}],
+    }  # fmt: skip
 
 
 def test_a_complaint_is_said_once_until_another_and_who_goes_ends_nothing(monkeypatch):
@@ -350,3 +367,103 @@ def test_a_complaint_is_said_once_until_another_and_who_goes_ends_nothing(monkey
     assert said == ["10 Hz", "5 Hz", "10 Hz"]
     assert (sent, answered, silences) == ([(b"fine", "it")], [4, 2], [5])
     assert listener.seconds == serving.WAIT_S
+
+
+class Body:
+    """A vehicle that flies nothing: how it was made, and how many outputs were asked of it."""
+
+    def __init__(self, *made):
+        self.made, self.checked = made, []
+        self.outputs = SimpleNamespace(check=self.checked.append, channels="channels")
+        self.flight = SimpleNamespace(frames=30, rate_hz=20.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "made", "speed", "checked"),
+    [
+        ({"protocol": Protocol.ardupilot}, (True, None, 0.0, None), 0.0, []),
+        ({"protocol": Protocol.px4}, (False, 250.0, 0.0, None), 1.0, [16]),
+        (
+            {"protocol": Protocol.px4, "rate_hz": 50.0, "speed": 0.0, "hold_s": 2.0, "ground_m": 300.0},
+            (False, 50.0, 2.0, 300.0), 0.0, [16],
+        ),
+        ({"protocol": Protocol.ardupilot, "rate_hz": 80.0, "speed": 3.0}, (True, 80.0, 0.0, None), 3.0, []),
+    ],
+)  # fmt: skip
+def test_each_autopilot_has_its_rate_and_its_pace_unless_they_are_given(
+    monkeypatch, options, made, speed, checked
+):
+    """ArduPilot's pulses at the rate of its packets, as fast as it asks; PX4's shares at 250 Hz, by the
+    clock."""
+    monkeypatch.setattr(serving, "Vehicle", Body)
+    endpoint = Endpoint("scenario", Options(**options), print)
+    assert endpoint.vehicle.made == ("scenario", *made)
+    assert (endpoint.pace.speed, endpoint.vehicle.checked) == (speed, checked)
+    assert {Protocol.ardupilot: 9002, Protocol.px4: 4560} == serving.PORTS
+    assert (endpoint._ground, endpoint._page, endpoint.ended) == (None, None, False)
+
+
+def test_what_is_new_is_said_to_all_and_then_the_answer_waits_for_its_time(monkeypatch):
+    """To people, and to the ground station before it is asked for commands; a restart is said once."""
+    monkeypatch.setattr(serving, "Vehicle", Body)
+    done = []
+    endpoint = Endpoint("scenario", Options(Protocol.px4, speed=2.0), done.append)
+    texts = [Text(1.5, 4, "FDI: alarm on q"), Text(1.5, 2, "FDI: flap")]
+    endpoint._teller = SimpleNamespace(
+        begin=lambda: done.append("begin"), news=lambda sim: texts if sim is endpoint.vehicle.flight else None
+    )
+
+    def serve_ground(now_s, inject):
+        assert (now_s, inject) == (77.0, endpoint.inject)
+        return ["rudder: stuck"]
+
+    def wait(t_s, ended):
+        done.append(("wait", t_s, ended()))
+        endpoint.ended = True
+        assert ended()
+        endpoint.ended = False
+
+    endpoint._ground = SimpleNamespace(say=lambda said: done.append(("ground", said)), serve=serve_ground)
+    endpoint._page = SimpleNamespace(tick=lambda: done.append("page"))
+    endpoint.pace = SimpleNamespace(wait=wait)
+    monkeypatch.setattr(serving, "time", SimpleNamespace(monotonic=lambda: 77.0, perf_counter=lambda: 5.25))
+    told = [
+        "1.50 s: FDI: alarm on q", "1.50 s: FDI: flap", ("ground", texts), "page", "rudder: stuck",
+        ("wait", 1.5, False),
+    ]  # fmt: skip
+    assert endpoint.after(5.0) == texts
+    assert done == told
+    done.clear()
+    endpoint.link.counts["resets"] += 1
+    for before in (["begin", "restarted"], []):
+        endpoint.after(5.0)
+        assert done == [*before, *told]
+        done.clear()
+    assert (endpoint.link.latency.count, endpoint.link.latency.largest) == (3, 0.25)
+    asked = []
+    monkeypatch.setattr(serving.failures, "inject", lambda *of: asked.append(of) or (0, "done"))
+    assert endpoint.inject((102.0, 2.0, 3.0)) == (0, "done")
+    assert asked == [(endpoint.vehicle.flight, "channels", (102.0, 2.0, 3.0))]
+
+
+def test_every_option_of_the_command_is_the_endpoint_s(monkeypatch, capsys):
+    """Each of another value, and those that it has by itself."""
+    given = []
+
+    def stop(scenario, options, say):
+        given.append((scenario.name, options))
+        say("a line")
+        raise BadInput("that is all")
+
+    monkeypatch.setattr(serving, "serve", stop)
+    more = "--host 10.0.0.1 --port 7 --rate 80 --speed 3 --hold 2 --ground 300 --mavlink 10.0.0.2:9 --page 11"
+    for arguments in ("--as ardupilot", f"--as px4 {more}"):
+        done = CliRunner().invoke(app, ["sitl", "fault-free", *arguments.split()])
+        assert str(done.exception) == "that is all"
+    assert given == [
+        ("fault-free", Options(Protocol.ardupilot, "127.0.0.1", None, None, None, 0.0, None, None, None)),
+        ("fault-free", Options(
+            protocol=Protocol.px4, host="10.0.0.1", port=7, rate_hz=80.0, speed=3.0, hold_s=2.0,
+            ground_m=300.0, ground=("10.0.0.2", 9), page=11,
+        )),
+    ]  # fmt: skip

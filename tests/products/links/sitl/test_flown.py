@@ -205,6 +205,91 @@ def test_what_the_autopilot_is_told_is_one_motion():
     down = np.array([rotation(*angles).T @ f for angles, f in zip(attitude, force, strict=True)])
     felt = np.gradient(velocity, t, axis=0)[2:-2] - [0.0, 0.0, 9.806]
     assert np.allclose(felt, down[2:-2], atol=0.06)  # the Earth turns, and is round
+    airspeed, beta, qdyn, altitude, latitude, longitude, height = (
+        np.array([getattr(now, name) for now in seen[1:]])
+        for name in (
+            "airspeed_mps", "beta_rad", "qdyn_pa", "altitude_m", "latitude_deg", "longitude_deg", "height_m",
+        )
+    )  # fmt: skip
+    body = np.array([rotation(*angles) @ v for angles, v in zip(attitude, velocity, strict=True)])
+    assert airspeed == pytest.approx(np.linalg.norm(velocity, axis=1), rel=1e-6)  # the air is still
+    assert beta == pytest.approx(np.arcsin(body[:, 1] / airspeed), abs=1e-6)
+    assert np.ptp(beta) > 1e-3
+    assert qdyn == pytest.approx(0.5 * 1.0253 * airspeed**2, rel=0.01)  # at 1829 m [ISA]
+    assert altitude == pytest.approx(height, abs=0.01)
+    assert height == pytest.approx(100.0 - position[:, 2], abs=1e-6)
+    # the geodetic radii at 45 degrees north, and height [WGS 84]
+    assert np.radians(latitude - latitude[0]) * (6_367_382 + 1829) == pytest.approx(
+        position[:, 0] - position[0, 0], abs=1.0
+    )
+    assert np.radians(longitude - longitude[0]) * (4_517_590 + 1293) == pytest.approx(
+        position[:, 1] - position[0, 1], abs=1.0
+    )
+    assert position[-1, 0] > 200.0
+    assert np.abs(position[-1, 1]) > 1.0
+    assert np.array_equal(attitude, [now.true_attitude for now in seen[1:]])
+
+
+def test_every_instrument_that_is_told_is_told_with_its_own_error():
+    """Eleven of them, each with a bias of another size; what none of them measures stays true."""
+    biases = {
+        "p": 0.5, "q": -0.75, "r": 1.25, "phi": 2.0, "theta": -1.5, "psi": 3.0, "beta": 0.8, "ax": 0.11,
+        "ay": -0.13, "az": 0.17, "V": 1.7, "qdyn": 40.0, "altitude": 7.0,
+    }  # fmt: skip
+    found = []
+    for size in (0.0, 1.0):
+        faults = [
+            {"type": "bias", "sensor": name, "magnitude": size * bias, "at_s": 0.0}
+            for name, bias in biases.items()
+        ]
+        vehicle = Vehicle(scenario(faults=faults if size else faults[:0]), pulses=True)
+        vehicle.fly([0] * 16, 100)
+        found.append(vehicle.instant())
+    sound, broken = found
+    differences = {name: np.subtract(getattr(broken, name), getattr(sound, name)) for name in sound._fields}
+    degrees = {name: np.radians(biases[name]) for name in ("p", "q", "r", "phi", "theta", "psi", "beta")}
+    expected = {
+        "t_s": 0.0, "gyro": [degrees[name] for name in "pqr"], "force": [0.11, -0.13, 0.17],
+        "attitude": [degrees[name] for name in ("phi", "theta", "psi")], "airspeed_mps": 1.7,
+        "beta_rad": degrees["beta"], "qdyn_pa": 40.0, "altitude_m": 7.0, "position": [0.0] * 3,
+        "velocity": [0.0] * 3, "latitude_deg": 0.0, "longitude_deg": 0.0, "height_m": 0.0,
+        "true_attitude": [0.0] * 3,
+    }  # fmt: skip
+    assert {name: difference.tolist() for name, difference in differences.items()} == {
+        name: pytest.approx(value, abs=1e-9) for name, value in expected.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("substeps", "packets_hz", "rate_hz", "flown"),
+    [
+        (1, 20, 20, 1), (1, 400, 400, 1), (5, 100, 100, 5), (1, 401, 200.5, 2), (3, 800, 400, 4),
+        (4, 1200, 400, 6), (2, 1000, 1000 / 3, 3), (1, 4000, 400, 10), (10, 4000, 400, 10),
+        (11, 4000, 400, 20),
+    ],
+)  # fmt: skip
+def test_fast_packets_are_a_whole_part_of_a_frame_of_the_diagnosis(substeps, packets_hz, rate_hz, flown):
+    """No more than 400 Hz, and as many steps of the model as asked for, or more."""
+    given = scenario(
+        substeps=substeps,
+        **{
+            "control.law": "lqr",
+            "reference": {"p": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}]},
+        },
+    )
+    found = at_rate(given, packets_hz)
+    assert (found.rate_hz, found.substeps) == (pytest.approx(rate_hz), flown)
+    assert (found.control.law, found.control.options) == ("nominal", {})
+    assert found.reference == scenario().reference
+    assert found.faults == given.faults
+
+
+@pytest.mark.parametrize("packets_hz", [19.9, 4000.5])
+def test_rates_beyond_the_limits_are_refused(packets_hz):
+    with pytest.raises(BadInput) as refused:
+        at_rate(scenario(), packets_hz)
+    says = f"frames of an autopilot at {packets_hz:g} Hz, allowed: 20 to 4000 Hz, or --rate"
+    assert str(refused.value) == f"elevator-partial-loss: {says}"
 
 
 def test_a_broken_gyro_breaks_what_the_autopilot_is_told():

@@ -237,19 +237,95 @@ def test_a_state_is_read_again_as_it_was_at_altitude():
         "ind_airspeed": round(100.0 * np.sqrt(2.0 * 1520.0 / 1.225)), "true_airspeed": 6100,
         "xacc": round(1300 / g), "yacc": round(-2900 / g), "zacc": round(-9100 / g),
     }  # fmt: skip
-    assert {name: found[name] for name in expected} == pytest.approx(expected)
-    assert found["attitude_quaternion"] == pytest.approx(quaternion(*ALOFT.true_attitude))
+    assert found.pop("mavpackettype") == "HIL_STATE_QUATERNION"
+    assert found.pop("attitude_quaternion") == pytest.approx(quaternion(*ALOFT.true_attitude))
+    assert found == pytest.approx(expected)
     (fix,) = line.unpack(line.pack(gps(line.messages, ALOFT, 4_000_000)))
-    found = fix.to_dict()
     course = round(100.0 * np.degrees(np.arctan2(-13.0, 58.0))) % 36000
-    expected = {"lat": 450036000, "lon": -9500, "alt": 2_890_000, "vn": 5800, "ve": -1300, "vd": 250,
-                "vel": round(100.0 * np.hypot(58.0, 13.0)), "cog": course, "fix_type": 3}  # fmt: skip
-    assert {name: found[name] for name in expected} == expected
+    assert fix.to_dict() == {
+        "mavpackettype": "HIL_GPS", "time_usec": 4_000_000, "fix_type": 3, "lat": 450036000, "lon": -9500,
+        "alt": 2_890_000, "eph": 30, "epv": 40, "vel": round(100.0 * np.hypot(58.0, 13.0)), "vn": 5800,
+        "ve": -1300, "vd": 250, "cog": course, "satellites_visible": 12, "id": 0, "yaw": 0,
+    }  # fmt: skip
     (felt,) = line.unpack(line.pack(sensor(line.messages, ALOFT, 4_000_000, True)))
     found = felt.to_dict()
-    expected = {"xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23, "zgyro": 0.37,
-                "diff_pressure": 15.2, "pressure_alt": 3050.0, "abs_pressure": 696.8}  # fmt: skip
-    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-3)
+    assert found.pop("mavpackettype") == "HIL_SENSOR"
+    north, east, down = (  # of a field of 0.467 gauss, 60.5 degrees down, 1.2 degrees east of north
+        0.467 * share
+        for share in (
+            np.cos(np.radians(60.5)) * np.cos(np.radians(1.2)),
+            np.cos(np.radians(60.5)) * np.sin(np.radians(1.2)),
+            np.sin(np.radians(60.5)),
+        )
+    )
+    phi, theta, psi = ALOFT.true_attitude
+    ahead = np.cos(psi) * north + np.sin(psi) * east
+    right = np.cos(psi) * east - np.sin(psi) * north
+    below = np.cos(theta) * down + np.sin(theta) * ahead
+    expected = {
+        "time_usec": 4_000_000, "xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23,
+        "zgyro": 0.37, "xmag": np.cos(theta) * ahead - np.sin(theta) * down,
+        "ymag": np.cos(phi) * right + np.sin(phi) * below, "zmag": np.cos(phi) * below - np.sin(phi) * right,
+        "abs_pressure": 696.8, "diff_pressure": 15.2, "pressure_alt": 3050.0,
+        "temperature": 15.0 - 6.5 * 3.05, "fields_updated": 0b1111111111111, "id": 0,
+    }  # fmt: skip
+    assert found == pytest.approx(expected, rel=2e-3)
+    (felt,) = line.unpack(line.pack(sensor(line.messages, ALOFT, 4_000_000, False)))
+    inertial = expected | dict.fromkeys(("xmag", "ymag", "zmag"), 0.0) | {"fields_updated": 0b111111}
+    found = felt.to_dict()
+    del found["mavpackettype"]
+    assert found == pytest.approx(inertial, rel=2e-3)
+
+
+def test_what_a_field_cannot_hold_is_its_largest():
+    """Forces of more than 32 g; no indicated airspeed of a negative pressure, no course beyond north."""
+    line = Mavlink()
+    beyond = ALOFT._replace(force=(400.0, -400.0, 0.0), qdyn_pa=-3.0, velocity=(10.0, -1e-4, 0.0))
+    (found,) = line.unpack(line.pack(state(line.messages, beyond, 1)))
+    assert (found.xacc, found.yacc, found.zacc, found.ind_airspeed) == (32767, -32768, 0, 0)
+    (fix,) = line.unpack(line.pack(gps(line.messages, beyond, 1)))
+    assert (fix.cog, fix.vel, fix.vn, fix.ve) == (0, 1000, 1000, 0)
+
+
+def answered(stamp_us, armed=True):
+    """What the autopilot says to the instant with this stamp."""
+    from pymavlink.dialects.v20 import common
+
+    message = common.MAVLink_hil_actuator_controls_message(stamp_us, [0.5] * 16, 128 * armed, 0)
+    return message.pack(common.MAVLink(None))
+
+
+def test_an_answer_that_comes_later_is_late_and_noise_is_counted(px4):
+    """At 250 Hz the stamps are 4 ms apart; of the frame just before it is one sent again."""
+    px4.end.connect(0.0)
+    for frame in range(3):
+        assert px4.end.take(answered(1_000_000 + 4000 * frame, armed=frame == 1), 0.0)
+    assert [in_charge for *_, in_charge in px4.body.given] == [False, True, True]  # armed once, for good
+    for frame in (2, 1, 0, 4):
+        assert px4.end.take(answered(1_000_000 + 4000 * frame), 0.0) == b""
+    found = {name: px4.counts[name] for name in ("frames", "repeated", "late", "malformed")}
+    assert found == {"frames": 3, "repeated": 1, "late": 3, "malformed": 0}
+    for _ in range(2):
+        noisy = answered(1_000_000 + 4000 * (3 + _))
+        assert px4.end.take(b"noise" + noisy, 0.0)
+    assert px4.counts["malformed"] == px4.end._mav.malformed > 1
+    px4.body.over = True
+    assert px4.end.take(answered(1_000_000 + 4000 * 5), 0.0) == b""
+    assert px4.counts["frames"] == 5
+
+
+def test_while_it_starts_a_frame_passes_with_each_step_and_none_after_the_end(px4):
+    px4.end.connect(10.0)
+    assert px4.end.tick(10.019, 0.02) == b""
+    assert px4.end.tick(10.021, 0.02)
+    assert px4.end.tick(10.04, 0.02) == b""
+    assert px4.body.given == [((), 250.0, False)]
+    px4.body.over = True
+    assert px4.end.tick(11.0, 0.02) == b""
+    px4.body.over = False
+    px4.end.take(answered(1_004_000), 11.0)
+    assert px4.end.tick(11.99, 0.02) == b""
+    assert list(kinds_of(px4.end.tick(12.0, 0.02))) == [107]
 
 
 @pytest.mark.parametrize(("last", "again", "number", "peer", "anew"), [

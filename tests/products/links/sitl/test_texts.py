@@ -1,5 +1,7 @@
 """What is said of a flight, and what a MAVLink command breaks in it."""
 
+import select
+import socket
 from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,7 +21,7 @@ from beaver_ftc.results import Metrics
 from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.link import COUNTED, Link, Times
-from beaver_ftc_links.sitl.mavlink import Mavlink
+from beaver_ftc_links.sitl.mavlink import GroundLine, Mavlink
 from beaver_ftc_links.sitl.serve import Endpoint
 from beaver_ftc_links.sitl.telling import CRITICAL, INFO, WARNING, Teller, Text
 from beaver_ftc_links.sitl.vehicle import Flown, Vehicle
@@ -278,3 +280,109 @@ def test_an_address_is_a_host_and_a_port(given, found):
             address(given)
     else:
         assert address(given) == found
+
+
+def test_what_came_over_the_wire_is_a_document_of_counts_and_of_times_in_ms():
+    link = Link()
+    for now_s in (10.0, 10.02, 10.06, 11.06, 13.5, 13.56):  # of 1 s, too: no silence yet
+        link.hear(now_s)
+    for time_s in (0.001, 0.002, 0.0045, 0.001):
+        link.latency.add(time_s)
+    for count, name in enumerate(COUNTED, 2):
+        link.counts[name] += count
+    found = link.document()
+    gaps_ms = np.array([20.0, 40.0, 1000.0, 60.0])
+    assert list(found) == [*COUNTED, "latency_ms", "interval_ms", "longest_silence_s"]
+    assert [found[name] for name in COUNTED] == [2, 3, 4, 5, 6, 7, 8, 9, 11]  # one silence is its own
+    assert found["interval_ms"] == pytest.approx(
+        {"mean": gaps_ms.mean(), "jitter_rms": gaps_ms.std(), "largest": 1000.0}, abs=1e-3
+    )
+    assert found["longest_silence_s"] == 2.44
+    assert found["latency_ms"] == pytest.approx({"median": 1.0, "p99": 4.5, "largest": 4.5}, rel=0.04)
+    assert found["latency_ms"]["p99"] == 4.5
+
+
+SERVOS = {1: {"type": "float"}, 2: {"type": "stuck"}, 4: {"type": "hardover", "direction": 1},
+          3: {"type": "oscillatory", "amplitude_deg": 3.0, "frequency_rad_s": 10.0},
+          5: {"type": "rate_limit", "scale": 0.1}}  # fmt: skip
+INSTRUMENTS = {1: {"type": "lost"}, 2: {"type": "freeze"}, 4: {"type": "scale", "magnitude": 0.3}}
+OF_UNITS = {0: ("p", "q", "r"), 1: ("ax", "ay", "az"), 3: ("altitude",), 8: ("V", "qdyn"), 7: (), 102: ()}
+
+
+@pytest.mark.parametrize("unit", OF_UNITS)
+def test_every_unit_and_type_of_a_command_breaks_or_repairs_its_own(unit):
+    """FAILURE_UNIT by FAILURE_TYPE [MAVLink, common.xml]: of servos the second and fourth output, of all."""
+    channels = SimpleNamespace(
+        surfaces={"aileron": [SimpleNamespace(channel=2)], "flap": [SimpleNamespace(channel=4)]}
+    )
+    done = []
+    sim = SimpleNamespace(airframe=load(), inject=done.append, repair=done.append)
+    for kind in range(-1, 8):
+        for which in (0, 2, 3):
+            done.clear()
+            params = (unit + 0.2, kind - 0.3, which + 0.4)  # they come as floats
+            result, says = failures.inject(sim, channels, params)
+            servo = unit == 102
+            places = {0: ("aileron", "flap"), 2: ("aileron",)}.get(which, ()) if servo else OF_UNITS[unit]
+            faults = {0: None} | (SERVOS if servo else INSTRUMENTS)
+            if not places or kind not in faults:
+                assert (result, done) == (3, [])
+                assert says == f"unit {unit}, type {kind}, number {which}: nothing of this aircraft"
+            elif kind == 0:
+                assert (result, says) == (0, f"{', '.join(places)}: repaired")
+                assert done == [*(places if servo else (f"sensor {place}" for place in places))]
+            else:
+                words = faults[kind]["type"].replace("_", " ")
+                assert (result, says) == (0, f"{', '.join(places)}: {words}")
+                assert done == [
+                    {"actuator" if servo else "sensor": place, **faults[kind]} for place in places
+                ]
+    assert failures.inject(sim, channels, (2e6, 1.0, 0.0))[0] == 3
+    assert failures.inject(sim, channels, (float("inf"), 1.0, 0.0))[1].startswith("unit -1, ")
+
+
+def test_a_ground_station_has_a_heartbeat_a_second_texts_and_its_commands_done():
+    def received():
+        found = []
+        while select.select([station], [], [], 0.0)[0]:
+            found += common.MAVLink(None).parse_buffer(station.recv(4096))
+        return found
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind(("127.0.0.1", 0))
+        line = GroundLine(*station.getsockname())
+        asked = []
+
+        def inject(params):
+            asked.append(params)
+            return 2, f"done {len(asked)}"
+
+        times = [
+            t_s for t_s in (0.0, 0.5, 0.99, 1.0, 1.5, 2.0, 2.4) if not line.serve(t_s, inject) and received()
+        ]
+        assert times == [0.0, 1.0, 2.0]
+        line.say([])
+        assert received() == []
+        line.say([Text(1.0, 4, "FDI: alarm on q"), Text(1.0, 2, "FDI: flap")])
+        said = received()
+        assert [(each.severity, each.text) for each in said] == [(4, "FDI: alarm on q"), (2, "FDI: flap")]
+        station.connect(("127.0.0.1", socket_port(line)))
+        sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
+        for which in (3, 4):
+            of = (1, 191, 420, 0, 102, 2, which, 0, 0, 0, 0)
+            station.send(common.MAVLink_command_long_message(*of).pack(sender))
+        assert line.serve(2.5, inject) == ["done 1", "done 2"]
+        assert asked == [(102.0, 2.0, 3.0), (102.0, 2.0, 4.0)]
+        acks = [(each.command, each.result, each.target_system) for each in received()]
+        assert acks == [(420, 2, 255)] * 2
+        assert line.serve(9.0, inject) == []
+        (beat,) = received()
+        kind = (beat.type, beat.autopilot, beat.base_mode, beat.custom_mode, beat.system_status)
+        assert kind == (common.MAV_TYPE_ONBOARD_CONTROLLER, common.MAV_AUTOPILOT_INVALID, 0, 0, 4)
+        assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 191)
+        line.close()
+        assert line.fileno() == -1
+
+
+def socket_port(line):
+    return line._socket.getsockname()[1]

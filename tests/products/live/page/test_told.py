@@ -338,3 +338,28 @@ def test_a_terminal_is_told_whose_link_is_whose(capsys):
         "live: http://a", "guest 1: http://b", "guest 2: http://c", "anyone",
         "Open the first in a browser, give a guest one of the others; Ctrl-C ends the flight.",
     ]  # fmt: skip
+
+
+def test_of_a_flight_that_is_over_all_may_be_asked_but_what_flies_on(session, monkeypatch):
+    done = []
+    for do in (*ASKS, "fresh", "save", "stick", "game"):
+        monkeypatch.setattr(session, f"_{do}", lambda request: done.append(request.do) or "done")
+    for over in (False, True):
+        monkeypatch.setattr(Session, "over", over)
+        done.clear()
+        for do, more in ASKS.items():
+            if over:
+                with pytest.raises(BadInput, match=r"^the flight is over, allowed: a new flight$"):
+                    asked(session, do=do, **more)
+            else:
+                assert asked(session, do=do, **more) == "done"
+        for do, more in (("fresh", {}), ("save", {}), ("stick", {"rates_deg_s": [0, 0, 0]}),
+                         ("game", {"move": "stop"})):  # fmt: skip
+            assert asked(session, do=do, **more) == "done"
+        assert done == [*(() if over else ASKS), "fresh", "save", "stick", "game"]
+
+
+ASKS = {
+    "break": {"fault": LOSS}, "repair": {}, "blow": {"velocity_mps": [0, 1, 0]}, "aim": {"altitude_m": 1},
+    "change": {"law": "lqr"},
+}  # fmt: skip

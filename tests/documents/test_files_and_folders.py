@@ -1,5 +1,6 @@
 """Files that strangers name, folders that code is run from, and keys of scenarios: each at its bounds."""
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -288,3 +289,36 @@ def test_duplicates_are_told_with_their_first_line_and_read_past():
     ]
     many = parse("a: 1\n" * 102)
     assert len(many.problems) == 100
+
+
+def test_files_of_the_package_are_named_by_their_names_and_contents(tmp_path):
+    """And by their order; a byte that moves from one file to the next is another name."""
+    made = {}
+    for folder, contents in enumerate([("ab", "c"), ("a", "bc"), ("ab", "c")]):
+        (tmp_path / str(folder)).mkdir()
+        made[folder] = [tmp_path / str(folder) / name for name in ("one.py", "two.py")]
+        for file, content in zip(made[folder], contents, strict=True):
+            file.write_text(content)
+    names = [files.digest_of_files(*made[folder]) for folder in made]
+    assert names[0] == names[2] != names[1]
+    assert names[0] == hashlib.sha256(b"one.py 2 abtwo.py 1 c").hexdigest()[:16]
+    assert files.digest_of_files(*reversed(made[0])) != names[0]
+
+
+def test_code_that_another_user_can_write_is_not_read(tmp_path):
+    file = tmp_path / "code"
+    file.write_bytes(b"code")
+    for mode, why in ((0o600, ""), (0o644, ""), (0o620, "its mode is 0620"), (0o602, "its mode is 0602")):
+        file.chmod(mode)
+        assert files.read_own(file) == (b"" if why else b"code", why)
+    (tmp_path / "link").symlink_to(file)
+    with pytest.raises(OSError, match="link"):
+        files.read_own(tmp_path / "link")
+
+
+def test_data_lie_in_the_package_where_it_is_installed(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "PACKAGE", tmp_path / "root" / "src" / "beaver_ftc")
+    monkeypatch.setattr(files, "_INSTALLED", tmp_path / "data")
+    assert files.data_root() == tmp_path / "root"
+    (tmp_path / "data").mkdir()
+    assert files.data_root() == tmp_path / "data"

@@ -1,11 +1,12 @@
 """Reference signals against their definition by another road: areas, zero crossings, closed forms."""
 
 from math import pi, radians
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario import signals
+from beaver_ftc.scenario import sensors, signals
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import sample
 
@@ -166,3 +167,47 @@ def test_frames_are_sampled_from_any_one_on_and_nobody_changes_them():
     assert np.degrees(sampled) == pytest.approx(np.column_stack([[0] * 4, [4, 4.08, 4.16, 4.24], [0] * 4]))
     with pytest.raises(ValueError, match="read-only"):
         sampled[0, 0] = 1.0
+
+
+def test_what_happens_at_an_instant_is_in_force_from_the_first_frame_not_before_it():
+    """At 100 Hz: times are off by a rounding, as sums of frames are."""
+    for time_s, frame in (
+        (0.0, 0),
+        (0.29, 29),
+        (0.29 + 5e-10, 29),
+        (0.29 - 5e-10, 29),
+        (0.2900001, 30),
+        (7, 700),
+    ):
+        assert signals.frame_of(time_s, 100.0) == frame
+        assert signals.first_frame_s(time_s, 100.0) == pytest.approx(frame / 100.0)
+    assert signals.first_frame_s(0.11, 25.0) == pytest.approx(0.12)
+    assert list(signals.is_before(np.array([1.9, 2 - 2e-9, 2 - 5e-10, 2.0]), 2.0)) == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    ends, stays = SimpleNamespace(at_s=1.0, end_s=3.0), SimpleNamespace(at_s=1.0, end_s=None)
+    at_s = np.array([0.9, 1 - 2e-9, 1 - 5e-10, 2.0, 3 - 2e-9, 3 - 5e-10, 9.0])
+    assert list(signals.is_in_force(ends, at_s)) == [False, False, True, True, True, False, False]
+    assert list(signals.is_in_force(stays, at_s)) == [False, False, True, True, True, True, True]
+    assert (signals.is_in_force(ends, 2.0), signals.is_in_force(ends, 3.0)) == (True, False)
+
+
+def test_a_fault_grows_from_its_beginning():
+    grows = SimpleNamespace(profile="incipient", kappa_per_s=0.5, at_s=3.0)
+    assert [signals.grown_share(grows, t_s) for t_s in (1.0, 3.0, 5.0, 7.0)] == pytest.approx(
+        [0.0, 0.0, 1.0 - np.exp(-1.0), 1.0 - np.exp(-2.0)]
+    )
+    assert signals.grown_share(SimpleNamespace(profile="abrupt"), 3.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "dt", "frames"),
+    [(0.0, 0.01, 1), (5.0, 0.01, 20), (5.0, 0.0025, 80), (30.0, 0.01, 3), (400.0, 0.01, 1)],
+)
+def test_an_instrument_is_read_at_its_own_rate(monkeypatch, rate_hz, dt, frames):
+    rows = [sensors.ROWS[0], sensors.ROWS[1]._replace(rate_hz=rate_hz)]
+    monkeypatch.setattr(sensors, "ROWS", rows)
+    assert (sensors.frames_apart(1, dt), sensors.frames_apart(0, dt)) == (frames, 1)

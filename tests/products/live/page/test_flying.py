@@ -47,8 +47,8 @@ class Wire:
 
 @pytest.fixture
 def flown(tmp_path, monkeypatch):
-    def fly(*script, break_at_s=None):
-        session = Session(bf.load("fault-free"), tmp_path, seed=1)
+    def fly(*script, break_at_s=None, rate_hz=100):
+        session = Session(bf.load("fault-free").with_({"rate_hz": rate_hz}), tmp_path, seed=1)
         wire = Wire([(at_s, page, text if page == 0 else json.dumps(text)) for at_s, page, text in script])
         monkeypatch.setattr(flying, "time", SimpleNamespace(monotonic=lambda: wire.now_s))
         if break_at_s is not None:
@@ -156,9 +156,9 @@ def test_a_guest_is_named_in_what_it_does_until_it_leaves(flown):
 
 def test_a_new_flight_is_introduced_to_all_and_goes_on_after_a_pause(flown):
     pause, fresh = {"do": "pause", "on": True}, {"do": "fresh", "scenario": "rudder-stuck"}
-    wire = flown((0.0, 0, "joined 1"), (0.5, 1, pause), (1.0, 1, fresh), (1.5, 0, "end"))
+    wire = flown((0.0, 0, "joined 1"), (0.5, 1, pause), (1.0, 1, fresh), (1.5, 0, "end"), rate_hz=50)
     (hello,) = wire.of("hello", page=0)
-    assert hello["scenario"] == "rudder-stuck"
+    assert (hello["scenario"], hello["rate_hz"]) == ("rudder-stuck", 100)
     assert wire.times(1.0)[-1] == pytest.approx(0.5, abs=0.06)
     assert not wire.of("s")[-1]["paused"]
 

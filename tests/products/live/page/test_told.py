@@ -14,6 +14,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.commands import live as live_command
 from beaver_ftc_live.page import messages, reports
+from beaver_ftc_live.page import session as session_module
 from beaver_ftc_live.page.session import Session, as_live, changes_of, fault_types
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
@@ -363,3 +364,22 @@ ASKS = {
     "break": {"fault": LOSS}, "repair": {}, "blow": {"velocity_mps": [0, 1, 0]}, "aim": {"altitude_m": 1},
     "change": {"law": "lqr"},
 }  # fmt: skip
+
+
+def test_sensors_that_are_exchanged_are_declared_as_well(session, monkeypatch):
+    """Law and diagnosis are what is asked, and no more is said of the flight than that."""
+    changed = []
+    monkeypatch.setattr(session.sim, "change", changed.append)
+    before = dict(session.flying)
+    for request in ({"sensors": "consumer-grade", "law": "lqr"}, {"scheme": "none"}):
+        asked(session, do="change", **request)
+    grade = "consumer-grade"
+    assert changed == [{"law": "lqr", "sensors": grade, "declared_sensors": grade}, {"scheme": "none"}]
+    assert session.flying == before | {"law": "lqr", "sensors": grade, "scheme": "none"}
+
+
+def test_an_autopilot_holds_what_the_aircraft_can_be_asked_for(monkeypatch):
+    fresh = messages.parse(json.dumps({"do": "fresh", "autopilot": True}))
+    monkeypatch.setattr(session_module, "channels_of", lambda of: ("bank_deg", "heading_deg", "altitude_m"))
+    held = {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}
+    assert changes_of(fresh, load()) == {"autopilot": held}

@@ -1,12 +1,14 @@
 """The fit in steps: coefficients from accelerations, columns that are taken, errors in boxes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc_aircraft.derive import fit
-from beaver_ftc_aircraft.derive.sample import REACHES
+from beaver_ftc_aircraft.derive.sample import REACHES, Moves
+from telling import numbers
 
 from .known import aircraft, moving, states
 
@@ -247,3 +249,97 @@ def test_ends_are_rounded_outwards_to_five_digits(value, down, up):
 def test_a_term_as_a_file_has_it(of, surface, name):
     expected = {"name": name, "value": 0.12345679, "of": of} | ({"surface": surface} if surface else {})
     assert fit._term("Cl", of, surface, 0.123456789123) == expected
+
+
+REGIONS, SHARES = 2, (0.3, 0.7, 1.0)
+
+
+def in_regions(of, n, seed, beside):
+    """States of two regions, in boxes 0 to 7, that take turns; three shares of the travel."""
+    rng = np.random.default_rng(seed)
+    found = states(of, n, seed)
+    box, level = rng.integers(0, 8, n), rng.integers(0, 3, n)
+    x = found.x * rng.uniform(0.1, 1.0, (n, 1)) + 0.3 * (box % 2)[:, None]
+    return moving(of, replace(found, x=x, box=box, level=level), beside * rng.uniform(0.1, 1.0, (n, 3)))
+
+
+def test_each_region_has_boxes_of_its_own_that_hold_its_states_and_their_errors(trainer):
+    """Every end and error of the map against the states themselves: the most of those of the same region, in
+    the box or one inside, as old or younger, moved as much or less, and 1.3 times that is declared."""
+    first = in_regions(trainer, 90, 4, np.array([0.001, 0.002, 0.003]))
+    second = in_regions(trainer, 70, 5, np.array([0.002, 0.001, 0.004]))
+    flown = replace(in_regions(trainer, 8, 6, np.zeros(3)), age=np.zeros(8, int))
+    flown.y[:, 2] = 99.0  # in no box
+    told, worst = fit.map_of(trainer, (first, second), flown, REGIONS, Moves(SHARES, 0.5))
+    boxes = told.pop("boxes")
+    assert told == {"travel_share": [0.3, 0.7, 1.0], "stand_ins": 0.5, "until_s": [120.0, 900.0, 7200.0]}
+    sets = [
+        (of, np.abs(of.rate - fit_of.rate))
+        for of in (first, second)
+        for fit_of in [moving(trainer, of, np.zeros(3))]
+    ]
+    assert len(boxes) == 8
+    for b, box in enumerate(boxes):
+        own = [(of.box <= b) & (of.box % 2 == b % 2) for of, _ in sets]
+        seen = np.concatenate([
+            np.column_stack([
+                of.x, of.y[:, :3], 2.0 * of.y[:, 3] / of.y[:, 2] ** 2, *of.signals.values(),
+            ])[k]
+            for (of, _), k in zip(sets, own, strict=True)
+        ])  # fmt: skip
+        names = "p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "density_kg_m3"
+        ends = [*(box[name] for name in names), *(box["signals"][name] for name in ("mach", "engines_m"))]
+        low, high = np.array(ends).T
+        assert (low <= seen.min(axis=0)).all()
+        assert (high >= seen.max(axis=0)).all()
+        assert low == pytest.approx(seen.min(axis=0), rel=1e-4)
+        assert high == pytest.approx(seen.max(axis=0), rel=1e-4)
+        for axis, name in enumerate("pqr"):
+            for age, level in np.ndindex(3, 3):
+                most = max(
+                    errors[k & (of.age <= age) & (of.level <= level), axis].max(initial=0.0)
+                    for (of, errors), k in zip(sets, own, strict=True)
+                )
+                declared = box[f"error_{name}_rad_s2"][age][level]
+                assert declared == pytest.approx(1.3 * most + 1e-7, rel=1e-4, abs=1e-11)
+    for (of, errors), told_of in zip(sets, worst, strict=False):
+        assert told_of == pytest.approx(errors[of.age == 0].max(axis=0))
+    assert worst[2] == pytest.approx(np.zeros(3))
+
+
+def test_states_near_neutral_count_most_as_one_over_box_and_share_squared():
+    """Of two regions, boxes 0 and 1 are the innermost of one and of the other."""
+    of = SimpleNamespace(box=np.array([0, 1, 2, 5, 7]), level=np.array([2, 0, 1, 0, 2]))
+    found = fit.nearness(of, 2, Moves((0.1, 0.4, 1.0)))
+    assert found == pytest.approx([1 / 0.25, 1 / (0.25 * 0.01), 1 / (0.5 * 0.16), 1 / (0.75 * 0.01), 1.0])
+
+
+def test_what_counts_next_to_nothing_moves_no_term(trainer):
+    """Half of the states are of another aircraft, with a weight of a millionth."""
+    samples, weight = states(trainer, n=160), np.where(np.arange(160) % 2, 1.0, 1e-6)
+    other = np.where(weight[:, None] == 1.0, 0.0, [0.01, -0.02, 0.03] * samples.y[:, :1])
+    terms = fit.fitted(moving(trainer, samples, other), trainer, most=8, weight=weight)
+    for coefficient in ("Cl", "Cn"):
+        known = [t.value for t in trainer.moments if t.coefficient == coefficient and t.value]
+        found = [term["value"] for term in terms[coefficient] if abs(term["value"]) > 1e-4]
+        assert sorted(found) == pytest.approx(sorted(known), abs=1e-5)
+
+
+@pytest.mark.parametrize(("off", "known"), [(0.9e-6, True), (1.1e-6, False)])
+def test_how_unlike_mirrored_engines_pull_is_declared_box_by_box(off, known, monkeypatch):
+    """1.3 times the most in a box or one inside, and 1e-7 more, of the yawing moment that thrust does not
+    explain; where that is a millionth, the engines are not mirrored, and nothing is declared."""
+    monkeypatch.setattr(fit, "healthy_yawing_moment_per_thrust", lambda aircraft: {"jet": -0.03}[aircraft])
+    thrust = numbers(5, seed=3)
+    apart_by = np.array([2e-7, -3e-7, -off, 1e-7, 4e-7])
+    alike = SimpleNamespace(
+        signals={"thrust": thrust, "engines_n": apart_by - 0.03 * thrust}, box=np.array([1, 0, 3, 2, 2])
+    )
+    boxes = [{"p_rad_s": k} for k in range(4)]
+    fit.set_engines_apart(boxes, "jet", alike)
+    assert [box["p_rad_s"] for box in boxes] == [0, 1, 2, 3]
+    found = [box.get("engines_apart") for box in boxes]
+    if known:
+        assert found == pytest.approx([1.3 * of + 1e-7 for of in (3e-7, 3e-7, 4e-7, off)], rel=1e-3)
+    else:
+        assert found == [None] * 4

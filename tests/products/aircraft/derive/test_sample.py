@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -248,3 +249,94 @@ def test_every_box_reaches_the_ends_of_the_altitudes():
         assert min(altitudes) == 250.0
         assert max(altitudes) == 2750.0
         assert np.ptp(altitudes[2:]) > 1500.0
+
+
+def few(box, seed):
+    """Samples in these boxes, all of whose numbers tell."""
+    of = states(aircraft("mach", "engines_m"), n=len(box), seed=seed)
+    return replace(of, box=np.array(box))
+
+
+@pytest.mark.parametrize(("searched", "starts"), [(False, 16), (True, 32)])
+def test_states_of_all_regions_are_together_their_boxes_in_turns(searched, starts, monkeypatch):
+    """Starts and states are shared out, each region has a seed of its own; boxes go reach by reach."""
+    asked, parts = [], [few([0, 1, 3], 1), few([2, 0], 2), few([3], 3)]
+
+    def sample(plant, envelope, trim, n, seed, properties, ages, starts, moves, errors):
+        asked.append((plant, envelope, trim, n, seed, properties, ages, starts, moves, errors))
+        return parts[len(asked) - 1]
+
+    monkeypatch.setattr(sampling, "sample", sample)
+    regions = [sampling.Region(f"envelope {k}", f"trim {k}") for k in range(3)]
+    moves, errors = sampling.Moves((0.5, 1.0)), len if searched else None
+    found = sampling.sample_all("plant", regions, 100, 7, "properties", (0, 2), moves, errors)
+    assert asked == [
+        ("plant", f"envelope {k}", f"trim {k}", 33, 7 + 10 * k, "properties", (0, 2), starts, moves, errors)
+        for k in range(3)
+    ]
+    assert found.box.tolist() == [0, 3, 9, 7, 1, 11]
+    for name in ("x", "y", "u", "rate", "level", "age"):
+        assert getattr(found, name).tolist() == [row for of in parts for row in getattr(of, name).tolist()]
+    for name in ("mach", "engines_m"):
+        assert found.signals[name].tolist() == [at for of in parts for at in of.signals[name].tolist()]
+
+
+TRAVEL = {
+    "flap": SimpleNamespace(min_rad=-0.1, max_rad=0.5),
+    "fin": SimpleNamespace(min_rad=-0.6, max_rad=0.3),
+    "brake": SimpleNamespace(min_rad=0.0, max_rad=0.7),
+}
+ENGINES = {
+    "left": SimpleNamespace(right_m=-2.0, throttle="of/left"),
+    "middle": SimpleNamespace(right_m=0.0, throttle="of/middle"),
+    "right": SimpleNamespace(right_m=0.7, throttle="of/right"),
+}
+
+
+def test_in_flights_about_trim_surfaces_swing_about_theirs_and_engines_from_side_to_side():
+    """By 6 % of the shorter side of their travel, no further than it goes; levers by 0.15 at 0.8 rad/s."""
+    jet = SimpleNamespace(travel=TRAVEL, surfaces=tuple(TRAVEL), effectors=ENGINES, n=3)
+    trim = SimpleNamespace(surfaces_rad={"flap": -0.0998, "fin": 0.04, "brake": 0.2})
+    t_s, phases = np.array([0.0, 0.4, 1.7, 2.9]), np.arange(9.0).reshape(3, 3) / 1.7
+    found = sampling._commands(jet, trim, phases, t_s)
+    for k, t in enumerate(t_s):
+        waves = [sum(np.sin(2 * np.pi * f * t + at) for f, at in zip((0.2, 0.5, 1.1), of, strict=True))
+                 for of in phases]  # fmt: skip
+        flap, fin = max(-0.0998 + 0.06 * 0.1 * waves[0], -0.1), 0.04 + 0.06 * 0.3 * waves[1]
+        swing = 0.6 * 0.25 * np.sin(0.8 * t)
+        assert found[k] == pytest.approx([flap, fin, 0.2, -swing, 0.0, swing])
+    assert -0.1 in found[:, 0], "one of them is at its stop"
+
+
+def test_a_surface_that_stands_in_moves_through_its_shares_sooner():
+    """It is used by a tenth where others are by all, and at the last share beyond that."""
+    jet = SimpleNamespace(travel=TRAVEL, surfaces=tuple(TRAVEL), stand_ins=("fin",), signals=(), n=3)
+    u = np.array([[0.1, 0, 0], [-0.05, 0, 0], [0, 0.011, 0], [0, -0.011, 0], [0, -0.5, 0], [0, 0, 0.13]])
+    n = len(u)
+    samples = Samples(np.zeros((n, 3)), np.ones((n, 4)), {}, u, np.zeros((n, 3)), *np.zeros((3, n), int))
+    everywhere = [np.array([[-9.0] * 7, [9.0] * 7])]
+    moves = sampling.Moves((0.2, 0.6, 1.0), 0.1)
+    assert moves.seldom(jet).tolist() == [1.0, 0.1, 1.0]
+    assert sampling.sorted_in(samples, everywhere, jet, moves).level.tolist() == [0, 1, 1, 0, 2, 0]
+
+
+def test_engines_are_started_apart_by_a_share_of_the_box_and_are_together_in_the_end(monkeypatch):
+    written, started = [], []
+    fuel = SimpleNamespace(fill=lambda age_s: started.append(("burnt", age_s)))
+    monkeypatch.setattr(sampling, "Tanks", lambda plant, trim: fuel)
+    plant = SimpleNamespace(
+        aircraft=SimpleNamespace(effectors=ENGINES),
+        write=lambda name, value: written.append((name, value)), start=started.append,
+    )  # fmt: skip
+    draw = SimpleNamespace(
+        trim="trim", between=lambda low, high: (low, high), around=lambda middle, half: (middle, half),
+        start=lambda reach, turn: ("begin", reach, turn),
+    )  # fmt: skip
+    standing = sampling._Standing(plant, draw, "reader")
+    standing.start(box=2, age=1, youngest_s=40.0, apart=0.4, turn=5)
+    assert written == [(f"of/{side}", (0.0, pytest.approx(0.3))) for side in ENGINES]
+    assert started == [("burnt", (40.0, 930.0)), ("begin", 0.75, 5)]
+    assert (standing.box, standing.age, standing.rows) == (2, 1, [])
+    written.clear()
+    sampling._together(plant)
+    assert written == [(f"of/{side}", 0.0) for side in ENGINES]

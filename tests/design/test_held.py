@@ -1,5 +1,7 @@
 """The equations and the design models at states where nothing is zero, to the last digits that are kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,6 +112,13 @@ def test_what_a_plug_in_is_told_of_errors():
     ):
         assert Declared(**said).errors
         assert not Declared(**said).air
+    for name, of_instruments_or_air in (
+        ("noise", True), ("bias", True), ("resolution", True), ("slope", True), ("gust_rad_s", True),
+        ("gust_time_s", False), ("gust_effect", False), ("coefficients", False), ("inertia", False),
+        ("deflection_rad", False), ("model_rad_s2", False), ("bandwidth_rad_s", False),
+    ):  # fmt: skip
+        one = 0.1 if name in ("inertia", "deflection_rad") else np.array([0.0, -0.1, 0.0])
+        assert Declared(**{name: one}).noisy is of_instruments_or_air, name
     still = Declared()
     names = ("noise", "gust_time_s", "gust_effect", "coefficients", "model_rad_s2", "bandwidth_rad_s")
     sizes = [getattr(still, name).shape for name in (*names, "rate_limit_rad_s")]
@@ -119,6 +128,7 @@ def test_what_a_plug_in_is_told_of_errors():
 def test_who_leads():
     nothing = np.zeros(3)
     told = Context(0.01, 1, None, nothing, nothing, nothing, nothing, nothing, nothing)
+    assert replace(told, leading=(2, 0, 3)).leaders == ("rudder", "aileron", "flap")
     assert told.surfaces == ("aileron", "elevator", "rudder", "flap")
     assert told.leaders == ("aileron", "elevator", "rudder")
     assert (told.seed, dict(told.options), told.leading) == (0, {}, (0, 1, 2))

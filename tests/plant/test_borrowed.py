@@ -1,5 +1,8 @@
 """Aircraft that are lent out and trims that are known, one by one and without a flight."""
 
+from functools import partial
+from types import SimpleNamespace
+
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
@@ -139,3 +142,42 @@ def test_an_address_that_there_is_not_is_zero():
     nodes = addresses._trial_nodes("abc")
     assert [node.get_name() for node in nodes] == ["a", "b", "c"]
     assert len({addresses.pointer(node) for node in nodes}) == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "another"),
+    [({"initial": {"altitude_m": 900}}, True), ({"uncertainty": {"coefficients": {"Cm_0": 1.1}}}, True),
+     ({"actuators": {"flap": {"travel_deg": [-5, 40]}}}, True), ({"aircraft": "beaver-split"}, True),
+     ({"environment": {"wind_mps": [3, 0, 0]}}, False), ({"rate_hz": 50}, False),
+     ({"faults": [{"type": "float", "actuator": "flap", "at_s": 1}]}, False)],
+)  # fmt: skip
+def test_a_trim_is_that_of_the_aircraft_its_errors_its_actuators_and_its_flight_condition(
+    given, another, monkeypatch
+):
+    searched = []
+    monkeypatch.setattr(
+        conditions, "trim_of", lambda scenario, plant: searched.append(plant) or len(searched)
+    )
+    usual = conditions.find_trim(load({}))
+    assert conditions.find_trim(load(given)) == (usual + 1 if another else usual)
+    assert [conditions.find_trim(load({})), len(searched)] == [usual, 1 + another]
+    assert free() == 1 + (given.get("aircraft") is not None)  # each was given back
+
+
+def test_engines_that_have_been_through_a_search_do_not_take_off(monkeypatch):
+    """They remember it: the flight has an aircraft of its own, but only where there was a search."""
+    lent, plant = [], SimpleNamespace
+
+    def configured(scenario):
+        lent.append(plant(origin="file"))
+        return lent[-1]
+
+    monkeypatch.setattr(conditions, "_configured", configured)
+    monkeypatch.setattr(conditions, "trim_of", lambda scenario, plant: "found")
+    for engines, flights in ((2, [1, 0]), (0, [0, 0])):
+        conditions._trims.clear()
+        plant = partial(SimpleNamespace, n_engines=engines)
+        for flown in flights:
+            lent.clear()
+            assert conditions.ready(load({})) == (lent[flown], "found")
+            assert len(lent) == 1 + flown

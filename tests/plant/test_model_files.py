@@ -7,6 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented, model_file
+from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import instrument
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects, copy_of, files_of, with_systems
 from kept import page
@@ -226,3 +227,67 @@ def test_a_copy_has_the_files_it_uses_and_no_others(tmp_path):
     systems = {f"Systems/ftc-{name}.xml" for name in (*travel, "common")}
     assert there == {"navion.xml", *systems}
     assert "aero/qbar-psf" in model.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def twin(tmp_path_factory):
+    """The jsbsim package's 737, its engines with levers of their own, at 139 m/s while they come to run."""
+    folder = tmp_path_factory.mktemp("twin")
+    travel = dict.fromkeys(("aileron", "elevator", "rudder"), (-0.3, 0.3))
+    fdm = bare(instrument(instrumented.source_of("737"), folder, travel, apart=True))
+    fdm["ic/vt-fps"], fdm["ic/alpha-deg"], fdm["ic/beta-deg"], fdm["ic/q-rad_sec"] = 456.0, 3.0, 2.0, 0.05
+    fdm["propulsion/set-running"] = -1
+    fdm.run_ic()
+    return fdm
+
+
+@pytest.mark.parametrize(
+    ("together", "apart", "failed", "levers"),
+    [(0.5, (0.2, -0.1), (0, 0), (0.7, 0.4)), (0.9, (0.2, -0.95), (0, 0), (1.0, 0.0)),
+     (0.6, (0.1, -0.2), (0, 1), (0.7, 0.0)), (0.6, (0.1, -0.2), (1, 0), (0.0, 0.4))],
+)  # fmt: skip
+def test_the_lever_of_each_engine_is_that_of_all_and_its_own_difference(
+    twin, together, apart, failed, levers
+):
+    twin["fcs/actuated-throttle-norm"] = together
+    for i in range(2):
+        twin[f"fcs/actuated-throttle-{i}-difference"] = apart[i]
+        twin[f"failures/engine-{i}-at-idle"] = failed[i]
+    twin.run()
+    assert [twin[f"fcs/throttle-cmd-norm[{i}]"] for i in range(2)] == pytest.approx(levers)
+
+
+def test_signals_of_engines_and_flow_are_dimensionless_and_of_the_instant(twin):
+    """Thrust of both engines over dynamic pressure and area, their moments also over span, chord and span."""
+    twin["fcs/actuated-throttle-norm"] = 0.6
+    for i, way in enumerate((0.3, -0.3)):
+        twin[f"fcs/actuated-throttle-{i}-difference"], twin[f"failures/engine-{i}-at-idle"] = way, 0.0
+    for _ in range(200):
+        twin.run()
+    before = [twin[f"propulsion/engine[{i}]/thrust-lbs"] for i in range(2)]
+    moments = [twin[f"moments/{axis}-prop-lbsft"] for axis in "lmn"]
+    assert before[0] > 1.2 * before[1] > 0.0
+    assert all(moments[1:])
+    twin.suspend_integration()
+    twin.run()
+    twin.run()
+    twin.resume_integration()
+    force, b, c = (
+        twin["aero/qbar-psf"] * twin["metrics/Sw-sqft"],
+        twin["metrics/bw-ft"],
+        twin["metrics/cbarw-ft"],
+    )
+    V2 = 2.0 * twin["velocities/vt-fps"]
+    wanted = {
+        "thrust": sum(twin[f"propulsion/engine[{i}]/thrust-lbs"] for i in range(2)) / force,
+        "alpha_rate": twin["aero/alphadot-rad_sec"] * c / V2,
+        "beta_rate": twin["aero/betadot-rad_sec"] * b / V2,
+        **{
+            f"engines_{axis}": twin[f"moments/{axis}-prop-lbsft"] / force / arm
+            for axis, arm in zip("lmn", (b, c, b), strict=True)
+        },
+        "mach": twin["velocities/mach"],
+    }
+    found = {name: twin[of] for name, of in instrumented.SIGNALS.items()}
+    assert found == pytest.approx(wanted, rel=1e-3, abs=1e-9)
+    assert instrumented.ENGINE_SIGNALS == ("engines_l", "engines_m", "engines_n")

@@ -93,6 +93,32 @@ def test_what_is_written_when():
     assert [schedule.next_change(k) for k in (-1, 0, 10)] == [0, 10, 20]
 
 
+def test_of_two_runaways_or_oscillations_the_later_holds_in_whatever_order_they_are_declared():
+    def moved(type, at_s, **of):
+        return {"type": type, "actuator": "flap", "at_s": at_s, "end_s": at_s + 0.1, **of}
+
+    plant = Recorded()
+    given = faults(
+        moved("hardover", 0.15, direction=-1), moved("hardover", 0.1, direction=1),
+        moved("oscillatory", 0.15, amplitude_deg=2.0, frequency_rad_s=7.0),
+        moved("oscillatory", 0.1, amplitude_deg=1.0, frequency_rad_s=5.0),
+    )  # fmt: skip
+    schedule = FaultSchedule(given, plant, 100.0)
+    per_deg = np.pi / 180
+    for k, (way, amplitude_deg, frequency) in (
+        (10, (1, 1, 5)),
+        (15, (-1, 2, 7)),
+        (20, (-1, 2, 7)),
+        (25, (0, 0, 0)),
+    ):
+        schedule.apply(k)
+        now = dict(plant.written)
+        found = [now[f"flap/{name}"] for name in (
+            "hardover", "oscillation-amplitude-rad", "oscillation-frequency-rad_sec"
+        )]  # fmt: skip
+        assert found == pytest.approx([way, amplitude_deg * per_deg, frequency]), k
+
+
 def test_faults_declared_later_and_ended_earlier():
     plant = Recorded()
     first, second = faults(LOSS, {**LOSS, "actuator": "flap", "at_s": 0.3})

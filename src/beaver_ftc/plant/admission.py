@@ -23,7 +23,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 from beaver_ftc.plant.trial import failure
 
-_FORMAT = 3  # of what is checked: aircraft admitted by another are checked again
+_FORMAT = 4  # of what is checked: aircraft admitted by another are checked again
 
 
 @lru_cache(maxsize=32)
@@ -77,6 +77,12 @@ def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
     for kind in ("settings", "limits"):
         for name, of in getattr(file.engine, kind).items():
             yield ("engine", kind, name, "property"), of.property
+    for name, engine in file.effectors.items():
+        yield ("effectors", name, "throttle"), engine.throttle
+    for name, case in file.damage.items():
+        yield ("damage", name, "property"), case.property
+    if file.ground is not None:
+        yield ("ground", "present"), file.ground.present
 
 
 def _mistakes(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:

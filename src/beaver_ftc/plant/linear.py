@@ -12,7 +12,7 @@ not wait for the side force of betadot to settle.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from math import hypot
+from math import cos, hypot, radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant.adapter import FlightState, Plant
+from beaver_ftc.plant.adapter import START_LATITUDE_DEG, FlightState, Plant
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.trim import configure
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 
+_PARALLEL_RADIUS_M = EARTH_RADIUS_M * cos(radians(START_LATITUDE_DEG))
 # State by our name, with its unit (a field of FlightState, but for north and east), and by JSBSim's, with the
 # factor to ours; how far it is moved for a difference: small against the curvature of the polynomials, large
 # against rounding. Latitude and longitude become metres.
@@ -47,7 +48,7 @@ _STATES = (
     ("psi", "psi_rad", "Psi", 1.0, 1e-4),
     ("altitude", "altitude_m", "Alt", M_PER_FT, 10.0),
     ("north", "north_m", "Latitude", EARTH_RADIUS_M, 0.0),
-    ("east", "east_m", "Longitude", EARTH_RADIUS_M, 0.0),
+    ("east", "east_m", "Longitude", _PARALLEL_RADIUS_M, 0.0),
 )
 _MOVED = [state for state in _STATES if state[-1]]
 _UNITS = {name: unit for name, unit, *_ in _STATES}

@@ -427,35 +427,7 @@ def _fit_noise_model(
 
 
 def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> FilterSettings:
-    """Estimate the settings of later faults from the flights: levels seen, and how often they changed.
-
-    A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-    """
-    usable_hours = (
-        sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
-        / 3600.0
-    )
-    n_effectiveness_changes, n_repairs, fault_levels_by_group = 0, 0, {}
-    surface_names = list(model.vehicle.surfaces)
-    for group in model.groups:
-        surface_index = surface_names.index(group[0])
-        level_sequences_by_flight = (
-            [_labelled_levels_in_order(usable_flight, surface_index) for usable_flight in usable_flights]
-            if len(group) == 1
-            else []
-        )
-        fault_levels_by_group["+".join(group)] = sorted(
-            {level for level_sequence in level_sequences_by_flight for level in level_sequence if level < 1.0}
-        )
-        n_effectiveness_changes += sum(
-            max(len(level_sequence) - 1, 0) for level_sequence in level_sequences_by_flight
-        )
-        n_repairs += sum(
-            int(level == 1.0) for level_sequence in level_sequences_by_flight for level in level_sequence[1:]
-        )
-    fault_levels_by_group = {
-        group_name: levels for group_name, levels in fault_levels_by_group.items() if levels
-    }
+    """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     may_air_move = model.vehicle.moving_air
     command_delay_offset_candidates_s = [
         delay_samples / model.rate_hz
@@ -466,39 +438,84 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         if model.vehicle.other_laws
         else {}
     )
-    if not fault_levels_by_group:
-        trim_walk_sd_per_sample = _estimate_trim_walk_sd_per_sample(usable_flights, model)
-        model_with_trim_drift = model.model_copy(
-            update={"settings": FilterSettings(trim_walk=trim_walk_sd_per_sample, **other_laws_settings)}
+    labelled = _count_labelled_faults(usable_flights, model)
+    if not labelled.fault_levels_by_group:
+        return _filter_settings_without_labelled_faults(
+            usable_flights, model, other_laws_settings, command_delay_offset_candidates_s
         )
-        max_effective_sample_share = (
-            (1.0 if may_air_move else _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
-            if other_laws_settings
-            else _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED
-        )
-        effective_sample_share = min(
-            max_effective_sample_share, 1.0 / gain_error_overdispersion(usable_flights, model_with_trim_drift)
-        )
-        alarm_settings = {"alarm": _FAULT_PROBABILITY_FOR_ALARM, "hold_s": _ALARM_CONFIRMATION_TIME_S}
-        return FilterSettings(
-            **alarm_settings,
-            **other_laws_settings,
-            power=effective_sample_share,
-            trim_walk=trim_walk_sd_per_sample,
-            delays_s=command_delay_offset_candidates_s,
-        )
+    # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
+    changes_per_hour = (labelled.n_effectiveness_changes + 1) / labelled.usable_hours
     return FilterSettings(
-        levels=fault_levels_by_group,
-        changes_per_hour=float(
-            np.sqrt(
-                (n_effectiveness_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour
-            )
-        ),
+        levels=labelled.fault_levels_by_group,
+        changes_per_hour=float(np.sqrt(changes_per_hour * FilterSettings().effectiveness_changes_per_hour)),
         **(_FILTER_SETTINGS_FOR_OTHER_DAYS | other_laws_settings),
         delays_s=command_delay_offset_candidates_s,
-        repair_share=(n_repairs + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE / 2)
-        / (n_effectiveness_changes + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE),
+        repair_share=(labelled.n_repairs + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE / 2)
+        / (labelled.n_effectiveness_changes + _N_PRIOR_CHANGES_FOR_REPAIR_SHARE),
         power=_EFFECTIVE_SAMPLE_SHARE_LABELLED,
+    )
+
+
+class _LabelledFaults(NamedTuple):
+    """What the labels of the flights say: levels of effectiveness below 1 seen of each group that is a single
+    surface, how often a level changed, how often to 1, and the hours of usable rows."""
+
+    fault_levels_by_group: dict[str, list[float]]
+    n_effectiveness_changes: int
+    n_repairs: int
+    usable_hours: float
+
+
+def _count_labelled_faults(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> _LabelledFaults:
+    fault_levels_by_group, n_effectiveness_changes, n_repairs = dict[str, list[float]](), 0, 0
+    surface_names = list(model.vehicle.surfaces)
+    for group in model.groups:
+        if len(group) > 1:
+            continue
+        level_sequences_by_flight = [
+            _labelled_levels_in_order(usable_flight, surface_names.index(group[0]))
+            for usable_flight in usable_flights
+        ]
+        fault_levels = {level for sequence in level_sequences_by_flight for level in sequence if level < 1.0}
+        if fault_levels:
+            fault_levels_by_group[group[0]] = sorted(fault_levels)
+        n_effectiveness_changes += sum(max(len(sequence) - 1, 0) for sequence in level_sequences_by_flight)
+        n_repairs += sum(
+            int(level == 1.0) for sequence in level_sequences_by_flight for level in sequence[1:]
+        )
+    usable_s = sum(
+        usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights
+    )
+    return _LabelledFaults(
+        fault_levels_by_group, n_effectiveness_changes, n_repairs, float(usable_s / 3600.0)
+    )
+
+
+def _filter_settings_without_labelled_faults(
+    usable_flights: Sequence[FlightWithUsableRows],
+    model: Model,
+    other_laws_settings: dict[str, Any],
+    command_delay_offset_candidates_s: list[float],
+) -> FilterSettings:
+    trim_walk_sd_per_sample = _estimate_trim_walk_sd_per_sample(usable_flights, model)
+    model_with_trim_drift = model.model_copy(
+        update={"settings": FilterSettings(trim_walk=trim_walk_sd_per_sample, **other_laws_settings)}
+    )
+    max_effective_sample_share = (
+        (1.0 if model.vehicle.moving_air else _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
+        if other_laws_settings
+        else _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED
+    )
+    effective_sample_share = min(
+        max_effective_sample_share, 1.0 / gain_error_overdispersion(usable_flights, model_with_trim_drift)
+    )
+    return FilterSettings(
+        alarm=_FAULT_PROBABILITY_FOR_ALARM,
+        hold_s=_ALARM_CONFIRMATION_TIME_S,
+        **other_laws_settings,
+        power=effective_sample_share,
+        trim_walk=trim_walk_sd_per_sample,
+        delays_s=command_delay_offset_candidates_s,
     )
 
 

@@ -324,10 +324,25 @@ def advance_gust_estimate(gust, y, attitude, dt):
     V = gust.output.speed_relative_to_mean_air
     update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change)
     fill_axes_rate_and_fast_turn(gust, dt, V)
+    update_air_rotation_and_unmeasured_shares(
+        gust, predicted_horizontal_velocity_right, predicted_vertical_velocity_down, heading_change / dt, dt
+    )
+
+
+@kernel
+def update_air_rotation_and_unmeasured_shares(
+    gust, predicted_horizontal_velocity_right, predicted_vertical_velocity_down, heading_rate, dt
+):
+    """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
+
+    predicted_horizontal_velocity_right, predicted_vertical_velocity_down, m/s: velocity relative to the air
+    if the gust had not changed. heading_rate rad/s; dt s.
+    """
+    V = gust.output.speed_relative_to_mean_air
     pitching_lag_s, yawing_lag_s = gust_correlation_time_s(gust, 1, V), gust_correlation_time_s(gust, 2, V)
     previous_unmeasured_yawing_share = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_from_heading_rate(
-        gust, V, heading_change / dt
+        gust, V, heading_rate
     )
     larger_unmeasured_yawing_share = max(
         previous_unmeasured_yawing_share, gust.memory.unmeasured_yawing_share_by_turn_now

@@ -7,19 +7,26 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.context import Context, Declared
-from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis import Measured, rivals
 from beaver_ftc.diagnosis.rivals.effectiveness import (
     N_STATES_WITHOUT_GUSTS,
     AugmentedEkf,
     AugmentedUkf,
     EffectivenessFilter,
 )
+from beaver_ftc.diagnosis.rivals.imm import (
+    HEALTHY_AND_LOSS_MODES,
+    InteractingMultipleModels,
+    transition_matrix,
+)
 from beaver_ftc.diagnosis.rivals.kalman import (
     TurbulenceModel,
     unexplained_acceleration_size,
     update_state_and_covariance,
 )
+from beaver_ftc.diagnosis.rivals.observer import ConstantThresholdObserver, healthy_residual_std
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest, RecursiveLeastSquaresFit, RlsMonitor
+from beaver_ftc.documents.errors import BadInput
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
 GUSTY = Declared(
@@ -27,13 +34,15 @@ GUSTY = Declared(
     gust_rad_s=np.array([0.05, 0.03, 0.02]), gust_time_s=np.array([0.8, 0.4, 0.3]),
     gust_effect=np.arange(9.0).reshape(3, 3), model_rad_s2=np.array([0.04, 0.0, 0.1]),
 )  # fmt: skip
-SURFACES = ("aileron", "elevator", "rudder", "flap")
+# In no order of the axes: a place among the surfaces is none among the axes.
+SURFACES, LEADING = ("flap", "rudder", "aileron", "elevator"), (2, 3, 1)
 
 
 def context(declared=None, **options):
     travel = np.array([[-1.0] * 4, [1.0] * 4])
     return Context(DT, 1, None, np.zeros(3), np.zeros(5), np.zeros(4), travel, BOUND, np.zeros(3),
-                   options=options, declared=declared or Declared())  # fmt: skip
+                   options=options, declared=declared or Declared(), surfaces=SURFACES,
+                   leading=LEADING)  # fmt: skip
 
 
 def seen(x=(0.0, 0.0, 0.0), t_s=9.0, eta_bar=BOUND):
@@ -137,7 +146,7 @@ def test_the_surface_most_significantly_off_is_named():
     assert detector.wald_statistics() == pytest.approx([4.0, 1.0, 9.0])
     assert (verdict.axis, verdict.isolated, verdict.type) == ("r", "rudder", "loss_of_effectiveness")
     assert verdict.estimate == pytest.approx(-0.3)
-    assert verdict.effectiveness == pytest.approx([0.8, 0.5, 0.7, 1.0])
+    assert verdict.effectiveness == pytest.approx([1.0, 0.7, 0.8, 0.5])
     assert verdict.statistic == 2.0
     quiet = named((-0.2, -0.5, -0.3), statistic=1.0)[1]
     assert (quiet.detected, quiet.isolated, quiet.statistic) == (False, None, 1.0)
@@ -156,7 +165,7 @@ def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, squ
     verdict = named(theta, square=square)[1]
     assert verdict.isolated == isolated
     if isolated == "elevator":
-        assert verdict.effectiveness == pytest.approx([1.0, 0.5, 1.0, 1.0]), "nothing has gained"
+        assert verdict.effectiveness == pytest.approx([1.0, 1.0, 1.0, 0.5]), "nothing has gained"
 
 
 def test_a_pairs_score_is_of_errors_against_those_before():
@@ -179,9 +188,10 @@ def test_a_pairs_score_is_of_errors_against_those_before():
 
 class Scores:
     def __init__(self, *scores):
-        self.scores = list(scores)
+        self.scores, self.seen = list(scores), []
 
     def step(self, u, y):
+        self.seen.append((u, y))
         return self.scores.pop(0)
 
 
@@ -204,12 +214,23 @@ def test_the_first_pair_beyond_the_limit_is_the_fault():
     assert (warm.statistic, warm.isolated) == (2.25, "aileron")
 
 
+def test_a_pair_is_the_command_of_the_surface_that_leads_an_axis_and_its_rate():
+    monitor, _ = monitored((1.0, 0.2), (0.0, 0.2), (0.0, 0.2))
+    for pair in monitor.prediction_tests:
+        pair.seen.clear()
+        pair.scores = [0.0]
+    monitor.step(seen((0.1, -0.2, 0.3)), np.array([1.0, 2.0, 3.0, 4.0]))
+    assert [pair.seen for pair in monitor.prediction_tests] == [[(3.0, 0.1)], [(4.0, -0.2)], [(2.0, 0.3)]]
+
+
 def test_a_monitor_forgets_and_averages_over_its_times_and_doubts_a_gyro():
     monitor = RlsMonitor()
     monitor.reset(context(GUSTY, forgetting_s=2.0, score_s=0.5, floor_rad_s=0.004))
     floors = np.hypot(0.004, GUSTY.gyro_rad_s)
     assert [pair._min_error_std for pair in monitor.prediction_tests] == pytest.approx(list(floors))
-    assert monitor.prediction_tests[0]._averaging_decay == pytest.approx(exp(-DT / 0.5))
+    for pair in monitor.prediction_tests:
+        assert pair._averaging_decay == pytest.approx(exp(-DT / 0.5))
+        assert pair._model._forgetting_factor == pytest.approx(exp(-DT / 2.0))
 
 
 class Curved:
@@ -234,7 +255,7 @@ def test_the_extended_filters_transition_is_its_models_slopes():
     detector.reset(moving()[1])
     expected = np.eye(9)
     expected[:3, :3] += DT * (Curved.A + np.diag(measured.x))
-    expected[:3, 3:6] = DT * measured.contribution[:, :3]
+    expected[:3, 3:6] = DT * measured.contribution[:, LEADING]
     expected[:3, 6:] = DT * GUSTY.gust_effect
     expected[6:, 6:] = np.diag(np.exp(-DT / GUSTY.gust_time_s))
     assert detector.jacobian(measured) == pytest.approx(expected, abs=1e-9)
@@ -247,7 +268,7 @@ def test_each_sigma_point_moves_by_the_model_its_losses_and_its_air():
     expected = points.copy()
     for point, after in zip(points, expected, strict=True):
         turning = measured.acceleration + model.f(point[:3], measured.y) - model.f(measured.x, measured.y)
-        turning = turning + measured.contribution[:, :3] @ point[3:6] + GUSTY.gust_effect @ point[6:]
+        turning = turning + measured.contribution[:, LEADING] @ point[3:6] + GUSTY.gust_effect @ point[6:]
         after[:3] += DT * turning
         after[6:] = np.exp(-DT / GUSTY.gust_time_s) * point[6:]
     assert detector.propagate_points(points, measured) == pytest.approx(expected)
@@ -264,3 +285,146 @@ def test_what_turbulence_turns_adds_by_squares():
     swing = [sum((GUSTY.gust_effect[i, g] * GUSTY.gust_rad_s[g]) ** 2 for g in range(3)) for i in range(3)]
     assert pytest.approx(np.sqrt(swing)) == GUSTY.turbulence_rad_s2
     assert (GUSTY.errors, GUSTY.air, Declared().errors, Declared().air) == (True, True, False, False)
+
+
+def test_a_step_of_the_multiple_models_is_each_filter_by_itself_between_mixing_and_bayes_rule():
+    """Moments of the mixture, one prediction and one update a mode, in loops; two steps in gusts."""
+    models = InteractingMultipleModels()
+    models.reset(context(GUSTY, noise=2.0, unknown_noise=40.0, stay=0.97, measurement_rad_s=0.004))
+    rates, n = GUSTY.rate_variance(0.004), len(HEALTHY_AND_LOSS_MODES) + 1
+    first = models.step(seen((0.1, -0.2, 0.3)), np.zeros(4))
+    assert (first.statistic, first.detected) == (0.0, False)
+    x, probability = np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (n, 1)), np.full(n, 1e-12)
+    P, probability[0] = np.tile(np.diag([*rates, *GUSTY.gust_rad_s**2]), (n, 1, 1)), 1.0 - (n - 1) * 1e-12
+    chain, keep = transition_matrix(0.97, n), np.exp(-DT / GUSTY.gust_time_s)
+    F = np.block([[np.eye(3), DT * GUSTY.gust_effect], [np.zeros((3, 3)), np.diag(keep)]])
+    bound = np.hypot(BOUND, GUSTY.model_rad_s2)
+    rng = np.random.default_rng(8)
+    for _ in range(2):
+        contribution, acceleration = rng.normal(size=(3, 4)), rng.normal(size=3)
+        now = probability @ x[:, :3] + DT * (acceleration - 0.3 * contribution[:, LEADING[0]])
+        predicted, likely = probability @ chain, np.empty(n)
+        after_x, after_P = np.empty_like(x), np.empty_like(P)
+        for m in range(n):
+            weight = chain[:, m] * probability / predicted[m]
+            mean = weight @ x
+            off = x - mean
+            spread = sum(weight[i] * (P[i] + np.outer(off[i], off[i])) for i in range(n))
+            ahead, Q = F @ mean, np.zeros(6)
+            ahead[:3] += DT * acceleration
+            if 0 < m < n - 1:
+                axis, theta = divmod(m - 1, 3)
+                loss = (-0.25, -0.5, -0.9)[theta]
+                ahead[:3] += DT * loss * contribution[:, LEADING[axis]]
+            Q[:3] = (DT * (40.0 if m == n - 1 else 2.0) * bound) ** 2
+            Q[3:] = (1.0 - keep**2) * GUSTY.gust_rad_s**2
+            wide = F @ spread @ F.T + np.diag(Q)
+            S = wide[:3, :3] + np.diag(rates)
+            nu, K = now - ahead[:3], wide[:, :3] @ np.linalg.inv(S)
+            after_x[m], after_P[m] = ahead + K @ nu, wide - K @ wide[:3]
+            likely[m] = np.exp(-0.5 * nu @ np.linalg.inv(S) @ nu) / np.sqrt(np.linalg.det(2.0 * np.pi * S))
+        x, P, probability = after_x, after_P, predicted * likely / (predicted @ likely)
+        models.step(Measured(1.0, now, np.zeros(5), acceleration, contribution, 9.0 * BOUND), np.zeros(4))
+        assert models.x == pytest.approx(x, rel=1e-6)
+        assert pytest.approx(P, rel=1e-6, abs=1e-15) == models.P
+        assert models.mode_probabilities == pytest.approx(probability, rel=1e-6, abs=2e-12)
+    assert np.sort(probability)[-3] > 1e-3, "several modes count"
+
+
+def test_the_deviation_of_a_residual_has_that_of_the_model_the_gyro_and_the_air():
+    """A steady error of the model is kept by dt / (1 - a); of gusts the variance is summed frame by frame."""
+    a, n = 0.8, 400
+    found = healthy_residual_std(replace(context(GUSTY), constant_rad_s2=np.array([0.0, 0.03, 0.05])), a)
+    model = np.hypot([1e-4, 0.03, 0.05], GUSTY.model_rad_s2) * DT / (1.0 - a)
+    lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    weight = a ** np.arange(n)
+    air = [
+        DT * sigma * np.sqrt(weight @ np.exp(-DT * lag / tau) @ weight)
+        for sigma, tau in zip(GUSTY.turbulence_rad_s2, GUSTY.turbulence_time_s, strict=True)
+    ]
+    noise = np.convolve(weight, [1.0, -1.0])[:n]  # of n[k] - n[k-1] through the filter
+    gyro = GUSTY.gyro_rad_s * np.sqrt(noise @ noise)
+    assert found == pytest.approx(np.sqrt(model**2 + np.square(air) + gyro**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("declared", [None, GUSTY])
+def test_an_observer_step_by_step(declared):
+    """Residual, threshold and fit in plain sums; from the alarm on the residual that is fitted starts again,
+    and a window later the name stands."""
+    observer, constant = ConstantThresholdObserver(), np.array([0.02, 0.0, 0.05])
+    options = {"alarm": 3.0, "pole_per_s": 4.0, "window_s": 0.1}
+    observer.reset(replace(context(declared, **options), constant_rad_s2=constant))
+    a = exp(-4.0 * DT)
+    threshold = 3.0 * np.array([0.02, 1e-4, 0.05]) / 4.0
+    if declared:
+        threshold = 3.0 * healthy_residual_std(replace(context(GUSTY), constant_rad_s2=constant), a)
+    assert observer.threshold == pytest.approx(threshold)
+    rng, x, eps, alarm, said = np.random.default_rng(3), np.zeros(3), np.zeros(3), None, []
+    fitted, effects, kept = np.zeros(3), np.zeros((3, 3)), []
+    for k in range(25):
+        contribution, acceleration = 30.0 * rng.normal(size=(3, 4)), rng.normal(size=3)
+        lost = -0.6 * contribution[:, LEADING[1]] if k > 7 else 0.0  # of the elevator
+        moved = DT * (acceleration + lost) if k else np.zeros(3)
+        x = x + moved
+        found = observer.step(
+            Measured(k * DT, x, np.zeros(5), acceleration, contribution, BOUND), np.zeros(4)
+        )
+        if k:
+            eps, fitted = a * eps + moved - DT * acceleration, a * fitted + moved - DT * acceleration
+            effects = a * effects + DT * contribution[:, LEADING]
+        ratio = np.abs(eps) / threshold
+        assert found.statistic == pytest.approx(ratio.max(), abs=1e-9)
+        if alarm is None and ratio.max() > 1.0:
+            alarm, axis, fitted, effects = k, "pqr"[int(ratio.argmax())], np.zeros(3), np.zeros((3, 3))
+        assert found.detected is (alarm is not None)
+        if alarm is None:
+            continue
+        if k <= alarm + 5:  # a window of 0.1 s
+            kept.append((fitted / threshold, effects / threshold[:, None]))
+            weight = exp(-DT / 0.1) ** np.arange(len(kept))[::-1]
+            each = []
+            for s in range(3):
+                cross = sum(w * (e @ of[:, s]) for w, (e, of) in zip(weight, kept, strict=True))
+                square = sum(w * (of[:, s] @ of[:, s]) for w, (_, of) in zip(weight, kept, strict=True))
+                theta = float(np.clip(cross / max(square, 1e-300), -1.0, 0.0))
+                left = sum(
+                    w * np.sum((e - theta * of[:, s]) ** 2) for w, (e, of) in zip(weight, kept, strict=True)
+                )
+                each.append((left / (3.0 * weight.sum()), s, theta))
+            misfit, s, theta = min(each)
+            name = ("aileron", "elevator", "rudder")[s] if misfit <= 1.0 else "unanticipated"
+            said.append((name, theta if misfit <= 1.0 else None))
+        assert (found.axis, found.isolated) == (axis, said[-1][0])
+        assert found.estimate == (None if said[-1][1] is None else pytest.approx(said[-1][1]))
+    assert said[-1] == ("elevator", pytest.approx(-0.6, abs=1e-6))
+
+
+EXACT, LAGGING, RATED = (
+    Declared(), Declared(bandwidth_rad_s=np.array([0.0, 9.0, 0.0, 0.0])),
+    Declared(rate_limit_rad_s=np.array([0.0, 0.0, 1.0, 0.0])),
+)  # fmt: skip
+NOISY = Declared(noise=np.full(7, 1e-3), bandwidth_rad_s=np.array([0.0, 9.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("declared", "alarm"), [(EXACT, 11.0), (LAGGING, 12.0), (RATED, 12.0), (NOISY, 13.0), (GUSTY, 13.0)]
+)
+def test_the_scenario_counts_before_what_was_tuned_and_that_before_the_defaults(monkeypatch, declared, alarm):
+    """What was tuned is that of the flight's grade, of detectors as of laws, and of this method alone."""
+    tuned = {
+        grade: {"detectors": {"mine": {"alarm": level, "noise": 5.0}, "other": {"walk": 9.0}},
+                "laws": {"theirs": {"walk": level}}}
+        for grade, level in (("exact", 11.0), ("actuators", 12.0), ("errors", 13.0))
+    }  # fmt: skip
+    monkeypatch.setattr(rivals, "load_tuned_values", lambda: tuned)
+    defaults = {"alarm": 1.0, "noise": 2.0, "walk": 3.0}
+    found = rivals.rival_options("mine", defaults, context(declared, noise=7.0))
+    assert found == {"alarm": alarm, "noise": 7.0, "walk": 3.0}
+    of_a_law = rivals.rival_options("theirs", defaults, context(declared))
+    assert of_a_law == {"alarm": 1.0, "noise": 2.0, "walk": alarm}
+    with pytest.raises(BadInput) as refused:
+        rivals.rival_options("mine", defaults, context(declared, alarn=7.0))
+    assert (
+        str(refused.value) == "mine: options.alarn: unknown option, did you mean alarm? "
+        "allowed: alarm, noise, walk"
+    )

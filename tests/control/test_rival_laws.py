@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control import Reference
 from beaver_ftc.control.rivals.indi import IncrementalInversion, LowPass
-from beaver_ftc.control.rivals.l1 import Predictor
+from beaver_ftc.control.rivals.l1 import L1Adaptive, Predictor
 from beaver_ftc.control.rivals.lqr import FixedGainLqr, gains
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
@@ -153,6 +153,70 @@ def test_incremental_inversion_sets_what_was_measured_against_the_positions_that
             disturbed.step(d)
         assert G @ command == pytest.approx(nu - disturbed.value, abs=1e-9)
         position = position + reach * (command - position)
+
+
+class Curved:
+    """A design model whose slopes are others elsewhere: xdot = A x + x^2 + b + G u."""
+
+    def f(self, x, y):
+        return A @ x + x**2 + y[0]
+
+    def G(self, y):
+        return (1.0 + y[1]) * G
+
+
+TRIM_X, TRIM_Y = np.array([0.1, -0.2, 0.3]), np.array([0.4, 0.5, 0.0, 0.0, 0.0])
+TRIM = np.array([0.02, -0.05, 0.01, 0.1])
+
+
+def curved(**options):
+    """A flight of that model from a trim that turns, with its surfaces off neutral."""
+    travel = np.array([[-9.0] * 4, [9.0] * 4])
+    return Context(DT, 1, Curved(), TRIM_X, TRIM_Y, TRIM, travel, np.zeros(3), np.zeros(3), options=options)
+
+
+def test_the_regulator_weighs_rates_angles_and_deflections_by_what_is_acceptable_of_each():
+    """No other first command costs less, about the trim; then what the law asks for in its first frames."""
+    law = FixedGainLqr()
+    law.reset(curved(error_deg_s=0.4, integral_deg=0.7, deflection_deg=2.0))
+    slope, B = A + 2.0 * np.diag(TRIM_X), 1.5 * G[:, :3]
+    ahead = np.block([[np.eye(3) + DT * slope, np.zeros((3, 3))], [DT * np.eye(3), np.eye(3)]])
+    into = np.vstack([DT * B, np.zeros((3, 3))])
+    Q, R = np.diag(np.radians([0.4] * 3 + [0.7] * 3) ** -2.0), np.eye(3) * np.radians(2.0) ** -2.0
+    K, closed = law.K, ahead - into @ law.K
+    P = Q + K.T @ R @ K  # what one frame costs; then of twice as many, and so on to the end
+    for _ in range(20):
+        P, closed = P + closed.T @ P @ closed, closed @ closed
+    best = np.linalg.solve(R + into.T @ P @ into, into.T @ P @ ahead)  # as the first of all to come
+    assert pytest.approx(best, rel=1e-6, abs=1e-9) == K
+    rng, integral = np.random.default_rng(6), np.zeros(3)
+    for k in range(3):
+        x, rate, acceleration = 0.01 * rng.normal(size=(3, 3))
+        seen = Measured(k * DT, x, TRIM_Y, np.zeros(3), np.zeros((3, 4)), np.zeros(3))
+        command = law.step(seen, Reference(rate, rate, acceleration), Verdict())
+        integral = integral + DT * (rate - x)
+        feedforward = np.linalg.inv(B) @ (acceleration - slope @ (rate - TRIM_X))
+        assert command[:3] == pytest.approx(TRIM[:3] + feedforward + K @ [*(rate - x), *integral], rel=1e-6)
+        assert command[3] == TRIM[3]
+
+
+def test_l1_demands_what_the_model_and_what_was_learnt_do_not_give():
+    """G u = nu - f - C sigma of all surfaces, the flap in trim among them; sigma by the predictor."""
+    law = L1Adaptive()
+    law.reset(curved(proportional_per_s=1.7, integral_per_s2=0.6, predictor_per_s=3.0, bandwidth_per_s=15.0))
+    predictor, learnt, keep = Predictor(3.0, DT), np.zeros(3), np.exp(-15.0 * DT)
+    rng, integral, before = np.random.default_rng(6), np.zeros(3), None
+    y = np.array([0.3, 0.2, 0.0, 0.0, 0.0])
+    for k in range(5):
+        x, rate, acceleration, given = 0.01 * rng.normal(size=(4, 3))
+        seen = Measured(k * DT, x, y, given, np.zeros((3, 4)), np.zeros(3))
+        command = law.step(seen, Reference(np.full(3, 9.0), rate, acceleration), Verdict())
+        if before is not None:
+            learnt = keep * learnt + (1.0 - keep) * predictor.step(x - before, given)
+        before, integral = x, integral + DT * (rate - x)
+        nu = acceleration + 1.7 * (rate - x) + 0.6 * integral
+        assert 1.2 * G @ command == pytest.approx(nu - (A @ x + x**2 + 0.3) - learnt)
+        assert command[3] == TRIM[3]
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

@@ -232,3 +232,88 @@ def test_a_folder_is_the_last_place_to_find_a_plug_in_in(tmp_path, monkeypatch):
         assert (found.group, found.name) == (plugins.DETECTORS, name)
         assert sys.path[-1] == str(tmp_path)
     assert sys.path.count(str(tmp_path)) == 1
+
+
+# As plugins.yaml has them: with options and limits of tuning, without, and with a class.
+ROWS = {
+    "mine": {
+        "says": "Mine.",
+        "options": {
+            "gain": {"default": 2.0, "low": 0.5, "high": 3.0},
+            "order": {"default": 1, "whole": True, "high": 4},
+        },
+        "tunable": {"gain": [0.5, 3], "fdi.share": [0.1, 0.9, "odds"]},
+    },
+    "bare": {"says": "Bare."},
+    "theirs": {"says": "Theirs.", "class": "own_plugins:MyLaw"},
+}
+
+
+@pytest.fixture
+def rows(monkeypatch):
+    monkeypatch.setattr(plugins, "_ours", lambda group: ROWS if group == LAWS else {})
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "wrong"),
+    [
+        ("mine", {"gain": 0.5, "order": 4}, []), ("mine", {"gain": 3.0, "order": 0}, []),
+        ("mine", {"order": 2.5, "gain": 0.499, "gian": 1.0},
+         [("order", "2.5, allowed: whole numbers from 0 to 4"),
+          ("gain", "0.499, allowed: numbers from 0.5 to 3"),
+          ("gian", "mine has no such option, did you mean gain? allowed: gain, order")]),
+        ("mine", {"gain": 3.001, "order": 5},
+         [("gain", "3.001, allowed: numbers from 0.5 to 3"),
+          ("order", "5, allowed: whole numbers from 0 to 4")]),
+        ("mine", {"order": -1}, [("order", "-1, allowed: whole numbers from 0 to 4")]),
+        ("bare", {"gain": 1.0}, [("gain", "bare has no options, allowed: {}")]),
+        ("theirs", {"gain": 1.0}, []),  # which it has to say itself
+        ("of another package", {"gain": 1.0}, []),
+    ],
+)  # fmt: skip
+def test_options_of_what_the_compiled_frame_does_are_within_their_limits(rows, name, given, wrong):
+    found = plugins.wrong_options(LAWS, name, given)
+    assert found == [(("options", key), says) for key, says in wrong]
+
+
+def test_what_is_not_given_has_its_default(rows):
+    assert plugins.settings(LAWS, "mine", {}) == {"gain": 2.0, "order": 1}
+    assert plugins.settings(LAWS, "mine", {"order": 3}) == {"gain": 2.0, "order": 3}
+    assert plugins.settings(LAWS, "bare", {}) == {}
+
+
+def test_between_which_limits_a_parameter_is_tuned(rows, monkeypatch):
+    assert plugins.tunable(LAWS, "mine") == {
+        "gain": plugins.Range(0.5, 3.0, "log"), "fdi.share": plugins.Range(0.1, 0.9, "odds"),
+    }  # fmt: skip
+    assert plugins.tunable(LAWS, "bare") == {}
+    entry = register("own_plugins:MyLaw")
+    law = plugins.plugin_class(LAWS, entry.name)
+    assert plugins.tunable(LAWS, entry.name) == {}
+    monkeypatch.setattr(law, "tunable", {"pole": (2, 5)}, raising=False)
+    assert plugins.tunable(LAWS, entry.name) == {"pole": plugins.Range(2.0, 5.0, "log")}
+    monkeypatch.setattr(law, "tunable", [("pole", 2, 5)])
+    with pytest.raises(BadInput) as refused:
+        plugins.tunable(LAWS, entry.name)
+    assert str(refused.value) == "plug-in my-law: tunable is a list, allowed: option: (low, high)"
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [(0.0, 1.0), (2.0, 2.0), (3.0, 2.0), (1.0, float("inf")), (0.1, 1.0, "odds"), (0.1, 0.9, "linear"),
+     (0.1,), (0.1, 0.5, "log", 1), "ab", None, (0.1, None)],
+)  # fmt: skip
+def test_limits_of_tuning_that_are_none(limits):
+    with pytest.raises(BadInput) as refused:
+        plugins._range("mine", "gain", limits)
+    says = 'allowed: (low, high) with 0 < low < high, or (low, high, "odds") below 1'
+    assert str(refused.value) == f"mine: tunable gain: {limits!r:.60}; {says}"
+
+
+def test_a_class_is_found_by_its_own_name_unless_something_is_registered_by_that(rows):
+    register("MyLaw=own_plugins:Explains")
+    register("mine-too=own_plugins:MyLaw")
+    assert plugins._entry(LAWS, "MyLaw").target == "own_plugins:Explains"
+    assert plugins._entry(LAWS, "Explains").name == "MyLaw"
+    assert plugins._entry(LAWS, "mine-too").target == "own_plugins:MyLaw"
+    assert plugins._entry(DETECTORS, "MyLaw") is None

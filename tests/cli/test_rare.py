@@ -1,6 +1,7 @@
 """`beaver-ftc sweep --rare`: what it answers, and what it does not go with."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -38,6 +39,8 @@ def test_what_cannot_be_reached_is_no_failure(file, capsys):
     [
         ({"search": Objective.delay}, "search"),
         ({"replay": 1}, "replay"),
+        ({"junit": Path("j.xml")}, "junit"),
+        ({"ray_address": "auto"}, "ray-address"),
         ({"backend": Backend.ray}, "backend"),
         ({"keep_logs": "all"}, "keep-logs"),
         ({"certificate": True}, "certificate"),

@@ -63,8 +63,6 @@ class Row(TyperCommand):
         """What the row names, as typer reads it."""
         found = loaded(self.target)
         if isinstance(found, type):
-            pass
-
             return as_typer_reads(command_of(found), getattr(found, "PLUGINS", True))
         return as_typer_reads(found, getattr(found, "PLUGINS", True))
 

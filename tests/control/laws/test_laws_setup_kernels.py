@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import laws, state
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control import laws, row_of, state
+from beaver_ftc.control.laws import rejecting, zhang2005
 from beaver_ftc.control.laws.rejecting import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record, response
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
@@ -121,3 +121,93 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     A, B = laws.discretise(9.0, 0.6, 0.02)
     assert model["A"] == pytest.approx(np.array(A))
     assert model["B"] == pytest.approx(np.array(B))
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({}, {}), ({"projection": 0}, {"least": -np.inf, "most": np.inf, "weight_limit": np.inf}),
+        ({"network": 0}, {"networks": 0}), ({"adaptation": 0}, {"adapts": 0}),
+        ({"hand_over": 0}, {"reallocates": 0}),
+    ],
+)  # fmt: skip
+def test_every_option_of_the_published_law_is_in_its_record(options, expected):
+    """Of surfaces that lead the axes in no order, with stops that are not symmetric."""
+    chosen = {"network_gain": 70.0, "network_limit_rad_s2": 8.0, "parametric_gain": 30.0, "rate_weight": 5.0}
+    keys = {"law": "zhang2005", "proportional_per_s": 3.1, "integral_per_s2": 0.7,
+            "least_effectiveness": 0.15, "options": chosen | options}  # fmt: skip
+    control = new_control(main=(2, 0, 1))
+    control["config"] = 9, 1, 1, 0
+    control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.55, 0.45, 0.35, 1.0)
+    zhang2005.configure(control["zhang2005"], control, None, given(keys), None)
+    law, network = control["zhang2005"]["config"], control["zhang2005"]["network"]["config"]
+    feedback = control["zhang2005"]["feedback"]["config"]
+    found = {name: law[name].item() for name in law.dtype.names} | {
+        "Kp": feedback["Kp"], "Ki": feedback["Ki"], "network_gain": network["gain"],
+        "weight_limit": network["weight_limit"], "reallocates": control["config"]["reallocates"],
+        "uses_verdict": control["config"]["uses_verdict"],
+    }  # fmt: skip
+    usual = {
+        "adapts": 1, "networks": 1, "gain": 30.0, "integral_weight": 3.1 / (5.0 * 0.7 + 1.0), "least": 0.15,
+        "most": 1.0, "Kp": 3.1, "Ki": 0.7, "network_gain": 70.0, "weight_limit": 8.0, "reallocates": 1,
+        "uses_verdict": 1,
+    }  # fmt: skip
+    assert found == pytest.approx(usual | expected)
+    assert network["first_centre"][:, 2].tolist() == [-0.3, -0.5, -0.4]
+    assert network["centre_spacing"][:, 2] == pytest.approx([0.325, 0.525, 0.425])
+
+
+INTEGRAL, UNKNOWN, LEARNT, FOUND = (
+    np.array(of) for of in ((0.1, -0.2, 0.3), (1.0, 2.0, -3.0), (5.0, 6.0, 7.0), (0.4, -0.5, 0.8))
+)
+
+
+def flown_by(law):
+    """What a law has in memory, no two numbers alike; Ki 2 and 4 1/s2."""
+    control = new_control()
+    row = row_of(law)
+    control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
+    for feedback, Ki in ((control["published"], 2.0), (control["zhang2005"]["feedback"], 4.0)):
+        feedback["config"]["Ki"], feedback["memory"]["integral"] = Ki, INTEGRAL
+    control["surfaces"]["output"]["unknown"], control["zhang2005"]["network"]["output"] = UNKNOWN, LEARNT
+    observer = control["rejecting"]["observer"]
+    observer["disturbance"], observer["rate"], observer["begun"] = FOUND, (0.01, 0.02, 0.03), 1
+    control["compiled_rivals"]["memory"]["inherited"] = 3.0 * FOUND
+    return control
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [
+        ("nominal", UNKNOWN - 2.0 * INTEGRAL), ("fault-tolerant-published", UNKNOWN - 2.0 * INTEGRAL),
+        ("zhang2005", LEARNT - 4.0 * INTEGRAL), ("fault-tolerant", FOUND), ("oracle", FOUND),
+        ("lqr", 3.0 * FOUND), ("indi", 3.0 * FOUND),
+    ],
+)  # fmt: skip
+def test_what_a_law_leaves_to_no_model_is_what_the_next_one_begins_with(law, expected):
+    """Each after each: the integrators, the observer and what is only handed on."""
+    before = flown_by(law)
+    for then, begun in {
+        "nominal": ("published", lambda of: -2.0 * of["memory"]["integral"]),  # no network explains it
+        "adaptive": ("published", lambda of: 9.0 * LEARNT - 2.0 * of["memory"]["integral"]),
+        "oracle-published": ("published", lambda of: -2.0 * of["memory"]["integral"]),
+        "zhang2005": ("zhang2005", lambda of: -4.0 * of["feedback"]["memory"]["integral"]),
+        "fault-tolerant": ("rejecting", lambda of: of["observer"]["disturbance"]),
+        "lqr": ("compiled_rivals", lambda of: of["memory"]["inherited"]),
+    }.items():
+        new, (file, holds) = flown_by(then), begun
+        new["rejecting"]["observer"]["rate"] = 9.0
+        state.take_over(new, before, 9.0 * LEARNT)
+        assert holds(new[file]) == pytest.approx(expected), then
+        assert new["config"] == flown_by(then)["config"]
+        own_rate = (0.01, 0.02, 0.03) if file == "rejecting" else (9.0, 9.0, 9.0)
+        assert new["rejecting"]["observer"]["rate"].tolist() == [*own_rate]
+        assert new["surfaces"]["output"]["unknown"].tolist() == UNKNOWN.tolist()
+    assert before.tobytes() == flown_by(law).tobytes(), "the law before is left as it was"
+
+
+def test_without_an_integral_nothing_is_handed_to_it():
+    before, new = flown_by("fault-tolerant"), flown_by("nominal")
+    new["published"]["config"]["Ki"] = 0.0
+    state.take_over(new, before, LEARNT)
+    assert new["published"]["memory"]["integral"].tolist() == INTEGRAL.tolist()

@@ -9,9 +9,12 @@ from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.isolation import isolation_dtype
+from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.diagnosis.schemes import published as published_scheme
+from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, options_of, settings
+from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.scenario.schema import load_text
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
 
@@ -207,6 +210,57 @@ def test_what_a_part_is_good_for_shows_without_it(options, found):
 def test_without_the_dead_zone_the_network_learns_of_healthy_flight():
     _, log = flown(fdi=SCHEME | {"options": {"dead_zone": 0}}, duration_s=3.0)
     assert np.abs(log["q_network_rad_s2"]).max() > 1e-3
+
+
+CHOSEN = {
+    "network_gain": 70.0, "network_limit_rad_s2": 8.0, "adaptation_gain": 900.0, "initial_theta": -0.15,
+    "constant_threshold_rad_s": 0.004,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "projects", "adaptive", "waits", "left_out"),
+    [
+        ({}, True, True, 1, None), ({"projection": 0}, False, True, 1, None),
+        ({"leave_out": 3}, True, True, 1, 2), ({"adaptive_threshold": 0}, True, False, 1, None),
+        ({"dead_zone": 0, "leave_out": 1}, True, True, 0, 0),
+    ],
+)  # fmt: skip
+def test_every_option_is_in_the_record_of_its_part(options, projects, adaptive, waits, left_out):
+    """At 50 Hz, of surfaces that lead the axes in no order, with stops that are not symmetric."""
+    config = {"scheme": "zhang2005", "detection_pole_per_s": 4.0, "isolation_pole_per_s": 6.0,
+              "options": CHOSEN | options}  # fmt: skip
+    fdi, before = (np.zeros(1, fdi_dtype(4))[0] for _ in range(2))
+    travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
+    for record in (fdi, before):
+        record["layout"]["main"] = (2, 0, 1)
+        record["bank"]["config"]["decay_factor"][:3] = 0.5, 0.6, 0.7
+        record["isolation"]["config"]["threshold_kind"] = 1
+    given = load_scenario({"name": "x", "rate_hz": 50, "fdi": config})
+    published_scheme.reconfigure_diagnosis_as_published(fdi, given, travel)
+    found = fdi["published"]["network"]["config"]
+    assert (found["gain"], found["weight_limit"]) == (70.0, 8.0 if projects else np.inf)
+    middle = [(low + high) / 2.0 for low, high in travel.T[[2, 0, 1]]]
+    assert found["first_centre"].tolist() == [
+        [angle, -0.3, low] for angle, low in zip((-0.4, -0.1, -0.4), travel[0, [2, 0, 1]], strict=True)
+    ]
+    spacing = [[0.1, 0.3, at - low] for at, low in zip(middle, travel[0, [2, 0, 1]], strict=True)]
+    spacing[1][0] = 0.6 / 8.0
+    assert found["centre_spacing"] == pytest.approx(np.array(spacing))
+    assert fdi["published"]["config"]["uses_dead_zone"] == waits
+    assert fdi["published"]["config"]["constant_threshold"] == (0.0 if adaptive else 0.004)
+    assert fdi["fdae"]["config"]["decay_factor"] == pytest.approx(1.0 - 4.0 / 50.0)
+    assert fdi["bank"]["config"]["decay_factor"][:3] == pytest.approx([1.0 - 4.0 / 50.0, 0.6, 0.7])
+    isolating = fdi["isolation"]["config"]
+    assert isolating["filter_decay"] == pytest.approx(
+        np.full_like(isolating["filter_decay"], 1.0 - 6.0 / 50.0)
+    )
+    assert (isolating["adapts_by_gradient"], isolating["gradient_gain"]) == (1, 900.0)
+    assert isolating["projection_disabled"] == (not projects)
+    assert isolating["threshold_kind"] == (1 if adaptive else CONSTANT_THRESHOLD) != 0
+    estimators = fdi["isolation"]["estimator"]
+    assert (estimators["theta"] == -0.15).all()
+    assert np.flatnonzero(estimators["excluded"]).tolist() == ([] if left_out is None else [left_out])
 
 
 def mistake(fdi):

@@ -22,6 +22,12 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_ONSET_SLOTS,
     STEP_FAULT,
 )
+from beaver_ftc.diagnosis.detection.parity import (
+    AXIS_VIEW,
+    N_TONE_FREQUENCIES,
+    ORTHOGONAL_TO_VANE_ERROR,
+    ParityDirection,
+)
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.loop.assembly import configure_design
@@ -474,3 +480,27 @@ def test_a_surface_that_stands_still_again_moves_no_error():
         paces.append(float(record.block[1].uncertainty_change_over_bound_per_frame))
     shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
     assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])
+
+
+def test_which_views_make_tests_of_their_own():
+    """By hand: two losses a surface of roll and yaw, one of pitch, and a step either way on each axis of each
+    block; of views across a surface what they see of a force, and tones, also of an axis by itself."""
+    rates, force = (0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, 0.5)
+    plane, elsewhere = (1, 4), (1, 2)
+    across = {
+        ("axis", rates, False): N_TONE_FREQUENCIES,
+        ("axis", force, False): N_TONE_FREQUENCIES,
+        ("axis", force, True): 0,
+        ("vane", force, False): 0,
+        (0, rates, False): 0,
+        (0, force, False): N_ONSET_SLOTS * (2 + 3) + N_TONE_FREQUENCIES,
+        (3, (0.0, 0.0, 0.0, 0.2, 0.0), True): N_ONSET_SLOTS * (2 + 3) + N_TONE_FREQUENCIES,
+    }
+    alone = N_ONSET_SLOTS * ((1 + 2) + 2 * (2 + 4))
+    assert statistical.n_tests_per_frame(AIRCRAFT) == alone
+    names, views = {"axis": AXIS_VIEW, "vane": ORTHOGONAL_TO_VANE_ERROR}, []
+    for (to, direction, inertial), tests in across.items():
+        view = ParityDirection(names.get(to, to), direction, plane, [1, 2, 3], inertial)
+        assert statistical.n_tests_per_frame(AIRCRAFT, view) == alone + tests, (to, direction, inertial)
+        views.append(view._replace(plane_axes=elsewhere))
+    assert statistical.n_tests_per_frame(AIRCRAFT, *views) == alone + sum(across.values())

@@ -160,7 +160,10 @@ def test_what_a_bound_that_changes_lets_be_heard_is_within_the_room(bounds, angl
     assert most <= room * (1.0 + 1e-9) + 1e-12
 
 
-@pytest.mark.parametrize(("x", "steep"), [(0.01, True), (0.5, True), (1.2, True), (2.0, False), (6.0, False)])
+@pytest.mark.parametrize(
+    ("x", "steep"),
+    [(0.01, True), (0.5, True), (1.2, True), (1.5, True), (1.6, False), (2.0, False), (6.0, False)],
+)
 def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, steep):
     """A square wave whose edges take as long as its pace needs; beyond, a triangle that never gets to one."""
     phase = (np.arange(20000) + 0.5) * 2.0 * pi / 20000

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis import monitors
@@ -17,3 +18,33 @@ def test_thrust_on_the_right_turns_the_nose_to_the_left(named, arm):
     effectors = {name: SimpleNamespace(share=ENGINES[name][0], right_m=ENGINES[name][1]) for name in named}
     aircraft = SimpleNamespace(effectors=effectors, geometry=SimpleNamespace(span_m=12.0, chord_m=2.0))
     assert monitors.healthy_yawing_moment_per_thrust(aircraft) == pytest.approx(arm / 12.0)
+
+
+def aircraft(signals, knows_engines=True):
+    error_map = None if knows_engines is None else SimpleNamespace(knows_engines=knows_engines)
+    effectors = {name: SimpleNamespace(share=share, right_m=at) for name, (share, at) in ENGINES.items()}
+    geometry = SimpleNamespace(span_m=12.0, chord_m=2.0)
+    file = SimpleNamespace(model_error_map=error_map)
+    return SimpleNamespace(file=file, effectors=effectors, geometry=geometry, signals=signals)
+
+
+@pytest.mark.parametrize(
+    ("signals", "thrust", "turning"),
+    [(("dpt", "engines_n", "thrust"), 6, 5), (("thrust", "slip", "engines_n"), 4, 6)],
+)
+def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(signals, thrust, turning):
+    """y has alpha, beta, airspeed and dynamic pressure first."""
+    config = np.zeros(1, monitors.ENGINE_MONITOR_CONFIG_RECORD)[0]
+    monitors.configure_engine_monitor(config, aircraft(signals))
+    assert config.tolist() == pytest.approx((3, thrust, turning, -0.95 / 12.0, 0.05 / 12.0))
+
+
+@pytest.mark.parametrize(
+    ("signals", "knows_engines"),
+    [(("thrust", "engines_n"), None), (("thrust", "engines_n"), False), (("thrust", "engines_m"), True),
+     (("engines_n",), True)],
+)  # fmt: skip
+def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(signals, knows_engines):
+    config = np.zeros(1, monitors.ENGINE_MONITOR_CONFIG_RECORD)[0]
+    monitors.configure_engine_monitor(config, aircraft(signals, knows_engines))
+    assert not any(config.tolist())

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from beaver_ftc.design import Dryden
+from beaver_ftc.design.model import design_record, jacobian
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
@@ -19,11 +21,14 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     QDYN,
     REDUNDANCY_RECORD,
     RPM_TEST,
+    SENSOR_MONITOR_RECORD,
     SPEED_TEST,
     TEST_RECORD,
     THETA,
+    UNREACHABLE_FROZEN_SAMPLES,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, SENSORS
+from beaver_ftc.scenario.schema import Scenario
 
 H, GRAVITY, DRIFT, GUST = 0.02, 9.8, 2e-4, 0.7
 FLOWS = (ALPHA_FLOW_TEST, BETA_FLOW_TEST)
@@ -525,3 +530,77 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
         assert (
             relations["test"]["residual_bound_ratio"][FIRST_TURN_TEST : FIRST_TURN_TEST + 3] <= 1.0
         ).all(), k
+
+
+ERRORS = {
+    "p": {"noise_std_deg_s": 0.05}, "q": {"bias_deg_s": -0.2}, "r": {"quantum_deg_s": 0.01},
+    "alpha": {"scale_error": -0.02}, "V": {"noise_std_mps": 0.5, "quantum_mps": 0.1},
+    "psi": {"drift_deg_h": 30.0}, "phi": {"drift_deg_h": -36.0}, "engine_rpm": {"bias_rpm": 4.0},
+}  # fmt: skip
+Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
+
+
+def not_zero(record, path=""):
+    """{path: value} of all numbers of a record that are not zero."""
+    for name in record.dtype.names:
+        value = record[name]
+        if isinstance(value, np.void):
+            yield from not_zero(value, f"{path}{name}.")
+        elif value.dtype.names is None and np.any(value):
+            yield path + name, np.asarray(value)
+
+
+def at_sensors(**values):
+    return [values.get(name, 0.0) for name in SENSORS]
+
+
+@pytest.mark.parametrize(("noise_deg", "share"), [(0.0, 1.0), (0.1, 3.0 / 60.0)])
+def test_all_that_a_monitor_is_set_up_with_and_no_more(noise_deg, share):
+    """At 20 Hz of three instants each: numbers from the declaration, the standard and the design model."""
+    sensors = ERRORS | {"theta": {"noise_std_deg": noise_deg}}
+    bounds = {"sensors": sensors, "turbulence": "moderate", "vertical_wind_mps": 1.5}
+    given = {
+        "name": "x", "rate_hz": 20, "substeps": 3, "fdi": {"statistical": {}, "bounds": bounds},
+        "initial": {"airspeed_mps": 48, "altitude_m": 1000, "engine_rpm": 2000, "manifold_pressure_inhg": 21},
+    }  # fmt: skip
+    design, monitor = design_record()[0], np.zeros(1, SENSOR_MONITOR_RECORD)[0]
+    redundancy.configure_sensor_monitor(monitor, Scenario.model_validate(given), design, Y, True)
+    deg, h, sigma = np.pi / 180.0, 1.0 / 60.0, 10.6 * 0.3048
+    walk = 6.0 * sigma * np.sqrt(3.0 * 1.4 * 48.0 / (1750.0 * 0.3048))
+    fading = 1.0 - np.exp(-2.0 * h * np.array([1e6, 10.0, 1.0]))
+    damping = -jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
+    frozen = at_sensors(r=UNREACHABLE_FROZEN_SAMPLES, V=50) + np.where(at_sensors(r=1, V=1), 0, 3)
+    steady = {"q": 0.2 * deg, "engine_rpm": 4.0}
+    expected = {
+        "config.enabled": 1, "config.substeps": 3, "config.has_engine_sensors": 1,
+        "config.trim_reading": at_sensors(alpha=0.1, beta=0.02, V=44.0, qdyn=1000.0),
+        "config.replaced_rate_correction_share": share, "config.min_frozen_samples": frozen,
+        "config.rate_damping_per_s": damping, "memory.substep": 2, "output.alarmed_at_s": -1.0,
+        "output.isolated_sensor": -1, "output.isolated_at_s": -1.0, "redundancy.config.sample_time_s": h,
+        "redundancy.config.filter_decay_by_pole": [0.0, np.exp(-10.0 * h), np.exp(-h)],
+        "redundancy.config.gravity_m_s2": 9.80665 / (1.0 + 1000.0 / 6_371_000.0) ** 2,
+        "redundancy.config.max_gust_speed_mps": 6.0 * sigma,
+        "redundancy.config.gust_change_bound_mps": walk * np.sqrt(h / fading),
+        "redundancy.config.max_airspeed_mps": 1.4 * 48.0,
+        "redundancy.config.low_altitude_limit_m": Dryden("moderate").low_m,
+        "redundancy.config.max_vertical_wind_mps": 1.5,
+        "redundancy.config.error_bound_at_zero_reading": at_sensors(
+            p=0.2 * deg, r=0.005 * deg, V=2.05, theta=4.0 * noise_deg * deg, **steady
+        ),
+        "redundancy.config.error_bound_per_unit_reading": at_sensors(alpha=0.02),
+        "redundancy.config.constant_error_bound": at_sensors(**steady),
+        "redundancy.config.attitude_drift_rad_s": 36.0 * deg / 3600.0,
+        "redundancy.memory.commanded_engine_readings": [2000.0, 21.0],
+    } | ({"config.attitude_is_noisy": 1} if noise_deg else {})  # fmt: skip
+    found = dict(not_zero(monitor))
+    assert set(found) == set(expected)
+    for path, value in expected.items():
+        assert found[path] == pytest.approx(np.array(value), rel=1e-6, abs=1e-9), path
+
+
+def test_a_monitor_that_is_off_has_found_nothing_and_holds_no_more():
+    monitor = np.zeros(1, SENSOR_MONITOR_RECORD)[0]
+    redundancy.configure_sensor_monitor(monitor, None, None, None, False)
+    assert {path: value.item() for path, value in not_zero(monitor)} == {
+        "output.alarmed_at_s": -1.0, "output.isolated_sensor": -1, "output.isolated_at_s": -1.0,
+    }  # fmt: skip

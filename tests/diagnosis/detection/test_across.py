@@ -1,5 +1,7 @@
 """What a surface cannot have done: directions in which its fault, whatever its course, shows nothing."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,11 @@ def test_views_are_there_only_where_something_is_concluded_from_them(changes, in
 @pytest.mark.parametrize("substeps", [1, 2])
 def test_a_flight_has_them_or_not(substeps):
     loop = Loop(scenario(duration_s=1, substeps=substeps, **declared("light")))
-    assert loop.frames["fdi"]["statistical"]["n_views"][0] == (13 if substeps == 1 else 0)
+    detector = loop.frames["fdi"]["statistical"][0]
+    assert detector["n_views"] == (13 if substeps == 1 else 0)
+    # one share of the false alarms each, of a tone as of a step: exp(-l^2 / 2) beyond a level l of two parts
+    share = NormalDist().cdf(-detector["test_config"]["alarm_level"]) if substeps == 1 else 1.0
+    assert np.exp(-(detector["tone_config"]["alarm_level"] ** 2) / 2.0) == pytest.approx(share, rel=1e-6)
     loop.release()
 
 

@@ -1,6 +1,8 @@
 """Handling qualities: closed forms of made-up modes, the levels' edges, and the Beaver's own."""
 
 import math
+import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -151,3 +153,59 @@ def test_the_beaver_over_its_envelope_as_it_is_shown(changed):
     )
     assert not changed(as_text(found).splitlines(), "text")
     assert not changed(as_rows(found[: len(LIMITS)]))
+
+
+@pytest.mark.parametrize("departure", [None, (1.5, "alpha_rad")])
+def test_of_a_scenario_with_a_fault_the_end_of_its_flight_is_judged_too(monkeypatch, departure):
+    """By the last row of its log; not of an aircraft that was lost. A healthy flight is not flown."""
+    flown, ended = [], []
+
+    def fly(given, log):
+        flown.append(given)
+        log.open(["a", "b"])
+        log.write(np.array([[1.0, 2.0], [3.0, 4.0]]))
+        log.close()
+        return SimpleNamespace(departure=departure)
+
+    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fly)
+    monkeypatch.setattr(handling, "where_trimmed", lambda of: [of.initial.airspeed_mps])
+    monkeypatch.setattr(handling, "where_ended", lambda *given: ended.append(given) or ["at the end"])
+    speeds_mps = pytest.approx([30.0, 36.25, 42.5, 48.75, 55.0])
+    assert over_airspeeds(scenario()) == speeds_mps
+    assert flown == []
+    faulty = scenario(faults=[{"actuator": "rudder", "type": "float", "at_s": 1.0}])
+    found = over_airspeeds(faulty)
+    assert found[:5] == speeds_mps
+    assert found[5:] == ([] if departure else ["at the end"])
+    assert flown == [faulty]
+    assert ended == ([] if departure else [(faulty, {"a": 3.0, "b": 4.0})])
+
+
+def test_each_flight_condition_is_a_line_with_its_worst_level():
+    """A level in words beside each number; of the last one that the flight ended there."""
+    first = of_model(made_up(), 40.04, "trimmed")
+    last = of_model(made_up(dutch=(1.2, -0.01), T_roll=1.5), 33.96, "at the end")
+    quantities, units, one, two, empty, *clauses = as_text([*first, *last]).splitlines()
+    assert [cell.strip() for cell in re.split("   *", quantities)][:3] == [
+        "aircraft alone,", "short period", "short period"
+    ]  # fmt: skip
+    assert re.split("  +", units)[0] == "airspeed, m/s"
+    assert re.split("  +", units)[-2:] == ["damping x frequency rad/s", "level"]
+    assert re.split("  +", one) == [
+        "40.0", "0.6 (1)", "1.47 (1)", "0.2 (1)", "0.24 (1)", "1.2 (1)", "0.5 (1)", "never (1)", "0.1 (1)",
+        "never (1)", "never (1)", "1",
+    ]  # fmt: skip
+    cells = re.split("  +", two)
+    assert (cells[0], cells[3], cells[6], cells[-1]) == ("34.0 at the end", "-0.01 (none)", "1.5 (2)", "none")
+    assert empty == ""
+    assert clauses == [
+        "in brackets: level of MIL-F-8785C, class I, category B:",
+        "3.2.2.1.2 table IV, 3.2.2.1.1 figure 2, 3.3.1.1 table VI, 3.3.1.2 table VII, 3.3.1.3 table VIII, "
+        "3.2.1.2, 3.3.1.4",
+    ]
+    rows = as_rows([*first, *last])
+    assert rows[16] == {
+        "where": "at the end", "airspeed_mps": 33.96, "mode": "spiral", "quantity": "time to double",
+        "value": None, "level": 1,
+    }  # fmt: skip
+    assert [row["level"] for row in rows[10:]] == [each.level for each in last]

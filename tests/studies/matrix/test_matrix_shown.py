@@ -1,6 +1,8 @@
 """Table, heat map and document of the fault matrix, of rows made by hand; its scenarios; one short row."""
 
+from math import radians
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -162,6 +164,68 @@ def short(monkeypatch):
 )
 def test_a_row(case, short, changed):
     assert not changed(fly_case(case))
+
+
+def landed(rms_deg_s, **found):
+    """A flight of the trainer, whose surfaces stand in the order aileron, elevator, rudder."""
+    airframe = SimpleNamespace(surfaces=("rudder", "aileron", "elevator"), dominant_axis=(2, 0, 1))
+    rms = None if rms_deg_s is None else tuple(radians(of) for of in rms_deg_s)
+    nothing = {"departure": None, "authority": {}, "envelope_exits": ()}
+    scenario = SimpleNamespace(airframe=airframe)
+    return SimpleNamespace(scenario=scenario, post_fault_rms_rad_s=rms, **nothing | found)
+
+
+def test_tracking_is_of_the_surfaces_own_axis_beside_the_oracles():
+    """What became of either flight, each by its own keys."""
+    case = FaultCase("total loss", "rudder", 45.0)
+    authority = {axis: {"beyond_s": of} for axis, of in (("p", 1.0), ("q", 2.0), ("r", 3.5))}
+    ours = landed((0.1, 0.2, 0.6), departure=(21.5, "beta_rad"), envelope_exits=((19.0, 1.0),))
+    oracle = landed(
+        (0.7, 0.9, 0.4), departure=(25.0, "alpha_rad"), authority=authority,
+        envelope_exits=((17.5, 2.0), (23.0, 4.0)),
+    )  # fmt: skip
+    found = fault_matrix._tracking(ours, oracle, case)
+    numbers = [found.pop(key) for key in ("rms_deg_s", "oracle_rms_deg_s", "ratio")]
+    assert numbers == pytest.approx([0.6, 0.4, 1.5])
+    assert found == {
+        "axis": "r", "departure_s": 21.5, "oracle_departure_s": 25.0, "departure_signal": "beta_rad",
+        "oracle_beyond_s": 3.5, "oracle_left_envelope_s": 17.5,
+    }  # fmt: skip
+    kept = fault_matrix._tracking(landed((0.1, 0.2, 0.6)), landed(None), case._replace(surface="elevator"))
+    assert (kept["axis"], kept["rms_deg_s"], kept["oracle_rms_deg_s"], kept["ratio"]) == (
+        "q", pytest.approx(0.2), 0.0, None
+    )  # fmt: skip
+    assert [kept[key] for key in ("departure_s", "oracle_departure_s", "departure_signal")] == [None] * 3
+    assert (kept["oracle_beyond_s"], kept["oracle_left_envelope_s"]) == (0.0, None)
+
+
+def test_a_row_is_of_both_laws_and_of_the_informed_test_where_errors_are_declared(monkeypatch):
+    """Each law flies the surface from its deflection in trim; the diagnosis is that of the first."""
+    flown, asked = [], []
+    monkeypatch.setattr(fault_matrix, "trimmed_deg", lambda *of: asked.append(of) or 1.25)
+    monkeypatch.setattr(fault_matrix, "scenario_of", lambda case, law, deg: SimpleNamespace(
+        law=law, deg=deg, airframe="airframe"))  # fmt: skip
+    monkeypatch.setattr(fault_matrix, "columns_of", lambda airframe: [airframe])
+    monkeypatch.setattr(
+        fault_matrix, "fly", lambda one, log=None: flown.append((one.law, one.deg, log)) or one
+    )
+    monkeypatch.setattr(fault_matrix, "_diagnosis", lambda flight, case: {"seen by": flight.law})
+    monkeypatch.setattr(
+        fault_matrix, "_tracking", lambda flight, oracle, case: {"beside": (flight.law, oracle.law)}
+    )
+    monkeypatch.setattr(
+        fault_matrix, "seen_when_told", lambda one, kept, surface: {"told": (one.law, kept, surface)}
+    )
+    ours, oracle = "fault-tolerant-published", "oracle-published"
+    case = FaultCase("float", "rudder", 41.0, False, "beaver-split", "light")
+    row = {"seen by": ours, "beside": (ours, oracle)}
+    assert fly_case(case) == case._asdict() | row
+    assert fly_case(case._replace(declared=True)) == case._asdict() | row | {
+        "declared": True, "told": (ours, ["airframe"], "rudder")
+    }  # fmt: skip
+    assert asked == [(41.0, "rudder", "beaver-split")] * 2
+    assert flown == [(law, 1.25, log) for kept in (None, ["airframe"]) for law, log in (
+        (ours, kept), (oracle, None))]  # fmt: skip
 
 
 def test_a_jam_is_off_the_trimmed_deflection():

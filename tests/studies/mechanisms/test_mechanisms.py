@@ -16,6 +16,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.style import SERIES
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.mechanisms import command, effects, shown, survey
@@ -234,6 +235,23 @@ def test_a_false_alarm_of_a_worst_case_detector_wants_a_reason(few_cells, reason
     assert sum(row["unexplained"] for row in document["false_alarms"] if row["worst_case"]) == (not passed)
 
 
+@pytest.mark.parametrize("key", [DEFAULT, PAPER, "with default: statistical detector"])
+def test_false_alarms_are_counted_by_their_reasons(key):
+    """Of worst-case detectors: one within the declaration, or without the certificate that the scheme has. Of
+    the statistical one: only within the declaration. What raises no alarm has no reason that counts."""
+    reasons = [(3, True), (0, True), (2, False), (0, False), (4, None), (0, None)]
+    rows = [
+        {key: outcome(false_alarm=True, reason={"undeclared": beyond, "certified": proved})}
+        for beyond, proved in reasons
+    ]
+    rows += [{key: outcome(reason={"undeclared": 0, "certified": False})}] * 3
+    worst_case = "statistical" not in key
+    assert effects._alarms_of(key, rows) == {
+        "flown": key, "worst_case": worst_case, "count": 6, "undeclared": 3, "certified": 2,
+        "certifiable": 4, "unexplained": 4 if worst_case else 3,
+    }  # fmt: skip
+
+
 def test_findings_in_sentences(few_cells):
     document = document_of(1, 1, rows_of({"undeclared": 3, "certified": True}), [])
     first, *said, last = sentences(document)
@@ -391,6 +409,7 @@ def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path):
     for axes, name in zip(figure.axes, shown.CRITERIA, strict=True):
         for place, (bar, row) in enumerate(zip(axes.containers, MADE["mechanisms"], strict=True)):
             (dot, _, (span,)), found = bar.lines, row[name]
+            assert dot.get_color() == SERIES[place]  # of one system and of the other
             assert dot.get_xydata().tolist() == [[pytest.approx(100 * found["value"]), place]]
             (ends,) = span.get_segments()
             assert ends[:, 0] == pytest.approx([100 * found["low"], 100 * found["high"]])
@@ -526,7 +545,7 @@ def test_a_draw_has_the_fault_the_instruments_and_the_bandwidth_of_its_cell():
         assert of.duration_s == pytest.approx(of.faults[0].at_s + 8.0)
         assert 38.0 <= of.initial.airspeed_mps <= 52.0
         assert (of.environment.severity, of.fdi.bounds.turbulence) == ("light", "light")
-        assert of.fdi.bounds.constant_rad_s2.q == 0.002
+        assert (of.fdi.bounds.constant_rad_s2.q, of.fdi.bounds.inertia_coupling.r) == (0.002, 0.0)
         for axis, hz in (("p", 0.25), ("q", 0.2), ("r", 0.15)):
             (signal,) = getattr(of.reference, axis)
             assert (signal.sine.amplitude_deg_s, signal.sine.frequency_hz) == (3.0, hz)
@@ -537,6 +556,9 @@ def test_a_draw_has_the_fault_the_instruments_and_the_bandwidth_of_its_cell():
     assert min(phases) < -60.0
     assert max(phases) > 60.0
     lost = scenario_of(Flight("unanticipated", "low", 0.005, "exact sensors", 1), 7, PAPER)
+    assert (lost.fdi.bounds.constant_rad_s2.r, lost.fdi.bounds.inertia_coupling.p) == (0.02, 0.25)
+    thetas = [getattr(lost.uncertainty.inertia_coupling, axis) for axis in "pqr"]
+    assert 0.01 < max(map(abs, thetas)) <= 0.25
     assert (lost.faults[0].type, lost.faults[0].Cm_alpha3) == ("unanticipated", 10.0)
     assert {round(abs(ratio - 1.0), 9) for ratio in lost.uncertainty.coefficients.values()} == {0.005}
     assert {ratio > 1.0 for ratio in lost.uncertainty.coefficients.values()} == {True, False}

@@ -1,13 +1,15 @@
 """Statistics against a table small enough to count by hand."""
 
+from math import sqrt
 from pathlib import Path
 
 import pytest
+from scipy.stats import chi2, norm
 
 from beaver_ftc.scenario.sweeps import Level, SweepExpect, load_sweep_text
 from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
-from beaver_ftc.studies.sweep.summary import estimate_of, evaluate, summarise
+from beaver_ftc.studies.sweep.summary import estimate_of, evaluate, names, summarise
 
 from .counted import ROWS, SWEEP, detected, flights_of
 
@@ -133,6 +135,57 @@ def test_expectations_hold_the_flights_to_their_bounds(flights, expect, actual, 
     (found,) = evaluate(SweepExpect(**expect), flights)
     assert found["passed"] is passed
     assert found["actual"] == (None if actual is None else pytest.approx(actual, abs=1e-3))
+
+
+EVERY = {  # of the dozen flights: nine with a fault that no alarm came before, eleven with metrics
+    "detection_rate": {"at_least": 0.6}, "isolation_rate": {"at_most": 0.5, "confidence": 0.9},
+    "false_alarms_per_hour": {"at_most": 95.0, "confidence": 0.9},
+    "departure_rate": {"at_least": 0.01, "at_most": 0.05}, "failure_rate": {"at_least": 0.05},
+    "pass_rate": {"at_most": 0.9}, "detection_delay_s": {"quantile": 0.5, "at_most": 0.5},
+    "isolation_delay_s": {"quantile": 0.4, "at_most": 0.69},
+    "post_fault_rms_deg_s": {"q": {"quantile": 0.9, "at_most": 0.5}, "r": {"quantile": 0.5, "at_most": 9.0}},
+    "tracking_ratio": {"q": {"quantile": 0.25, "at_most": 2.0, "confidence": 0.6}},
+}  # fmt: skip
+
+
+def test_every_quantity_is_held_to_its_own_bound(flights):
+    """By hand, or by other formulas of the intervals: Wilson's of 4 of 9, and the Poisson distribution's."""
+    hours, z = (9 * 12.0 + 3.0 + 30.0) / 3600, norm.ppf(0.9)
+    isolated = (4 + z**2 / 2 + z * sqrt(4 * 5 / 9 + z**2 / 4)) / (9 + z**2)
+    alarms = chi2.ppf(0.9, 2 * (1 + 1)) / 2 / hours
+    expected = [  # name, passed, actual, of how many
+        ("detection_rate", True, 6 / 9, 9), ("isolation_rate", False, isolated, 9),
+        ("false_alarms_per_hour", False, alarms, 11), ("departure_rate", True, 1 / 11, 11),
+        ("departure_rate", False, 1 / 11, 11), ("failure_rate", True, 1 / 12, 12),
+        ("pass_rate", False, 10 / 11, 11), ("detection_delay_s", True, 0.5, 9),
+        ("isolation_delay_s", False, 0.7, 9),  # 0.2, 0.3, 0.4, 0.7, and five that are never named rightly
+        ("post_fault_rms_deg_s.q", False, None, 9), ("post_fault_rms_deg_s.r", False, None, 1),
+        ("tracking_ratio.q", True, 2.0, 9),
+    ]  # fmt: skip
+    expect = SweepExpect.model_validate(EVERY)
+    found = evaluate(expect, flights)
+    assert [(one["name"], one["passed"], one["actual"], one["of"]) for one in found] == [
+        (name, passed, actual if actual is None else pytest.approx(actual), of)
+        for name, passed, actual, of in expected
+    ]
+    asked = [dict(of) for of in (*EVERY.values(),)]
+    asked[3:4] = {"at_least": 0.01}, {"at_most": 0.05}
+    asked[9:] = EVERY["post_fault_rms_deg_s"]["q"], EVERY["post_fault_rms_deg_s"]["r"], asked[-1]["q"]
+    assert [one["expected"] for one in found] == asked
+    sides = ["at_least", "at_most", "at_most", "at_least", "at_most", "at_least", *["at_most"] * 6]
+    assert names(expect) == [f"{one[0]}.{side}" for one, side in zip(expected, sides, strict=True)]
+    judged = words.verdict({"sweep": "dozen", "passed": False, "expectations": found})
+    assert (judged.name, judged.passed) == ("dozen", False)
+    assert [(one.name, one.passed) for one in judged.expectations] == [
+        (name, one[1]) for name, one in zip(names(expect), expected, strict=True)
+    ]
+    assert [(one.expected, one.actual) for one in judged.expectations][:2] == [
+        ("≥ 0.6", "0.667 of 9 flights"), ("≤ 0.5 with 90 % confidence", "0.648 of 9 flights")
+    ]  # fmt: skip
+    assert [(one.expected, one.actual) for one in judged.expectations][-2:] == [
+        ("50 % quantile ≤ 9", "none of 1 flights"),
+        ("25 % quantile ≤ 2 with 60 % confidence", "2 of 9 flights"),
+    ]
 
 
 def test_both_sides_of_a_bound_are_two_expectations(flights):

@@ -183,3 +183,48 @@ def test_few_peaks_move_shape_and_scale_from_the_prior_by_their_likelihood():
         density = np.exp(-excess / sigma) if abs(xi) < 1e-9 else base ** (-1.0 / xi - 1.0)
         expected[i] = np.prod(density / sigma) ** (1.0 / 2.5) * np.exp(-0.5 * (xi / 0.2) ** 2)
     np.testing.assert_allclose(weight, expected / expected.sum(), rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "over"), [(11, 10), (24, 10), (36, 12), (100, 20), (110, 20)])
+def test_the_tail_is_of_the_highest_peaks_over_the_next_one(n, over):
+    """Ten at least, else twice the root of their number; flights differ by the chi-square of their sums of
+    excess, of which each has twice its mean times that of a peak as variance."""
+    rng = np.random.default_rng(n)
+    peaks = rng.permutation(np.linspace(1.0, 4.0, n) ** 3)
+    parts = [(peaks[: n // 5], 0.2), (peaks[n // 5 : n // 2], 0.7), (peaks[n // 2 :], 0.35)]
+    found = extremes.fit_peak_tail(parts)
+    down = sorted(peaks, reverse=True)
+    assert found.tail_start_level == pytest.approx(down[over])
+    assert found.excess_over_level == pytest.approx([peak - down[over] for peak in down[:over]])
+    assert found.healthy_minutes == pytest.approx(75.0)
+    mean = np.mean(found.excess_over_level)
+    square = 0.0
+    for of, hours in parts:
+        excess = sum(peak - down[over] for peak in of if peak > down[over])
+        expected = over * mean * hours / 1.25
+        square += (excess - expected) ** 2 / (2.0 * expected * mean)
+    assert found.overdispersion == pytest.approx(max(square / 2.0, 1.0))
+    alone = extremes.fit_peak_tail([(peaks, 0.5)])
+    assert (alone.overdispersion, alone.healthy_minutes) == (1.0, 30.0)
+    assert extremes.fit_peak_tail([(peaks[:10], 0.5)]) is None
+
+
+def test_the_sums_of_flights_that_differ_are_as_many_times_wider():
+    """Hours of 1 and 3, excess of 9 and 3 by four peaks of each: 3 and 9 expected, of peaks of 1.5."""
+    parts = [(np.array([1.0, 2.0, 2.5, 3.5]), 1.0), (np.array([0.25, 0.5, 1.0, 1.25]), 3.0)]
+    expected = (9.0 - 3.0) ** 2 / (2.0 * 3.0 * 1.5) + (3.0 - 9.0) ** 2 / (2.0 * 9.0 * 1.5)
+    assert extremes._excess_overdispersion(parts) == pytest.approx(expected)
+    assert extremes._excess_overdispersion([(np.empty(0), 1.0), (np.zeros(2), 3.0)]) == 1.0
+
+
+def test_where_hardly_any_peak_is_as_high_as_the_level_it_is_the_threshold():
+    """Ten peaks in a hundred hours are fewer than one an hour already."""
+    tail = extremes.PeakTail(level=2.5, excess=[0.1 * k for k in range(1, 11)], minutes=6000.0)
+    assert extremes.threshold_for_false_alarms(tail, 1.0) == 2.5
+    low, high = (extremes.threshold_for_false_alarms(tail, rate) for rate in (0.05, 0.01))
+    assert 2.5 < low < high
+    for rate, threshold in ((0.05, low), (0.01, high)):
+        assert extremes.expected_false_alarms_per_hour(tail, threshold).value == pytest.approx(rate, rel=1e-6)
+    at_level = extremes.expected_false_alarms_per_hour(tail, 2.5)
+    assert at_level.value == pytest.approx(10.5 / 100.0, rel=0.01)  # a gamma's mean of 10 and a half
+    assert (at_level.low, at_level.high) == (pytest.approx(0.058, abs=0.01), pytest.approx(0.163, abs=0.01))

@@ -15,7 +15,7 @@ from beaver_ftc_logs.filtering import (
     hypothesis_state_and_noise_posterior,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
-from products.logs import synthetic
+from products.logs import small, synthetic
 from telling import apart
 
 
@@ -204,3 +204,99 @@ def test_evidence_is_the_log_of_a_likelihood_ratio():
     assert np.isfinite(
         filtering.any_fault_log_odds_gains(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
     ).all()
+
+
+def test_the_scale_of_the_last_two_seconds_is_of_samples_or_of_their_sums():
+    """At 20 Hz: squares of one sample and of sums of two, an axis and a sample that is known, over 40 rows;
+    the larger. What is unknown is no residual."""
+    rng = np.random.default_rng(6)
+    noise = np.array([[0.0025, 0.0009, -0.0004], [0.0009, 0.0016, 0.0003], [-0.0004, 0.0003, 0.0005]])
+    known = ~np.isin(np.arange(90), [0, 1, 30, 31, 32])
+    white = rng.standard_normal((90, 3)) * np.where(np.arange(90) < 45, 1.0, 2.0)[:, None]
+    white[60:] = np.cumsum(white[60:], axis=0)
+    residual = np.where(known[:, None], white * [0.05, 0.04, 0.02], 0.0)
+    inverse = np.linalg.inv(noise)
+    squares = {1: [], 2: []}
+    for k in range(90):
+        for span, found in squares.items():
+            rows = [*range(max(k + 1 - span, 0), k + 1)]
+            total = residual[rows].sum(axis=0)
+            found.append(total @ inverse @ total / (3.0 * max(known[rows].sum(), 1)))
+    means = [[np.mean(of[max(k - 39, 0) : k + 1]) for k in range(90)] for of in squares.values()]
+    assert {int(place) for place in np.argmax(means, axis=0)} == {0, 1}
+    found = filtering.recent_noise_variance_scale(residual, known, noise, 20.0)
+    np.testing.assert_allclose(found, np.max(means, axis=0), rtol=1e-9)
+
+
+@pytest.mark.parametrize("laws", [False, True])
+def test_under_other_laws_the_noise_is_as_wide_as_the_last_seconds_show(monkeypatch, laws):
+    """By what the flight leaves if it is healthy, less the constant; else by the filter's own scale."""
+    model = small.model(small.WING | {"other_laws": laws})
+    flight = small.flight(model, 40, gap=20)
+    ok, left, answers = filtering.whitened_rates_and_responses(flight, model)
+    given = []
+    monkeypatch.setattr(filtering, "run_bank", lambda *of: given.append(of) or "run")
+    monkeypatch.setattr(
+        filtering,
+        "recent_noise_variance_scale",
+        lambda *of: given.append(of) or np.arange(40.0),
+    )
+    assert filtering._run_bank_on_flight(flight, model, "bank") == "run"
+    rates, responses, usable, bank, _, noise, least = given[-1]
+    np.testing.assert_array_equal(rates, np.nan_to_num(left))
+    np.testing.assert_array_equal(responses, np.nan_to_num(answers))
+    np.testing.assert_array_equal(usable, ok)
+    assert (bank, len(given)) == ("bank", 1 + laws)
+    assert least.tolist() == (list(range(40)) if laws else [0.0] * 40)
+    if laws:
+        residual, known, covariance, rate_hz = given[0]
+        expected = np.where(ok[:, None], left - np.array(model.intercept) - answers.sum(axis=1), 0.0)
+        np.testing.assert_allclose(residual, expected, atol=1e-15)
+        assert (known.tolist(), rate_hz) == (ok.tolist(), 10.0)
+        np.testing.assert_array_equal(covariance, noise.covariance)
+
+
+def test_a_noise_that_is_unlikely_is_left_out_and_filtered_no_longer_than_it_counts(monkeypatch):
+    """Three colours of three rows: the second counts to the second row, the third nowhere. Means by what is
+    left of the probabilities, each of the flight and the model of its own colour, taken wider."""
+    colours = [
+        {"average": [1.0, c], "noise": (s * np.eye(3)).tolist(), "wider": w}
+        for c, s, w in ((0.1, 2.0, 1.5), (0.2, 3.0, 2.5), (0.3, 4.0, 3.5))
+    ]
+    model = small.model(colours=colours)
+    chances = np.array([[0.6, 0.7, 0.9991], [0.3995, 0.2998, 0.0005], [0.0005, 0.0002, 0.0004]])
+    monkeypatch.setattr(
+        filtering,
+        "whiten_samples",
+        lambda of, by: SimpleNamespace(noise_ma_coefficients=tuple(by), rows=3),
+    )
+    monkeypatch.setattr(filtering, "first_samples", lambda of, n: SimpleNamespace(**(vars(of) | {"rows": n})))
+    monkeypatch.setattr(
+        filtering, "_noise_model_log_likelihood", lambda of, by, colour: (of.noise_ma_coefficients, colour)
+    )
+    asked = []
+    monkeypatch.setattr(
+        filtering,
+        "_model_probabilities_with_forgetting",
+        lambda likelihoods, rate_hz: asked.append((likelihoods, rate_hz)) or chances,
+    )
+
+    def run(flight, by, bank):
+        asked.append((flight.rows, len(by.noise_models), bank))
+        size = by.residual_covariance[0][0]
+        rows = np.arange(1.0, flight.rows + 1.0)
+        return np.outer(rows, [size, 2.0]), np.outer(rows, [0.1, size]), size + rows, None
+
+    monkeypatch.setattr(filtering, "_run_bank_on_flight", run)
+    posterior, states, scales = hypothesis_state_and_noise_posterior(small.flight(model, 3), model, "bank")
+    likelihoods, rate_hz = asked[0]
+    assert (likelihoods, rate_hz) == (
+        [(tuple(one.ma_coefficients), one) for one in model.noise_models], model.rate_hz,
+    )  # fmt: skip
+    assert asked[1:] == [(3, 1, "bank"), (2, 1, "bank")]
+    first = np.array([0.6 / 0.9995, 0.7 / 0.9998, 1.0])
+    size = 3.0 * first + 7.5 * (1.0 - first)
+    rows = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_allclose(posterior, np.column_stack([rows * size, 2.0 * rows]))
+    np.testing.assert_allclose(states, np.column_stack([0.1 * rows, rows * size]))
+    np.testing.assert_allclose(scales, size + rows)

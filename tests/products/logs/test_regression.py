@@ -219,3 +219,30 @@ def test_a_prediction_is_the_sum_over_the_samples_before_times_their_coefficient
 def test_a_flight_is_split_where_its_shortest_part_is_long_enough():
     assert [len(part) for part in regression.split_into_parts_for_bounds(np.arange(242))] == [61, 61, 60, 60]
     assert regression.split_into_parts_for_bounds(np.arange(239)) is None  # the last part has 59 rows
+
+
+def test_what_a_coefficient_surely_does_not_exceed():
+    """Four standard errors above least squares, of samples of which each counts for a share; much where
+    columns make one another up."""
+    x, y, _ = drawn(n=60, m=4)
+    for share in (1.0, 0.4):
+        high, squares = regression.coefficient_upper_bounds_and_squared_residuals(x, y[:, 1], share)
+        value = np.linalg.lstsq(x, y[:, 1], rcond=None)[0]
+        rest = y[:, 1] - x @ value
+        np.testing.assert_allclose(squares, rest**2, rtol=1e-6)
+        errors = np.sqrt(np.diag(np.linalg.inv(x.T @ x)) * (rest @ rest) / 60 / share)
+        np.testing.assert_allclose(high, value + 4.0 * errors, rtol=1e-6)
+    twice = np.column_stack([x, x[:, 0]])
+    loose, _ = regression.coefficient_upper_bounds_and_squared_residuals(twice, y[:, 1], 0.4)
+    assert (loose[[0, 4]] > 1e3 * np.abs(high[0])).all()
+    np.testing.assert_allclose(loose[1:4], high[1:], rtol=1e-3)
+
+
+@pytest.mark.parametrize(("n", "parts"), [(239, None), (240, [60] * 4), (243, [61, 61, 61, 60])])
+def test_a_flight_has_four_parts_of_sixty_rows_at_least(n, parts):
+    found = regression.split_into_parts_for_bounds(7 + 2 * np.arange(n))
+    if parts is None:
+        assert found is None
+        return
+    assert [len(part) for part in found] == parts
+    assert np.concatenate(found).tolist() == [*range(7, 7 + 2 * n, 2)]

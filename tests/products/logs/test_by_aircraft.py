@@ -204,6 +204,40 @@ def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
             by_aircraft._log_rate_hz(samples)
 
 
+def test_the_rate_is_that_of_the_first_fifty_samples_whose_steps_are_even():
+    """To four digits: a log that was cut short has the same."""
+    steps = np.full(90, 0.0123456)
+    steps[10], steps[49:] = 0.07, 0.02
+    samples = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.0123)
+    assert by_aircraft._log_rate_hz(samples) == 81.0
+    uneven = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.03)
+    assert by_aircraft._log_rate_hz(uneven) == 33.33
+
+
+def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
+    """Commands and labels of a file that names them the other way round; at any airspeed as they are."""
+    recording, vehicle = log
+    names = list(bf.aircraft("beaver").surfaces)
+    plain = by_aircraft.read_diagnosis_inputs(recording, vehicle, BEAVER)
+    t_s = recording.columns["p_rad_s"].t_s
+    truth = {f"{name}_truth": Column(t_s, np.full(len(t_s), 0.2 * k + 0.1)) for k, name in enumerate(names)}
+    labelled = RecordedFlight(recording.name, recording.columns | truth)
+    turned = without(
+        vehicle,
+        surfaces=dict(reversed(vehicle.model_dump(exclude_unset=True)["surfaces"].items())),
+        labels={name: f"{name}_truth" for name in names},
+        reference_airspeed_mps=20.0,
+    )
+    found = by_aircraft.read_diagnosis_inputs(labelled, turned, BEAVER)
+    np.testing.assert_array_equal(found.samples.commands, plain.samples.commands)
+    np.testing.assert_allclose(found.samples.labels, np.tile([0.1, 0.3, 0.5, 0.7], (len(t_s), 1)))
+    for one, other in zip(
+        found.rates_signals_commands_attitude, plain.rates_signals_commands_attitude, strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
+    assert (found.rate_hz, found.gap_free_stretches) == (100.0, [(0, len(t_s))])
+
+
 def test_a_log_too_slow_or_uneven_is_refused(log):
     recording, vehicle = log
     with pytest.raises(
@@ -236,6 +270,7 @@ def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch)
     [
         ("aircraft: beaver-split\n", "flies beaver-split, allowed: a scenario of beaver"),
         ("fdi: {sensor_monitor: always}\n", "wants accelerations, which a log has not"),
+        ("fdi: {scheme: none}\n", "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with"),
     ],
 )
 def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
@@ -483,24 +518,26 @@ def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains,
 
 
 def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
-    """Alarm in row 1, which names left in rows 2 and 4, and right in row 3."""
+    """Alarm in row 1, which names left in rows 2 and 4, and right in row 3; in the last row there is none."""
     said = {"isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ("jam", "bias")}
     verdicts = [by_aircraft.Verdict(), by_aircraft.Verdict(True), by_aircraft.Verdict(True, isolated="left")]
     verdicts += [by_aircraft.Verdict(True, isolated="right"), by_aircraft.Verdict(True, **said)]
-    faulty = np.array([0, 1, 1, 1, 1])
-    low = np.tile([0.9, 0.7], (5, 1))
+    verdicts += [by_aircraft.Verdict(candidates=("bias",))]
+    faulty = np.array([0, 1, 1, 1, 1, 0])
+    low = np.tile([0.9, 0.7], (6, 1))
+    names = np.array(["", "unknown", "left", "right", "left", ""], dtype=object)
     rows = stepped.DiagnosisRows(
-        100.0 + 0.25 * np.arange(5), faulty, np.array(["", "unknown", "left", "right", "left"], dtype=object),
-        np.ones((5, 2)), low, np.ones((5, 2)), faulty.astype(float),
+        100.0 + 0.25 * np.arange(6), faulty, names, np.ones((6, 2)), low, np.ones((6, 2)),
+        faulty.astype(float),
     )  # fmt: skip
     samples = SimpleNamespace(
-        name="log", t_s=rows.t_s, dt_s=0.25, stretch_number=np.array([0, 0, 1, 1, 2]), notes=("a remark",)
+        name="log", t_s=rows.t_s, dt_s=0.25, stretch_number=np.array([0, 0, 1, 1, 1, 2]), notes=("a remark",)
     )
     diagnosed = SimpleNamespace(aircraft=PAIR, declared_errors={"fdi": 1})
     replayed = SimpleNamespace(verdicts=verdicts)
     found = by_aircraft._verdict_document(samples, rows, replayed, diagnosed, {"alpha": 0.126})
     expected = {
-        "flight": "log", "aircraft": "pair", "declared": {"fdi": 1}, "duration_s": 1.0, "recorded_s": 1.25,
+        "flight": "log", "aircraft": "pair", "declared": {"fdi": 1}, "duration_s": 1.25, "recorded_s": 1.5,
         "gaps": 2, "rate_hz": 4.0, "faulty": True, "detection_s": 100.25, "isolation_s": 100.5,
         "isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ["jam", "bias"],
         "notes": ["a remark", "alpha is held, 0.13 s old on average: errors declared have to cover it"],
@@ -508,7 +545,7 @@ def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
     assert {name: found[name] for name in expected} == expected
     quiet = stepped.DiagnosisRows(**(vars(rows) | {"faulty": 0 * faulty}))
     none = by_aircraft._verdict_document(
-        samples, quiet, SimpleNamespace(verdicts=[by_aircraft.Verdict()] * 5), diagnosed, {}
+        samples, quiet, SimpleNamespace(verdicts=[by_aircraft.Verdict()] * 6), diagnosed, {}
     )
     names = ("faulty", "detection_s", "isolation_s", "isolated", "notes")
     assert [none[name] for name in names] == [False, None, None, None, ["a remark"]]

@@ -25,7 +25,7 @@ def parts_of(quantile, rng, hours, flights=5):
 
 
 @pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize(("hours", "asked"), [(0.1, 1.0), (1.0, 1.0), (1.0, 0.1)])
+@pytest.mark.parametrize(("hours", "asked"), [(0.1, 1.0), (1.0, 0.1)])
 def test_the_interval_holds_the_true_rate(tail, hours, asked):
     quantile, survival = TAILS[tail]
     rng, held, rates = np.random.default_rng(7), 0, []

@@ -240,3 +240,31 @@ def test_detectors_of_flights_come_first_and_others_are_refused():
     slow = small.flight(BARE, 60, dt_s=0.2)
     with pytest.raises(BadInput, match="allowed: within 25% of the 10 Hz"):
         detectors.diagnose_with_detector(names[1], slow, BARE)
+
+
+def test_each_detector_gets_what_it_takes_and_its_rows_stand_at_the_stamps_of_the_log(monkeypatch):
+    """Ours leaves out itself what stands still; the others are given the rates without it."""
+    samples, told = small.flight(BARE, 30), []
+    loop = detectors.detector_names()[-1]
+    stubs = {
+        "check_log_fits_model": lambda of, by: told.append((of, by)),
+        "with_rates_unknown_where_frozen_or_clipped": lambda of, by: (of, "alive", by),
+        "diagnose": lambda of, by: ("ours", of, by),
+        "run_loop_detector": lambda by, of, model: ("loop", by, of, model),
+        "made": lambda kind, name: (kind, name),
+        "finalize_rows_at_log_stamps": lambda of, by, rows: ("at its stamps", of, by, rows),
+    }
+    for name, stub in stubs.items():
+        monkeypatch.setattr(detectors, name, stub)
+    plain = {METHODS["sliding"]: lambda of, by: ("sums", of, by)}
+    monkeypatch.setattr(detectors, "_FLIGHT_DETECTORS", detectors._FLIGHT_DETECTORS | plain)
+    ours, sums, stepped = (
+        detectors.diagnose_with_detector(name, samples, BARE)
+        for name in ("bank-of-filters", METHODS["sliding"], loop)
+    )
+    alive = (samples, "alive", BARE)
+    assert ours == ("ours", samples, BARE)
+    assert sums == ("at its stamps", samples, BARE, ("sums", alive, BARE))
+    of_loop = ("loop", (detectors.DETECTORS, loop), alive, BARE)
+    assert stepped == ("at its stamps", samples, BARE, of_loop)
+    assert told == [(samples, BARE)] * 3

@@ -100,6 +100,24 @@ def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypat
     )
 
 
+@pytest.mark.parametrize(("share", "says"), [
+    (0.876, "No fault shows in 30 s."), (0.1, "No fault shows in 30 s."), (0.099, "No verdict on 30 s."),
+])  # fmt: skip
+def test_a_page_says_where_nothing_is_said_and_why(monkeypatch, flown, share, says):
+    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
+    samples, rows = flown[0], small.rows(CASES["none"])
+    reasons = [{"says": "a rate is <odd>", "share": 0.1234}, {"says": "p stands still", "share": 0.0321}]
+    verdict = verdict_document(samples, MODEL, rows) | {"credible": {"share": share, "reasons": reasons}}
+    text = " ".join(pages.render_diagnosis(samples, MODEL, rows, verdict).split())
+    assert f'<p class="verdict">{says}</p>' in text
+    assert f"Credible in {100 * share:.1f} % of the rows. In the others nothing is said:</p>" in text
+    assert (
+        "<li>a rate is &lt;odd&gt;: 12.3 % of the rows</li><li>p stands still: 3.2 % of the rows</li>" in text
+    )
+    sure = verdict_document(samples, MODEL, rows)
+    assert "Credible in" not in pages.render_diagnosis(samples, MODEL, rows, sure)
+
+
 def test_a_picture_is_in_the_page(flown):
     import base64
 

@@ -187,15 +187,9 @@ def test_few_minutes_mean_wide_bounds():
     """Standard errors of gains fall as the root of the time."""
     errors = []
     for n in (400, 6400):
-        flown = small.flight(small.model(), n=n, seed=6)
-        model = fitting.fit_model(fitting.flights_with_usable_rows([flown]), small.vehicle())
-        errors.append(
-            np.array(
-                fitting.add_fitted_ranges_and_alarm_threshold(
-                    fitting.flights_with_usable_rows([flown]), model
-                ).fitted_ranges.group_gain_standard_error
-            )
-        )
+        flights = fitting.flights_with_usable_rows([small.flight(small.model(), n=n, seed=6)])
+        fit = fitting.fit_least_squares_of_order(flights, small.vehicle(), 2, 3)
+        errors.append(fitting.group_gain_standard_error(fit, small.model()))
     assert (errors[0] / errors[1] > 2.0).all()
     assert (errors[0] / errors[1] < 8.0).all()
 

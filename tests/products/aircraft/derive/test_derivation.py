@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 from beaver_ftc.aircraft import THRUST_TERM
 from beaver_ftc.aircraft import aircraft as loading
@@ -380,3 +381,81 @@ def test_terms_of_several_regions_are_as_many_as_a_file_may_have_of_one_moment(m
     monkeypatch.setattr(outline, "aircraft_of", lambda data, folder: None)
     assert derivation._moments("samples", {"surfaces": {"aileron": {}}}, Path(), "weight") == "terms"
     assert asked == [(derivation.MAX_TERMS_OF_ONE, "weight")]
+
+
+@pytest.mark.parametrize(
+    ("gamma_rad", "n_engines", "seen", "retracted"),
+    [(-0.02, 1, True, True), (-0.01, 2, True, True), (-0.0099, 1, True, False), (0.02, 1, True, False),
+     (-0.02, 0, True, False), (-0.02, 1, False, False)],
+)  # fmt: skip
+@pytest.mark.parametrize("engines", [False, True])
+def test_a_gear_that_its_power_does_not_carry_is_retracted_in_the_copy(
+    gamma_rad, n_engines, seen, retracted, engines, monkeypatch, tmp_path
+):
+    """If it sinks, has engines, and its aerodynamics see a gear; the copy is then another one."""
+    copies, tried = [], []
+    folder = tmp_path / "new" / "mine"
+
+    def instrument_model(model, into, travel, absent, gear_up=False, apart=False):
+        assert not (into == folder and folder.exists())
+        into.mkdir(parents=True, exist_ok=True)
+        copies.append((into, travel, absent, gear_up, apart))
+        return into / "mine.xml"
+
+    def level_flight(outlines, into, said):
+        said.append(f"said at try {len(tried) + 1}")
+        tried.append(into)
+        return "data", SimpleNamespace(n_engines=n_engines), SimpleNamespace(gamma_rad=gamma_rad)
+
+    names = {"gear/gear-pos-norm"} if seen else {"gear/other"}
+    for name, instead in (
+        ("surfaces_of", lambda model: ["aileron", "elevator", "rudder"]),
+        ("instrument_model", instrument_model), ("try_out", lambda source: ("of/lacking",)),
+        ("is_known_to_jsbsim", lambda name: False), ("seen_by_aerodynamics", lambda model: frozenset(names)),
+        ("_with_engines", lambda source, level, into: ("with engines", level, into)),
+    ):  # fmt: skip
+        monkeypatch.setattr(derivation, name, instead)
+    monkeypatch.setattr(outline, "travel_of", lambda *of: {"aileron": (-0.2, 0.3)})
+    monkeypatch.setattr(outline, "own_control", lambda *of: [])
+    monkeypatch.setattr(outline, "outline", lambda *of: {})
+    monkeypatch.setattr(outline, "level_flight", level_flight)
+    notes, source = [], Source("mine", Path("mine.xml"))
+    level = derivation._prepared(source, folder, outline.EnvelopeFile(), notes, str, engines)
+    travel, absent = {"aileron": (-0.2, 0.3)}, ("of/lacking",)
+    copy = (folder, travel, absent, False, engines)
+    again = [(folder, travel, absent, True, engines)] if retracted else []
+    assert copies == [(tmp_path / "own", {}, absent, False, False), copy, *again]
+    assert tried == [folder] * (1 + retracted)
+    gear = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
+    said = [*gear, "said at try 2"] if retracted else ["said at try 1"]
+    assert notes == ["JSBSim alone gives it no of/lacking: 0 in the copy", *said]
+    assert (level[0] == "with engines") is engines
+    if engines:
+        assert (level[1][0], level[2]) == ("data", folder)
+
+
+def test_of_an_aircraft_with_a_file_engines_are_in_it_or_are_none(tmp_path):
+    source = Source("mine", Path("mine.xml"), TRAINER)
+    says = r"^mine: has a file, allowed: `effectors` in it, or a JSBSim model alone$"
+    with pytest.raises(BadInput, match=says):
+        derivation._prepared(source, tmp_path, outline.EnvelopeFile(), [], str, engines=True)
+
+
+@pytest.mark.parametrize("wish", [{}, {"airspeed_mps": (42.0, 54.0), "alpha_deg": (-2.0, 9.0),
+                                       "altitude_m": 810.0, "sideslip_deg": 5.0}])  # fmt: skip
+def test_an_aircraft_with_a_file_keeps_all_of_it_but_its_moments_and_what_is_wished_for(wish, tmp_path):
+    """It is trimmed where its flights start, or in the middle of the airspeeds that are wished for."""
+    folder = tmp_path / "new"
+    data, plant, point = outline.level_as_filed(TRAINER, folder, outline.EnvelopeFile(**wish))
+    own = yaml.safe_load((TRAINER / "aircraft.yaml").read_text())
+    assert (folder / "trainer.xml").read_text() == (TRAINER / "trainer.xml").read_text()
+    assert plant.aircraft.folder == TRAINER
+    assert "moments" not in data
+    for section in ("name", "surfaces", "mass", "geometry", "trim"):
+        kept = data[section]
+        assert kept == own[section] or kept | own[section] == kept, section
+    airspeed, alpha = ([42.0, 54.0], [-2.0, 9.0]) if wish else ([35.0, 65.0], [-4.0, 14.0])
+    assert data["envelope"] == {"airspeed_mps": airspeed, "alpha_deg": alpha}
+    start = (48.0, 810.0) if wish else (45.0, 1828.8)
+    assert data["start"] == {"airspeed_mps": start[0], "altitude_m": start[1]}
+    assert (point.airspeed_mps, point.altitude_m) == start

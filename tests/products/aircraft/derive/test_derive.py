@@ -211,6 +211,9 @@ def test_the_built_in_aircraft_is_found_again(again):
     known, fitted = values(load()), values(made.aircraft)
     assert {key: fitted[key] for key in known} == pytest.approx(known, rel=5e-3)
     assert max(made.checked_rad_s2) < 2e-3
+    outermost = made.aircraft.file.model_error_map.boxes[-1]
+    beta = made.trim.beta_rad  # its own terms hold wherever a rudder at its stop takes it
+    assert outermost.beta_rad == pytest.approx((beta - 0.45, beta + 0.45), abs=1e-3)
 
 
 def test_a_scenario_derives_its_aircraft_at_first_use_and_the_source_is_untouched(

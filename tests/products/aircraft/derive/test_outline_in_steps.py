@@ -281,3 +281,29 @@ def test_terms_have_the_names_of_an_aircrafts_own_file():
     assert [term["name"] for term in found["Cm"]] == ["Cm_de", "Cm_new", "Cm_alpha2"]
     assert [term["name"] for term in found["Cl"]] == ["Cl_new"]
     assert outline.usual_start(beaver) == {"airspeed_mps": 45.0, "altitude_m": 1828.8}
+
+
+def test_its_own_flight_control_is_asked_where_it_puts_a_surface_once_it_has_settled(monkeypatch):
+    """400 frames from what is given, flying nowhere: initialised again before every tenth."""
+    done = []
+
+    class Executive(dict):
+        def run_ic(self):
+            done.append("initialised")
+
+        def run(self):
+            done.append("run")
+            self["fcs/elevator-pos-rad"] = 0.3 * self["fcs/elevator-cmd-norm"] - 2.0 * self["ic/q-rad_sec"]
+            self["fcs/left-aileron-pos-rad"] = self["ic/p-rad_sec"] + 0.1 * self["fcs/aileron-cmd-norm"]
+            self["fcs/rudder-pos-rad"] = self["ic/r-rad_sec"] * self["fcs/rudder-cmd-norm"]
+
+    asked = []
+    usual = {f"fcs/{name}-cmd-norm": 0.0 for name in ("aileron", "elevator", "rudder")}
+    monkeypatch.setattr(outline, "bare", lambda model: asked.append(model) or Executive(usual))
+    model = Path("m.xml")
+    assert outline.own_deflection(model, "elevator", -0.5) == pytest.approx(-0.15)
+    assert done == (["initialised"] + ["run"] * 10) * 40
+    assert outline.own_deflection(model, "elevator", 0.5, 0.1) == pytest.approx(0.15 - 0.2)
+    assert outline.own_deflection(model, "aileron", 1.0, 0.1) == pytest.approx(0.2)
+    assert outline.own_deflection(model, "rudder", 0.5, 0.3) == pytest.approx(0.15)
+    assert asked == [model] * 4

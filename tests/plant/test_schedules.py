@@ -13,9 +13,10 @@ from beaver_ftc.plant.faults import (
     frame_of,
     is_there,
 )
-from beaver_ftc.plant.instruments import SENSORS, instruments_dtype
-from beaver_ftc.scenario.faults import HEALTHY
+from beaver_ftc.plant.instruments import CONFIGURED, SENSORS, instruments_dtype, take_configuration
+from beaver_ftc.scenario.faults import HEALTHY, SurfaceFault
 from beaver_ftc.scenario.schema import load
+from telling import bits, fill
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.1}
 GROWING = {"profile": "incipient", "kappa_per_s": 370.0}
@@ -135,6 +136,52 @@ def test_faults_declared_later_and_ended_earlier():
     ]  # fmt: skip
     none = FaultSchedule([], plant, 100.0)
     assert (none.any, none.begun(99), none.next_change(0)) == (False, False, NEVER)
+
+
+def test_a_jam_stays_where_the_surface_was_as_it_began(monkeypatch):
+    """Whatever the surface does later, and again when another change of the flight is due."""
+    plant, there = Recorded(), iter((0.25, 0.31, 0.42))
+    plant.read = lambda name: next(there)
+    stuck = {"type": "stuck", "actuator": "rudder", "at_s": 0.1}
+    schedule = FaultSchedule(faults(stuck, {**LOSS, "at_s": 0.2}), plant, 100.0)
+    for k in (10, 20):
+        schedule.apply(k)
+    assert plant.written == [
+        ("rudder/stuck", 1.0), ("rudder/stuck-at-rad", 0.25), ("elevator/effectiveness", 0.5),
+    ]  # fmt: skip
+
+
+def test_a_fault_that_follows_its_actuator_takes_each_frame_in_once():
+    """A frame that is applied again is not taken in again; nor is one before the fault or after it."""
+    followed = []
+
+    class Follows(SurfaceFault):
+        type: str = "follows"
+        profile: str = "abrupt"
+        follows_actuator = True
+
+        def follow(self, past, actuator_rad):
+            followed.append(actuator_rad)
+
+    event = _Event(Follows(at_s=0.1, end_s=0.13), 100.0)
+    for k in (9, 10, 10, 11, 11, 12, 13):
+        event.note(k, lambda surface, k=k: 0.01 * k)
+    assert followed == pytest.approx([0.1, 0.11, 0.12])
+    assert [event.next_change(k) for k in (9, 10, 11, 12, 13)] == [10, 11, 12, 13, NEVER]
+
+
+def test_other_sensors_are_taken_in_flight_with_the_memory_that_there_is():
+    """Every part that is configured is new; random numbers and readings go on, lags and delays begin anew."""
+    old, new = (fill(instruments(), seed) for seed in (1, 2))
+    before, given = old.copy(), new.copy()
+    take_configuration(old, new)
+    for name in old.dtype.names:
+        source = given if name in CONFIGURED else before
+        expected = np.zeros_like(source[name]) if name == "taken" else source[name]
+        assert bits(np.asarray(old[name])) == bits(np.asarray(expected)), name
+    assert set(old.dtype.names) - set(CONFIGURED) == {
+        "random", "counter", "lagged", "line", "taken", "reading", "broken", "fault",
+    }  # fmt: skip
 
 
 def instruments():

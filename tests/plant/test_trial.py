@@ -2,6 +2,7 @@
 are caught."""
 
 import shutil
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -117,6 +118,27 @@ def test_how_the_process_of_the_trial_ends_is_said(monkeypatch, status, said, wh
     assert command[1] == "-P"  # nothing is imported from the working directory
     assert command[-2:] == [str(Path("mine/m.xml")), "of/0"]
     assert how["timeout"] == trial.LONGEST_S
+
+
+def test_the_process_of_the_trial_has_little_memory_and_time_and_leaves_no_core(monkeypatch):
+    """A gibibyte; two seconds, then a signal, and one later the end. What the system refuses is left."""
+    limits = {}
+
+    def setrlimit(which, wanted):
+        if which == "cpu":
+            raise ValueError("not here")
+        limits[which] = wanted
+
+    names = {"RLIMIT_AS": "memory", "RLIMIT_CPU": "cpu", "RLIMIT_CORE": "core"}
+    resource = SimpleNamespace(**names, setrlimit=setrlimit)
+    monkeypatch.setitem(sys.modules, "resource", resource)
+    trial._limit()
+    assert limits == {"memory": (2**30, 2**30), "core": (0, 0)}
+    resource.setrlimit = limits.__setitem__
+    trial._limit()
+    assert limits["cpu"] == (2, 3)
+    monkeypatch.setitem(sys.modules, "resource", None)  # as where there is none
+    trial._limit()
 
 
 def test_a_model_that_waits_is_refused(monkeypatch):

@@ -174,6 +174,20 @@ def test_an_instrumented_copy(jet, tmp_path, changed):
     assert not changed([instrumented.is_told(name) for name in told], part="told")
 
 
+@pytest.mark.parametrize("gear_up", [False, True])
+def test_a_copy_has_at_zero_what_nothing_gives_and_a_retracted_gear(jet, tmp_path, gear_up):
+    """Its aerodynamics see that in place of the gear of its own flight control."""
+    model = instrument(jet, tmp_path / "copy", {}, ["of/one", "of/other"], gear_up=gear_up)
+    common = ElementTree.parse(model.parent / "Systems" / "ftc-common.xml").getroot()
+    zero = {of.text.strip() for of in common.findall("property") if of.get("value") == "0"}
+    gear = "gear/retracted-pos-norm"
+    assert zero & {"of/one", "of/other", gear} == {"of/one", "of/other", *([gear] if gear_up else [])}
+    seen = [
+        of.text.strip() for of in ElementTree.parse(model).getroot().find("aerodynamics").iter("property")
+    ]
+    assert (gear in seen, "gear/gear-pos-norm" in seen) == (gear_up, not gear_up)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -1,6 +1,7 @@
 """What is written into the aircraft, property by property: its start, a scenario's truth, the air, gusts."""
 
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from beaver_ftc.plant import channels
 from beaver_ftc.plant.adapter import FlightState, Plant, _Errors, bare, body_axes, translated
 from beaver_ftc.plant.model_file import copy_of, package
 from beaver_ftc.plant.trial import probe
-from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
+from beaver_ftc.plant.trim import NEVER, GustSchedule, _actuators, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import load
 from trainer import FOLDER, trainer
@@ -26,6 +27,9 @@ SEEN = ("velocities/u-fps", "velocities/v-fps", "velocities/w-fps", "velocities/
         "accelerations/udot-ft_sec2", "accelerations/vdot-ft_sec2", "accelerations/wdot-ft_sec2",
         "accelerations/pdot-rad_sec2", "accelerations/qdot-rad_sec2", "accelerations/rdot-rad_sec2",
         "simulation/sim-time-sec", "position/lat-geod-deg", "aero/dpt")  # fmt: skip
+
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
 
 
 class Noted(Plant):
@@ -238,12 +242,17 @@ def test_engines_are_run_up_with_the_aircraft_where_it_is(engined):
     plant.start(FlightState(50.0, 1000.0, aircraft=aircraft, throttle=0.2))
     assert len(runs) == 10 + 100 * 10
     assert plant.read(RPM) < 0.9 * first
+    for place in ((50.0, 2500.0), (44.0, 2500.0)):  # elsewhere they come to another speed
+        runs.clear()
+        plant.start(FlightState(*place, aircraft=aircraft, throttle=0.2))
+        assert len(runs) == 5 + 100 * 10
 
 
 @pytest.mark.parametrize(("start", "runs"), [("steady", 10), ("off", 5)])
 def test_engines_run_steadily_at_once_or_not_at_all(engined, start, runs):
     aircraft, plant = engined(start)
-    counted = []
+    counted, told, write = [], [], plant.write
+    plant.write = lambda name, value: (told.append((name, value)), write(name, value))
     plant.run = lambda run=plant.run: counted.append(run())
     for throttle in (0.9, 0.3):
         plant.start(FlightState(50.0, 1000.0, aircraft=aircraft, throttle=throttle))
@@ -252,6 +261,7 @@ def test_engines_run_steadily_at_once_or_not_at_all(engined, start, runs):
     assert [place for place, of in enumerate(counted) if type(of) is int] == [runs, 2 * runs + 1]
     fast, slow = counted[runs], counted[-1]
     assert (fast > 1.2 * slow > 600) == (start == "steady")
+    assert told.count(("propulsion/set-running", -1)) == (start == "steady")  # once and for all
 
 
 @pytest.mark.parametrize(
@@ -280,3 +290,26 @@ def test_names_and_units_of_what_is_read_and_logged(changed):
                    channels.LATITUDE, channels.LONGITUDE, channels.ALTITUDE, channels.PDOT,
                    channels.ENVELOPE, channels.POS],
     })  # fmt: skip
+
+
+def test_actuators_are_a_scenarios_without_the_delay_that_an_aircraft_was_built_with():
+    """Each surface has its own; travel only where the scenario has another."""
+    given = {
+        "bandwidth_rad_s": 20, "rate_limit_deg_s": 60, "flap": {"travel_deg": [-5, 40], "bandwidth_rad_s": 7},
+        "rudder": {"rate_limit_deg_s": 33},
+    }  # fmt: skip
+    scenario, degree = load({"actuators": given}), pi / 180
+    for delayed in (True, False):
+        noted = {}
+        plant = SimpleNamespace(
+            aircraft=scenario.airframe, has=lambda name, delayed=delayed: delayed, write=noted.__setitem__
+        )
+        _actuators(plant, scenario)
+        assert noted == pytest.approx({
+            **({"actuators/delay-s": 0.0} if delayed else {}),
+            **{f"actuators/{s}/bandwidth-rad_sec": 7.0 if s == "flap" else 20.0 for s in SURFACES},
+            **{
+                f"actuators/{s}/rate-limit-rad_sec": (33 if s == "rudder" else 60) * degree for s in SURFACES
+            },
+            "actuators/flap/position-min-rad": -5 * degree, "actuators/flap/position-max-rad": 40 * degree,
+        })  # fmt: skip

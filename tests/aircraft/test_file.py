@@ -200,6 +200,15 @@ def test_properties_that_write(text, names):
     assert writing_property(text) == names
 
 
+def test_level_flight_is_in_the_innermost_box_and_engines_are_known_if_they_are_in_all():
+    boxes = [box(alpha_rad=[0.1, 0.3])["model_error_map"]["boxes"][0], box()["model_error_map"]["boxes"][0]]
+    for known in ((None, None), (0.1, None), (None, 0.2), (0.1, 0.2)):
+        both = [of | ({} if e is None else {"engines_apart": e}) for of, e in zip(boxes, known, strict=True)]
+        aircraft = trainer(model_error_map=box()["model_error_map"] | {"boxes": both})
+        assert aircraft.usual_signals["alpha"] == pytest.approx(0.2)
+        assert aircraft.file.model_error_map.knows_engines is (None not in known)
+
+
 PLACE = {"travel_rad": [-0.2, 0.3]}
 MANY = {
     "surfaces": {"tab": PLACE, "flaperon": PLACE, "fin": PLACE},

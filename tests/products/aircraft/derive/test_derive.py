@@ -212,6 +212,8 @@ def test_the_built_in_aircraft_is_found_again(again):
     assert {key: fitted[key] for key in known} == pytest.approx(known, rel=5e-3)
     assert max(made.checked_rad_s2) < 2e-3
     outermost = made.aircraft.file.model_error_map.boxes[-1]
+    assert made.aircraft.envelope.alpha_deg == load().envelope.alpha_deg
+    assert made.aircraft.envelope.airspeed_mps == load().envelope.airspeed_mps
     beta = made.trim.beta_rad  # its own terms hold wherever a rudder at its stop takes it
     assert outermost.beta_rad == pytest.approx((beta - 0.45, beta + 0.45), abs=1e-3)
 

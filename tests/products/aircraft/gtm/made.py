@@ -75,7 +75,7 @@ def _parameters():
     """What the specification takes, of the numbers that the converter has."""
     of = parameters()
     letters = {name: short for short, name in NAMES.items()}
-    mass, engine, surfaces = of["mass"], of["engine"], of["surfaces"]
+    mass, engine = of["mass"], of["engine"]
     damage = {
         number: {
             "dweight_lbf": case["dweight_lbf"], "dCG_in": case["dcg_in"],
@@ -85,8 +85,6 @@ def _parameters():
         for number, case in enumerate(cases().values(), 1)
     }  # fmt: skip
     damping, stiffness = engine["spool"]["a"]
-    arms = {letters[name]: its["arm"] for name, its in surfaces.items() if its["kind"] == "elevator"}
-    share = {name: its["share"] for name, its in surfaces.items() if "share" in its}
     return {
         "mass": {
             "gravity": {"value": 32.17405}, "weight": {"value": mass["weight_lbf"]},
@@ -100,10 +98,11 @@ def _parameters():
             **_ENGINES,
         },
         "aero_shares": {
-            "elevator_arm_spans": arms,
-            "rudder_upper": share["upper_rudder"], "rudder_lower": share["lower_rudder"],
-            "spoiler_inboard": share["right_inboard_spoiler"],
-            "spoiler_outboard": share["right_outboard_spoiler"],
+            "elevator_arm_spans": {"ELLOB": -0.07, "ELLIB": -0.03, "ELROB": 0.07, "ELRIB": 0.03},
+            "rudder_upper": [0.5, 0.5, 0.5, 0.67, 0.67, 0.5],
+            "rudder_lower": [0.5, 0.5, 0.5, 0.33, 0.33, 0.5],
+            "spoiler_inboard": [0.45, 0.45, 0.45, 0.26, 0.45, 0.26],
+            "spoiler_outboard": [0.55, 0.55, 0.55, 0.74, 0.55, 0.74],
         },
         "damage": {"cases": damage},
     }  # fmt: skip

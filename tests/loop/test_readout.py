@@ -5,7 +5,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.readout import RECORDED_BLOCK_FIELDS
-from beaver_ftc.loop import Stepping, recorded_always, recorded_until_alarm
+from beaver_ftc.loop import Stepping, agent, recorded_always, recorded_until_alarm
 from beaver_ftc.loop.readout import FrameReadout, Instruments
 from beaver_ftc.plant.instruments import SENSORS
 
@@ -153,3 +153,11 @@ def test_each_number_of_a_frame_is_read_from_its_own_field():
     found = readout.actuators
     assert [found.low_rad.tolist(), found.high_rad.tolist()] == [[18.0, 19.0], [20.0, 21.0]]
     assert [found.approach.tolist(), found.step_rad.tolist()] == [[22.0, 23.0], [24.0, 25.0]]
+
+
+def test_an_agent_looks_at_the_columns_of_roll_and_at_the_trim():
+    columns = ["t_s", "q_measured_rad_s", "p_model_rad_s", "q_model_rad_s", "p_rad_s", "p_measured_rad_s"]
+    look = agent.look_of(columns)
+    assert look.tolist() == [(5, 2, 0.0, 0.0, 0.0)]
+    agent.note_trim(look, np.array([0.1, -0.02, 45.0, 1036.0, 0.3]))
+    assert look.tolist() == [(5, 2, 0.1, -0.02, 45.0)]

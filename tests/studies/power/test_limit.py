@@ -9,6 +9,7 @@ import pytest
 from beaver_ftc.diagnosis.informed_test import (
     UNEXPLAINED_ACCELERATION_CORRELATION_S,
     WhiteningFilter,
+    context_with_measured_gust,
     detection_probability,
 )
 from beaver_ftc.loop.loop import Loop
@@ -128,3 +129,18 @@ def test_chance_is_what_throwing_the_noise_counts():
     assert detection_probability(0.0, within_s, per_h) == pytest.approx(per_h * within_s / 3600.0)
     assert detection_probability(5.0, within_s, 0.0) == 0.0
     assert detection_probability(NormalDist().inv_cdf(1.0 - 0.05), within_s, per_h) == pytest.approx(0.5)
+    assert detection_probability(0.3, 9000.0, 1.0) == pytest.approx(NormalDist().cdf(0.3))  # every other time
+
+
+def test_a_test_that_is_shown_the_vanes_knows_all_of_a_gust_but_what_they_leave(context):
+    """Of roll all is left, of pitch and yaw shares of the intensity; what vanes add is noise of the model."""
+    noise = np.array([0.03, 0.05, 0.02])
+    found = context_with_measured_gust(context, noise)
+    declared = context.declared
+    assert found.declared.gust_rad_s == pytest.approx(declared.gust_rad_s * np.sqrt([1.0, 0.003, 0.03]))
+    assert found.declared.model_rad_s2 == pytest.approx(np.hypot(declared.model_rad_s2, noise))
+    of_before = {"gust_rad_s": declared.gust_rad_s, "model_rad_s2": declared.model_rad_s2}
+    assert replace(found.declared, **of_before) == declared
+    assert replace(found, declared=declared) == context
+    still = replace(context, declared=replace(declared, gust_rad_s=np.zeros(3)))
+    assert context_with_measured_gust(still, noise) is still

@@ -20,6 +20,10 @@ class MyOwnDetector:
 class Undescribed(MyOwnDetector):
     __doc__ = None
 
+class Silent:
+    def reset(self, context): pass
+    def step(self, measured, command): pass
+
 class MyLaw:
     """Commands nothing."""
     def reset(self, context): pass
@@ -74,6 +78,7 @@ def test_a_class_is_registered_for_this_run(tmp_path):
     assert "mine" not in registered(DETECTORS)
     assert (entry.description(), law.description()) == ("Sees all.", "Commands nothing.")
     assert register("own_plugins:Undescribed").description() == "Sees all."  # what it inherits
+    assert register("own_plugins:Silent").description() == ""
     for name in ("my-own-detector", "MyOwnDetector"):
         assert refusal(DETECTORS, name) is None
         assert type(plugins.made(DETECTORS, name)).__name__ == "MyOwnDetector"

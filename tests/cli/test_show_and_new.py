@@ -10,7 +10,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from beaver_ftc.cli import catalogue
 from beaver_ftc.cli.main import app
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps, described
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
@@ -87,3 +89,10 @@ def test_the_shell_is_told_commands_and_scenarios(shell):
     }  # fmt: skip
     done = subprocess.run([BEAVER], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
     assert "elevator-partial-loss" in done.stdout
+
+
+def test_a_list_that_is_none_is_cut_and_those_there_are_are_named():
+    with pytest.raises(BadInput) as refused:
+        catalogue.list_choices("x" * 99)
+    known = "scenarios, sweeps, plans, aircraft, schemes, laws, faults, signals"
+    assert str(refused.value) == f"there is no list of '{'x' * 60}', allowed: {known}"

@@ -222,3 +222,39 @@ def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
 
 def test_nothing_is_climbed_within_two_metres_a_second_of_the_slowest_flight(filled):
     assert filled[0]["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
+
+
+THRUST = SimpleNamespace(airspeed_mps=(20.0, 60.0), setting=(0.0, 0.5, 1.0), force_n=((0.0, 400.0, 900.0),
+                         (-50.0, 300.0, 700.0)))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("by", "terms", "filled", "pitch"),
+    [("power", {}, True, 0), ("power", {"CX_adpt2": 0.2, "CX_dpt": 0.1}, False, 0), ("pitch", {}, False, 1)],
+)
+def test_the_table_of_thrust_serves_where_power_holds_the_airspeed_and_no_slipstream_says_it(
+    by, terms, filled, pitch
+):
+    """At 1.2 times the mass of 500 kg; with 1e-4 m/s2 a setting, so that each has its own."""
+    scenario = made_up(terms)
+    scenario.airframe.airspeed_by, scenario.airframe.engine = by, SimpleNamespace(thrust=THRUST)
+    scenario.design_model.mass = 1.2
+    pilot = np.zeros(1, AUTOPILOT)[0]
+    profile._set_up_aircraft_values(pilot, scenario)
+    engine = pilot["engine"]
+    assert pilot["pitch_holds_airspeed"] == pitch
+    assert (engine["airspeeds"], engine["settings"]) == ((2, 3) if filled else (0, 0))
+    expected = np.array(THRUST.force_n) / 600.0 + 1e-4 * np.arange(3) if filled else np.zeros((2, 3))
+    assert engine["table"][:2, :3] == pytest.approx(expected)
+    of_slipstream = [terms.get(name, 0.0) * 20.0 / 600.0 for name in ("CX_dpt", "CX_adpt2")]
+    assert pilot["thrust"] == pytest.approx(of_slipstream)
+    assert pilot["slowest_mps"] == pytest.approx(25.0 + 2.0)
+
+
+@pytest.mark.parametrize(("fastest", "slowest"), [(50.0, 27.0), (30.0, 26.0)])
+def test_a_fifth_of_a_narrow_envelope_is_kept_above_its_slowest_airspeed(fastest, slowest):
+    scenario = made_up({})
+    scenario.airframe.envelope.airspeed_mps = (25.0, fastest)
+    pilot = np.zeros(1, AUTOPILOT)[0]
+    profile._set_up_aircraft_values(pilot, scenario)
+    assert pilot["slowest_mps"] == pytest.approx(slowest)

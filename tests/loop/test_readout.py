@@ -6,7 +6,9 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.readout import RECORDED_BLOCK_FIELDS
 from beaver_ftc.loop import Stepping, agent, recorded_always, recorded_until_alarm
+from beaver_ftc.loop import readout as of_loop
 from beaver_ftc.loop.readout import FrameReadout, Instruments
+from beaver_ftc.plant import channels
 from beaver_ftc.plant.instruments import SENSORS
 
 FLIGHT = {
@@ -161,3 +163,81 @@ def test_an_agent_looks_at_the_columns_of_roll_and_at_the_trim():
     assert look.tolist() == [(5, 2, 0.0, 0.0, 0.0)]
     agent.note_trim(look, np.array([0.1, -0.02, 45.0, 1036.0, 0.3]))
     assert look.tolist() == [(5, 2, 0.1, -0.02, 45.0)]
+
+
+class Frame(dict):
+    """A record as far as it is read: no two of its numbers are alike."""
+
+    def __init__(self):
+        super().__init__(
+            k=7,
+            measured={"x": np.array([0.1, 0.2, 0.3]), "y": np.array([0.4, 0.5, 60.0])},
+            truth={
+                "value": np.arange(100.0, 150.0), "latitude_0": 1.0, "longitude_0": 2.0, "radius_m": 3.0,
+                "parallel_radius_m": 4.0, "ground_m": 5.0, "slow_mps": 6.0,
+            },
+            accounts={"envelope": {"n_exits": 8, "outside_frames": 9}},
+            fdi={"verdict": {"detected": 0}, "sensor_monitor": {"output": {"alarmed": 0}}},
+            control={
+                "config": {"uses_verdict": 1, "reallocates": 1, "informed": 1},
+                "power": {"output": {"in_use": 0, "command": np.array([10.0, 11.0])}},
+            },
+            autopilot={"enabled": 1}, held=0, held_rad=np.zeros(3),
+        )  # fmt: skip
+
+
+def test_the_truth_and_the_counts_of_a_frame_are_read_from_their_own_places():
+    found = FrameReadout(Frame())
+    assert (found.k, found.alpha_rad, found.rates_rad_s.tolist()) == (7, 0.4, [0.1, 0.2, 0.3])
+    assert (found.airspeed_mps, found.height_m) == (100.0 + channels.AIRSPEED, 100.0 + channels.ALTITUDE)
+    assert (tuple(found.origin), found.envelope_exits) == ((1.0, 2.0, 3.0, 4.0), 8)
+
+
+@pytest.mark.parametrize(("surfaces", "sensors"), [(0, 0), (1, 0), (0, 1), (1, 1)])
+def test_an_alarm_is_one_of_the_surfaces_or_of_the_sensors(surfaces, sensors):
+    frame = Frame()
+    frame["fdi"]["verdict"]["detected"], frame["fdi"]["sensor_monitor"]["output"]["alarmed"] = (
+        surfaces,
+        sensors,
+    )
+    assert FrameReadout(frame).alarmed is bool(surfaces or sensors)
+
+
+def test_what_is_done_to_a_record_from_outside_is_that_and_no_more():
+    done = {
+        "ground": (
+            lambda it: of_loop.set_ground(it, 50.0, 7.5),
+            {"truth": {"ground_m": 50.0, "slow_mps": 7.5}},
+        ),
+        "hold": (lambda it: of_loop.hold_from_start(it, np.array([0.1, 0.2, 0.3])), {"held": 1}),
+        "loops": (of_loop.end_outer_loops, {"autopilot": {"enabled": 0}}),
+        "power": (
+            lambda it: of_loop.command_power(it, 22.5),
+            {"control": {"power": {"output": {"in_use": 1}}}},
+        ),
+        "verdict": (
+            lambda it: of_loop.withhold_from_law(it, "verdict"),
+            {"control": {"config": {"uses_verdict": 0, "reallocates": 0}}},
+        ),
+        "stand-in": (
+            lambda it: of_loop.withhold_from_law(it, "stand-in"),
+            {"control": {"config": {"reallocates": 0}}},
+        ),
+    }
+    for name, (act, changes) in done.items():
+        frame, wanted = Frame(), Frame()
+        act(frame)
+        put(wanted, changes)
+        if name == "hold":
+            wanted["held_rad"] = np.array([0.1, 0.2, 0.3])
+        if name == "power":
+            wanted["control"]["power"]["output"]["command"][0] = 22.5
+        assert repr(frame) == repr(wanted), name
+
+
+def put(record, changes):
+    for name, value in changes.items():
+        if isinstance(value, dict):
+            put(record[name], value)
+        else:
+            record[name] = value

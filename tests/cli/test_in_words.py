@@ -11,7 +11,7 @@ import pytest
 
 import needs
 from beaver_ftc import cli
-from beaver_ftc.cli import Format, run, sweep
+from beaver_ftc.cli import Format, mismatch, run, sweep
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 
 
@@ -314,3 +314,68 @@ def test_formats_of_figures_are_each_kept_once_and_without_spaces():
     assert run._formats("pdf, svg ,pdf") == ("pdf", "svg")
     with pytest.raises(BadInput, match=r"^--figures: 'gif' is no format, allowed: "):
         run._formats("svg,gif")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_line_of_a_study_replaces_the_one_before_on_a_terminal_and_is_shown_nowhere_else(
+    monkeypatch, terminal
+):
+    monkeypatch.setattr(sys, "stderr", Terminal(terminal))
+    with cli.told() as tell:
+        tell("one of two")
+        tell("two")
+        shown = sys.stderr.getvalue()
+    assert shown == ("\r\033[Kone of two\r\033[Ktwo" if terminal else "")
+    assert sys.stderr.getvalue() == shown + ("\r\033[K" if terminal else "")
+
+
+class Warned:
+    """A scenario of which there is something to say before it flies."""
+
+    name = "mine"
+
+    def warnings(self):
+        return iter(("this", "that"))
+
+
+WARNED = "mine: warning: this\nmine: warning: that\n"
+
+
+@pytest.mark.parametrize("certified", [False, True])
+def test_a_flight_is_flown_and_written_as_it_was_asked_for(monkeypatch, capsys, tmp_path, certified):
+    given = []
+
+    def write(scenario, out, with_report, progress, *others):
+        given.append((scenario.name, out, with_report, *others))
+        (out / scenario.name).mkdir()
+        text = {"statements": [1, 2, 3], "without": ["a"], "flight": "x"}
+        (out / scenario.name / "certificate.json").write_text(json.dumps(text))
+        return {"passed": True}
+
+    monkeypatch.setattr("beaver_ftc.results.writer.run", write)
+    options = run.Options(
+        ["mine"], tmp_path, no_report=certified, csv=True, acmi=certified, certificate=certified,
+        recording=run.Recording.ulog if certified else None,
+    )  # fmt: skip
+    found = run._run_one(Warned(), options, "connect", ("painters", ("pdf", "svg")))
+    assert capsys.readouterr() == ("", WARNED)
+    exports, recording = (["csv", "acmi"], "ulog") if certified else (["csv"], None)
+    wanted = ("mine", tmp_path, not certified, exports, "connect", recording, certified)
+    assert given == [(*wanted, "painters", ("pdf", "svg"))]
+    counted = {"certificate": {"statements": 3, "without": 1}} if certified else {}
+    assert found == {"passed": True, "folder": str(tmp_path / "mine")} | counted
+
+
+def test_what_is_said_of_a_scenario_is_said_before_its_errors_are_split(monkeypatch, capsys, tmp_path):
+    given, said = [], []
+    study = "beaver_ftc.studies.mismatch"
+    monkeypatch.setattr(
+        f"{study}.study.run_mismatch", lambda *of: given.append(of[:-1]) or ({"m": 1}, "tally")
+    )
+    monkeypatch.setattr(f"{study}.tables.mismatch_text", lambda *of: ("text", *of))
+    scenario = Warned()
+    found = mismatch._split(scenario, tmp_path, False, said.append)
+    assert found == ({"m": 1, "folder": str(tmp_path / "mine")}, "tally")
+    assert given == [(scenario, tmp_path, False)]
+    assert said == [("text", {"m": 1}, str(tmp_path / "mine"), sys.stdout.isatty())]
+    assert capsys.readouterr().err == WARNED

@@ -234,6 +234,12 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     assert (*off, fdi["statistical"]["test_config"]["enabled"], power["enabled"][0]) == (0,) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None
+    pairs = {**given, "fdi": given["fdi"] | {"pairs": True, "authority": "worst-case"}, "substeps": 1}
+    scenario = Scenario.model_validate(pairs)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
+    assert frames["fdi"]["types"]["pair"]["enabled"][0] == 1
+    plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
+    assert frames["fdi"]["types"]["pair"]["enabled"][0] == 0
 
 
 @pytest.mark.parametrize(

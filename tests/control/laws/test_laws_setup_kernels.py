@@ -19,6 +19,10 @@ SENSORS = {
 }
 
 
+def laws_place(file):
+    return list(state.FILES).index(file)
+
+
 def given(control=None, **keys):
     scenario = {"name": "gains", "duration_s": 10, "rate_hz": 50, "sensors": SENSORS, **keys}
     return Scenario.model_validate(scenario | {"control": control or {}})
@@ -111,6 +115,10 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     law, reach = fields(record["published"]), fields(record["layout"])
     assert (law["Kp"], law["Ki"]) == (3.1, 0.7)
     assert (reach["low"].tolist(), reach["high"].tolist()) == tuple(travel.tolist())
+    assert (reach["main"].tolist(), reach["stand_in"], reach["general"]) == ([0, 1, 2], 3, 0)
+    assert reach["is_backup"].tolist() == [0, 0, 0, 1]
+    assert reach["authority"].tolist() == np.eye(3, 4).tolist()  # each leader has all about its axis
+    assert record["config"].tolist() == (laws_place("published"), 1, 0, 0)
     surfaces, probe, model = (fields(record[stage]) for stage in ("surfaces", "probe", "reference"))
     assert fields(record["allocation"])["hand_over_step"] == pytest.approx(0.02 / 0.8)
     assert surfaces["effectiveness_step"] == pytest.approx(1.7 * 0.02)

@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 from kernels import new_fdi, on, put, put_on
 
 from beaver_ftc.diagnosis import types
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
+from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, layout_dtype
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
+from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -928,3 +931,57 @@ def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_co
             commanded_surface.update_oscillation_returning_consistent_interval, fdi, surface, OSCILLATORY, 10
         )
         assert swing["error_sign"] == 0, "on its command it is on no side of it"
+
+
+NOISY, SLOWEST_RAD_S = {"bounds": {"sensors": {"q": {"noise_std_deg_s": 0.1}}}}, 1.7
+
+
+@pytest.mark.parametrize(
+    ("keys", "fdi", "frames"),
+    [
+        ({"rate_hz": 50, "substeps": 2}, {}, 1), ({"rate_hz": 100}, {"pairs": True}, 1),
+        ({"rate_hz": 72, "substeps": 2}, {**NOISY, "fault_profile": "abrupt"}, 15),
+        ({"rate_hz": 20}, NOISY, 4),
+    ],
+)  # fmt: skip
+def test_all_that_types_are_set_up_with_by_scenario_surface_and_actuator(keys, fdi, frames):
+    """Blocks of 0.2 s where gyros are noisy. Of stops beyond the neutral position 0 is within reach, too."""
+    dt = 1.0 / keys["rate_hz"]
+    instant_s = dt / keys.get("substeps", 1)
+    slowest = {"slowest_oscillation_rad_s": SLOWEST_RAD_S, "slowest_rate_deg_s": 3.0}
+    given = {
+        "name": "x", **keys, "fdi": {"fault_class": "all", **slowest, **fdi},
+        "actuators": {"elevator": {"rate_limit_deg_s": 90.0}, "rudder": {"rate_limit_deg_s": 2.5}},
+    }  # fmt: skip
+    types = np.zeros(1, registry.fault_types_dtype(4))[0]
+    layout, prediction = np.zeros(1, layout_dtype(4))[0], np.zeros(1, prediction_dtype(4))[0]
+    layout["group"] = LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP
+    actuators = prediction["actuators"]
+    actuators["real"], actuators["approach"] = 1, (0.2, 0.3, 0.4, 0.5)
+    actuators["step"] = np.inf, np.radians(90.0) * instant_s, np.radians(2.5) * instant_s, np.inf
+    travel = np.array([[0.05, -0.4, -0.3, -0.2], [0.5, 0.45, 0.35, -0.02]])
+    registry.configure_fault_types(types, layout, actuators, Scenario.model_validate(given), travel)
+    config, pairs = types["config"], fdi.get("pairs", False)
+    found = {name: config[name].item() for name in config.dtype.names if np.any(config[name])}
+    expected = {
+        "frames_per_block": frames, "block_duration_s": frames * dt, "dt": dt,
+        "slowest_half_cycle_frames": int(np.ceil(np.pi / SLOWEST_RAD_S / (frames * dt))),
+        "n_substeps": keys.get("substeps", 1), "released_surface_returns_via_actuator": 1,
+    }  # fmt: skip
+    expected |= {"frame_shows_single_instant": 1} if pairs else {}
+    expected |= {"abrupt": 1} if fdi.get("fault_profile") else {}
+    assert found == pytest.approx(expected)
+    assert (types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"]) == (-1, pairs)
+    surfaces = types["surface"]
+    expected = {
+        "travel_low": travel[0], "travel_high": travel[1], "reachable_low": [0.0, -0.4, -0.3, -0.2],
+        "reachable_high": [0.5, 0.45, 0.35, 0.0], "approach_share_per_substep": actuators["approach"],
+        "max_motion_per_substep": actuators["step"],
+        "min_runaway_rate": [np.pi / 6.0, np.pi / 4.0, np.radians(1.25), np.pi / 6.0],
+        "min_rate_limited_motion_per_substep": np.radians([3.0, 3.0, 2.5, 3.0]) * instant_s,
+    }  # fmt: skip
+    assert set(surfaces["actuator"].dtype.names) == set(expected)
+    for name, values in expected.items():
+        assert surfaces["actuator"][name] == pytest.approx(np.array(values)), name
+    assert surfaces["status"]["may_be_sole_fault"].tolist() == ([0, 1, 0, 1] if pairs else [1] * 4)
+    assert surfaces["accommodation"]["mode"].tolist() == surfaces["status"]["fault_type"].tolist() == [-1] * 4

@@ -193,3 +193,8 @@ def test_whose_verdict_it_is():
         sim = bf.Simulation(scenario(duration_s=0.2), **plug_ins)
         sim.step()
         assert sim.verdict == verdict
+
+
+def test_a_flight_that_has_not_begun_lands_with_frame_0():
+    sim = bf.Simulation(scenario(duration_s=0.2))
+    assert (sim.land().metrics["frames"], sim.frames) == (1, 1)

@@ -39,7 +39,7 @@ def test_a_flight_has_them_or_not(substeps):
     assert detector["n_views"] == (13 if substeps == 1 else 0)
     # one share of the false alarms each, of a tone as of a step: exp(-l^2 / 2) beyond a level l of two parts
     share = NormalDist().cdf(-detector["test_config"]["alarm_level"]) if substeps == 1 else 1.0
-    assert np.exp(-(detector["tone_config"]["alarm_level"] ** 2) / 2.0) == pytest.approx(share, rel=1e-6)
+    assert np.exp(-(detector["tone_test_config"]["alarm_level"] ** 2) / 2.0) == pytest.approx(share, rel=1e-6)
     loop.release()
 
 

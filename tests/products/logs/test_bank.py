@@ -111,3 +111,15 @@ def test_a_group_of_which_nothing_is_said_has_no_hypothesis():
     assert len(nothing.transition_share) == len(
         build_hypothesis_bank(small.model(settings=SETTINGS)).transition_share
     )
+
+
+def test_of_another_law_a_surface_s_own_gain_counts_whole_whatever_is_left_of_it():
+    plain, other = (
+        build_hypothesis_bank(small.model(small.WING | {"other_laws": laws}, settings=SETTINGS))
+        for laws in (False, True)
+    )
+    np.testing.assert_array_equal(plain.response_share_scaled_by_group_gain, plain.effectiveness)
+    np.testing.assert_array_equal(other.effectiveness, plain.effectiveness)
+    np.testing.assert_array_equal(
+        other.response_share_scaled_by_group_gain, np.ones_like(plain.effectiveness)
+    )

@@ -151,6 +151,7 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
     planted = np.repeat(theta, 1000, axis=0)
     innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
+    innovation[0], innovation[7, 1] = 1e6, np.nan  # the first ends no frame
     found = stepped._relative_command_gain_upper_bounds(innovation, expected)
     assert np.all(found > gain)
     assert found == pytest.approx(gain, abs=0.1)
@@ -207,7 +208,7 @@ def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
 def test_the_rate_is_that_of_the_first_fifty_samples_whose_steps_are_even():
     """To four digits: a log that was cut short has the same."""
     steps = np.full(90, 0.0123456)
-    steps[10], steps[49:] = 0.07, 0.02
+    steps[10], steps[50:] = 0.07, 0.013
     samples = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.0123)
     assert by_aircraft._log_rate_hz(samples) == 81.0
     uneven = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.03)

@@ -57,3 +57,16 @@ def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
         np.testing.assert_array_equal(column(rates, vehicle, name), column(samples, vehicle, source))
     np.testing.assert_array_equal(turned.commands, samples.commands[:, [2, 1, 0]])
     assert len(found) == 3 + 3 + 5 * 5  # pairs of commands and of rates; a sign and two units either way
+
+
+def test_commands_of_unknown_effect_are_exchanged_with_none(log):
+    vehicle, samples = log
+    every, fewer = (
+        [one.correction_text for one in logs_with_one_mistake_corrected(samples, vehicle, unknown)]
+        for unknown in ((), {"elevator"})
+    )
+    assert [text for text in every if text not in fewer] == [
+        "the commands of left_aileron and elevator exchanged",
+        "the commands of elevator and right_aileron exchanged",
+    ]
+    assert [text for text in every if text in fewer] == fewer

@@ -149,3 +149,22 @@ def test_an_engine_is_no_surface_that_was_named():
     assert _is_most_frequent_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
     assert _is_most_frequent_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
     assert _is_most_frequent_name_right({"engine": 1.0}, ["engine"], groups) is None
+
+
+def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_nothing_rises():
+    """The evidence began two seconds before the alarm; the fall ends at 9 s, and no energy comes back."""
+    faulty = ((T_S >= 5.0) & (T_S < 18.0)).astype(int)
+    climb = np.where((T_S >= 3.0) & (T_S < 9.0), -2.0, np.where(T_S < 3.0, 0.5, -0.5))
+    names = np.where(faulty == 1, "left", "").astype(object)
+    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S - 2.0)
+    assert set(named[(T_S > 4.95) & (T_S < 7.95)]) == {"unknown"}
+    assert set(named[(T_S > 8.05) & (T_S < 17.95)]) == {"engine"}
+
+
+def test_energy_that_neither_falls_as_without_power_nor_rises_tells_of_no_engine():
+    faulty = (T_S >= 5.0).astype(int)
+    names = np.where(faulty == 1, "left", "").astype(object)
+    level = np.full(len(T_S), -0.5)
+    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, level, -1.0, T_S)
+    assert set(named[(T_S > 4.95) & (T_S < 9.95)]) == {"unknown"}
+    assert set(named[T_S > 10.05]) == {"left"}

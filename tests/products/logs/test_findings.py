@@ -220,3 +220,26 @@ def test_odds_against_a_change_are_those_of_its_median_share():
         np.log(9.0) - np.log(0.00025)
     )
     assert findings._log_odds_needed_for_alarm(model, bank, 0, 0.1) == np.inf
+
+
+def test_an_event_has_the_name_of_most_of_its_rows_and_begins_with_a_brief_alarm_without_one():
+    """The first in the alphabet is not the one that stood; an unknown surface that stands is an event."""
+    within = [(10, "right", [0.5, 1.0]), (4, *LESS), (9, "right", [0.5, 1.0])]
+    (event,) = fault_events(small.rows(within), NAMES)
+    assert (event["named"], list(event["effectiveness"])) == ("right", ["right"])
+    before = [(5, *SOUND), (6, "unknown", [1.0, 1.0]), (12, *HALF), (5, *SOUND)]
+    (event,) = fault_events(small.rows(before), NAMES)
+    assert (event["from_s"], event["to_s"], event["named"]) == (12.5, 21.0, "left")
+    before[1] = (7, "unknown", [1.0, 1.0])
+    one, other = fault_events(small.rows(before), NAMES)
+    assert [(one["from_s"], one["to_s"], one["named"]), (other["from_s"], other["named"])] == [
+        (12.5, 15.5, "unknown"), (16.0, "left"),
+    ]  # fmt: skip
+
+
+def test_the_duration_of_a_flight_is_from_its_first_sample(flown):
+    model, samples = flown
+    late = replace(samples, t_s=samples.t_s + 1000.0)
+    rows = small.rows([(9, "", [1.0] * len(model.vehicle.surfaces))], len(model.vehicle.surfaces))
+    found, expected = (verdict_document(of, model, rows) for of in (late, samples))
+    assert found == expected | {"duration_s": pytest.approx(samples.t_s[-1])}

@@ -143,6 +143,13 @@ def test_columns_of_an_order():
     """One, the past, the signal, then the lags of each group, of 1 + 12 + 1 + 6 + 6."""
     assert fitting._regressor_columns_of_order(TAIL.vehicle, 4, 6) == list(range(26))
     assert fitting._regressor_columns_of_order(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
+    moving = small.vehicle(
+        small.TAIL | {"moving_air": True}
+    )  # as many lags of the signal: 1 + 12 + 4 + 6 + 6
+    assert fitting._regressor_columns_of_order(moving, 4, 6) == list(range(29))
+    assert fitting._regressor_columns_of_order(moving, 2, 3) == [
+        *range(7), 13, 14, 17, 18, 19, 23, 24, 25,
+    ]  # fmt: skip
     assert fitting._regressor_columns_of_order(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
 
 

@@ -389,3 +389,27 @@ def test_what_answers_in_every_part_of_a_flight_is_by_least_squares_of_each(monk
     assert count == pytest.approx(34 * 0.8 / 1.7)
     monkeypatch.setattr("beaver_ftc_logs.regression._MIN_PART_ROWS_FOR_BOUNDS", 35)
     assert trust._part_log_likelihoods_and_sample_count(flight, model) is None
+
+
+def test_the_colour_of_gyro_noise_by_every_pair_of_residuals():
+    """Two lags whose coefficients are not alike across: the covariance of four residuals as a map of what
+    moved the aircraft and what its gyros added, and the regression of the latest on the others."""
+    rng = np.random.default_rng(8)
+    a = 0.4 * rng.uniform(-1.0, 1.0, (2, 3, 3)) + [np.diag([0.5, 0.6, 0.7]), np.zeros((3, 3))]
+    root = 0.01 * (np.eye(3) + np.tril(rng.uniform(0.2, 0.9, (3, 3))))
+    model, gyro = small.model(past=a.reshape(6, 3).tolist()), 0.013
+    moved, added = np.zeros((12, 12)), np.zeros((12, 18))
+    for k in range(4):  # the latest is the first; w = e + v - before @ a, as rows
+        moved[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = root
+        added[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = np.eye(3)
+        for j in (1, 2):
+            added[3 * k : 3 * k + 3, 3 * (k + j) : 3 * (k + j) + 3] = -a[j - 1].T
+    covariance = moved @ moved.T + gyro**2 * added @ added.T
+    by = np.linalg.solve(covariance[3:, 3:], covariance[3:, :3])
+    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, root @ root.T, gyro, 3)
+    np.testing.assert_allclose(before, by, rtol=1e-9)
+    np.testing.assert_allclose(noise, covariance[:3, :3] - covariance[:3, 3:] @ by, rtol=1e-9)
+    one, rest = gyro_noise.residual_predictor_by_yule_walker(model, root @ root.T, gyro, 1)
+    by = np.linalg.solve(covariance[3:6, 3:6], covariance[3:6, :3])
+    np.testing.assert_allclose(one, by, rtol=1e-9)
+    np.testing.assert_allclose(rest, covariance[:3, :3] - covariance[:3, 3:6] @ by, rtol=1e-9)

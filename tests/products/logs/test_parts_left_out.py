@@ -36,7 +36,8 @@ def known(model, *tied):
 
 def flown(gains=(0.8, 1.25), loud=1.0, n=150, seed=5, **changes):
     """A flight of the colour that is known, in which surfaces do so much of what the model says."""
-    flight = small.flight(small.model(noise=(loud * NOISE).tolist()), n, seed=seed, gap=60)
+    lost = ((0, 15, 35, 0.6), (1, 70, 100, 0.3))
+    flight = small.flight(small.model(noise=(loud * NOISE).tolist()), n, lost, seed=seed, gap=60)
     use = ~np.isin(np.arange(n), [3, 40, 41, n - 1])
     commands = flight.commands / np.array(gains)
     return FlightWithUsableRows(

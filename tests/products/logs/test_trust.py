@@ -720,3 +720,22 @@ def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
     assert told == [((1.0, 0.2), [1.0, 0.2])]
     nothing = {"commands": [], "rates": [], "tied": [1.0, 0.99]}
     trust.refuse_columns_not_as_identified(log, small.model(colours=colours, fitted=nothing))
+
+
+def test_a_column_has_its_rows_of_every_lag_and_what_the_airspeed_makes_of_it():
+    """In moving air signals have as many lags as rates; a rate tells nothing of its own axis."""
+    air = {"signals": ["a", "b"], "airspeed": "tas", "reference_airspeed_mps": 30.0, "moving_air": True}
+    vehicle = small.vehicle(small.TAIL | air)
+    past = np.random.default_rng(3).uniform(0.1, 0.9, (6 + 2 * 7, 3))
+    model = SimpleNamespace(vehicle=vehicle, n_rate_lags=2, lagged_rate_and_signal_coefficients=past.tolist())
+    found = trust.rows_and_coefficients_without_own_axis(model)
+    rows = {
+        "p_rad_s": [0, 3, 8, 15], "q_rad_s": [1, 4, 9, 16], "r_rad_s": [2, 5, 10, 17],
+        "a": [6, 11, 13, 18], "b": [7, 12, 14, 19],
+    }  # fmt: skip
+    assert {name: places for name, (places, _) in found.items()} == rows
+    for name, (places, values) in found.items():
+        expected = past[places]
+        if name in ("p_rad_s", "q_rad_s", "r_rad_s"):
+            expected[:2, "pqr".index(name[0])] = 0.0
+        np.testing.assert_array_equal(values, expected)

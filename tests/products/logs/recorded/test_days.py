@@ -183,6 +183,10 @@ def test_only_labelled_data_sets_have_other_days(monkeypatch, tmp_path, data):
     monkeypatch.setattr(other_days, "_test_data_set_on_days", lambda one: one.name)
     monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare, data])
     assert other_days.run_other_days(tmp_path) == {"sets": ["set"]}
+    mixed = replace(data, name="mixed", flights=(*data.flights, *bare.flights))
+    late = replace(data, name="late", flights=(*bare.flights, *data.flights))
+    monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [late, mixed])
+    assert other_days.run_other_days(tmp_path) == {"sets": ["mixed"]}
     monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare])
     with pytest.raises(BadInput, match="holds no labelled flight, allowed: one with labels"):
         other_days.run_other_days(tmp_path)

@@ -89,6 +89,11 @@ def test_what_is_just_allowed_of_delays_and_covariances(tmp_path):
         [-0.05, 0.05],
         2e-12,
     )
+    noise[0][0] = 1.8e-12
+    with pytest.raises(
+        BadInput, match="noise: is singular or nearly so, allowed: a covariance, conditioned to"
+    ):
+        load_model(written(tmp_path, (("noise",), noise)))
     for wrong in ({"delays_s": [-0.06]}, {"delays_s": [0.0501]}):
         with pytest.raises(BadInput, match="up to a sample"):
             load_model(written(tmp_path, (("settings",), wrong)))

@@ -121,7 +121,7 @@ def test_a_gain_is_misread_by_as_much_as_the_past_of_the_residual_explains(monke
                 ok, left, answers = unexplained_rates_and_responses(one.samples, MODEL, True)
                 rest += list((left - MODEL.intercept - answers.sum(axis=1))[one.is_usable & ok])
         apart_by_colour[colour] = np.cov(np.array(rest).T), len(rest)
-    for share_by_colour in ((0.3, 0.2), (0.2, 0.25), (0.1, 0.05)):
+    for share_by_colour in ((0.6, 0.2), (0.2, 0.25), (0.1, 0.05)):
         colours = []
         for (colour, (all_of, _)), share, before in zip(
             apart_by_colour.items(), share_by_colour, (BEFORE.reshape(6, 3).tolist(), []), strict=True

@@ -329,6 +329,17 @@ def test_an_engine_at_idle_takes_the_thrust_that_it_has_in_trim(monkeypatch, sig
         assert found == {"engine": name, "known": known, "held": held}
 
 
+def test_columns_that_are_nearly_parallel_are_told_by_what_little_is_left():
+    """Over twice the bound (2, 0, 0) and (3, 0, 0.0006). Of the first so much of the second is left that roll
+    and yaw miss alike: 2 - 3 t and 0.0006 t. Of the second no roll need be left."""
+    bound = np.full(3, 0.5)
+    one, other = np.array([2.0, 0.0, 0.0]), np.array([3.0, 0.0, 0.0006])
+    told = detectability.least_distinguished_rad
+    assert told(one, other, bound) == pytest.approx(3.0006 / (2.0 * 0.0006))
+    assert told(other, one, bound) == pytest.approx(1.0 / 0.0006)
+    assert told(one, 1.5 * one, bound) == np.inf
+
+
 def test_an_engine_is_said_with_what_the_design_model_knows_of_it():
     of = {"engine": "left", "turns_rad_s2": [0.0035, 0.2, 0.175], "shows": 0.756}
     failed = (
@@ -462,6 +473,39 @@ def test_it_is_worked_out_for_one_scheme(fdi, refused, pointed, tmp_path):
         return
     with pytest.raises(BadInput, match="detectability is worked out for the sharpened scheme"):
         run_survey(tmp_path, given, [40.0], [0.0], [1.0])
+
+
+def test_another_scenario_of_the_name_is_another_survey(monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(detectability, "run_study", lambda study, out, progress: seen.append(study))
+    for given in (scenario(), scenario(duration_s=7)):
+        run_survey(tmp_path, given, [40.0], [0.0], [1.0])
+        assert seen[-1].follows_from == given
+        assert seen[-1].fly.args == (given,)
+    assert seen[0].name == seen[1].name == "test-detectability"
+
+
+def test_the_conclusions_are_of_the_references_nearest_to_the_scenarios_own():
+    """Of a scale of 0.25, 1.25 and 4 the middle one; the largest loss that it takes anywhere."""
+    rows = [
+        {"fault": "flap", "excitation": scale, "isolated": isolated, "detected": 0.1, "why": "w"}
+        for scale, sizes in ((0.25, (0.9, 0.8)), (1.25, (0.301, 0.4)), (4.0, (0.1, None)))
+        for isolated in sizes
+    ]
+    says = "loss of {} or more is certain to be detected and isolated at"
+    assert detectability._conclusions(rows) == [
+        f"flap: at 1.25 times the scenario's references a {says.format('40 %')} all 2 places."
+    ]
+    assert detectability._conclusions(rows[4:]) == [
+        f"flap: at 4 times the scenario's references a {says.format('10 %')} 1 of 2 places."
+    ]
+    none = [
+        {"fault": "flap", "excitation": 1.0, "isolated": None, "detected": detected, "why": why}
+        for detected, why in ((0.2, "a"), (None, "c"), (None, "b"))
+    ]
+    assert detectability._conclusions(none) == [
+        "flap: at the scenario's references no loss is certain to be detected and isolated (b)."
+    ]
 
 
 def test_the_name_of_a_survey_is_no_longer_than_a_folders_may_be():

@@ -141,3 +141,11 @@ def test_zeros_stand_by_size_and_of_a_pair_the_upper_one_first():
     A = np.zeros((5, 5))  # the observer's form, whose first state is the output
     A[:, 0], A[range(4), range(1, 5)] = -denominator[1:], 1.0
     np.testing.assert_allclose(zeros(A, numerator, 0), wanted, atol=1e-6)
+
+
+def test_a_fast_zero_is_one():
+    """(s + 2000)(s - 0.5) over (s + 1)^5."""
+    numerator, denominator = np.poly([-2000.0, 0.5]), np.poly([-1.0] * 5)
+    A = np.zeros((5, 5))
+    A[:, 0], A[range(4), range(1, 5)] = -denominator[1:], 1.0
+    np.testing.assert_allclose(zeros(A, np.array([0.0, 0.0, *numerator]), 0), [0.5, -2000.0], rtol=1e-5)

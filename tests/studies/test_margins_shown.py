@@ -1,6 +1,7 @@
 """What the margins are worked out from, and how they are shown; to the number, at one flight condition."""
 
 from dataclasses import asdict
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -244,3 +245,33 @@ def test_linearise_as_text_has_the_numbers_of_its_document(monkeypatch):
     assert table[1].split() == ["none", "flap", "7.2", "5.5", "58.5", "42"]
     assert table[-1] == "2 loops, 1 with less than 6 dB or 45 deg"
     assert shown == [[handling.Quality("trimmed", 30.0, "spiral", "time to double", np.inf, 1)]]
+
+
+def test_of_a_surface_that_hardly_moves_there_is_no_loop(monkeypatch):
+    """Of each fault and surface whose loop comes to more than a thousandth, with its own margins."""
+    asked = []
+    small = np.array([[0.2, -1e-3, 0.5, 1.1e-3], [-3.0, 5e-4, 0.1, 0.0]])
+    frame = SimpleNamespace(true_signals="signals", control=SimpleNamespace(main="main"))
+    monkeypatch.setattr(margins, "trimmed", lambda of: ("plant", "point"))
+    monkeypatch.setattr(margins, "differences", lambda plant, point: (plant, point))
+    monkeypatch.setattr(margins, "Loop", lambda of: SimpleNamespace(frames=["frame"]))
+    monkeypatch.setattr(margins, "FrameReadout", lambda of: frame)
+    monkeypatch.setattr(margins, "cases", lambda main, surfaces: [("none", "all"), ("given up", "few")])
+    monkeypatch.setattr(margins, "open_loop", lambda *given: asked.append(given[1:]) or ("loop", "law"))
+    monkeypatch.setattr(margins, "loops", lambda loop, law, omega: small * (1.0 if len(asked) == 1 else 0.01))
+    monkeypatch.setattr(margins, "margins", lambda L: (L[0], L[1], len(L)))
+    flown = scenario(initial={"airspeed_mps": 41.0}, rate_hz=50)
+    found = [tuple(asdict(each).values()) for each in at(flown)]
+    assert [row[:3] for row in found] == [
+        (41.0, "none", "aileron"), (41.0, "none", "rudder"), (41.0, "none", "flap"),
+        (41.0, "given up", "aileron"), (41.0, "given up", "rudder"),
+    ]  # fmt: skip
+    expected = [
+        (0.2, -3.0, 2.0),
+        (0.5, 0.1, 2.0),
+        (1.1e-3, 0.0, 2.0),
+        (0.002, -0.03, 2.0),
+        (0.005, 0.001, 2.0),
+    ]
+    assert [row[3:] for row in found] == [pytest.approx(of) for of in expected]
+    assert asked == [(frame, ("plant", "point"), "signals", left) for left in ("all", "few")]

@@ -191,6 +191,8 @@ def test_how_much_shorter_the_delay_is_needs_both_delays():
     assert "1 flights drawn could not be trimmed" in summary_text(document)
     assert _campaign(None, 0.1)["delay_shorter_by"] is None
     assert _campaign(0.4, None)["delay_shorter_by"] is None
+    assert _campaign(0.0, 0.1)["delay_shorter_by"] is None  # there is nothing to be shorter than
+    assert _campaign(0.4, 0.0)["delay_shorter_by"] == 1.0
 
 
 def test_a_delay_over_what_is_guaranteed_is_of_those_that_are_certain():

@@ -90,7 +90,8 @@ def test_a_promise_is_kept_up_to_a_frame_after(guaranteed_s, alarm_s, late):
 @pytest.mark.parametrize(
     ("candidates", "isolated", "excluded", "wrong"),
     [
-        (("elevator", "rudder"), None, False, False), ((), "elevator", False, False),
+        (("elevator", "rudder"), None, False, False), (("rudder", "elevator"), None, False, False),
+        ((), "elevator", False, False),
         (("rudder",), None, True, False), ((), "rudder", True, True),
     ],
 )  # fmt: skip

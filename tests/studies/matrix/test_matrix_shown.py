@@ -134,6 +134,10 @@ def test_what_is_flown_of_which_aircraft(monkeypatch):
     assert airspeeds_of("beaver") == (38.0, 45.0, 52.0)
     usual = fault_matrix.aircraft_of(TRAINER).usual_airspeed_mps
     assert airspeeds_of(TRAINER) == tuple(round(share * usual, 1) for share in (0.9, 1.0, 1.1))
+    with monkeypatch.context() as at:
+        made = SimpleNamespace(usual_airspeed_mps=33.37)
+        at.setattr(fault_matrix, "aircraft_of", lambda reference: made)
+        assert airspeeds_of(TRAINER) == (30.0, 33.4, 36.7)
     every = cases((40.0, 50.0), aircraft=TRAINER)
     assert every[:3] == [
         FaultCase(FAULTS[0][0], "aileron", 40.0, False, TRAINER, "none"),

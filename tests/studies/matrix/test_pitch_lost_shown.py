@@ -1,5 +1,7 @@
 """Elevator and flap lost: the report of rows made by hand, the linear numbers, short rows, the scenarios."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -154,3 +156,30 @@ def test_the_phugoid_is_the_slow_oscillation_that_is_damped_least():
     system = block_diag(pair(0.2, 0.3), pair(0.3, 0.1), pair(5.0, 0.05), [[-0.01]])
     assert pitch_lost._phugoid_damping(system) == pytest.approx(0.1)
     assert pitch_lost._phugoid_damping(pair(5.0, 0.05)) == 1.0
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_an_outcome_is_of_what_came_since_the_fault_and_once_settled(lost, monkeypatch):
+    """Frames at 11, 12, 20, 30 and 40 s: the fault is at 12 s, settled is from 30 s on."""
+    columns = {
+        "t_s": [11.0, 12.0, 20.0, 30.0, 40.0], "q_rad_s": [9.0, 8.0, 7.0, 0.03, -0.04],
+        "theta_rad": [9.0, 2.0, -3.0, 0.1, 0.35], "phi_rad": [9.0, 0.2, -0.5, 0.3, 0.1],
+        "airspeed_mps": [99.0, 41.0, 38.0, 45.0, 43.0], "envelope_valid": [0.0, 1.0, 0.0, 1.0, 1.0],
+    }  # fmt: skip
+    made = SimpleNamespace(document=lambda: {"time_s": 50.0}) if lost else None
+    power = SimpleNamespace(document=lambda: {"from_s": 13.0}) if lost else None
+
+    def fly(scenario, kept):
+        kept |= {name: np.array(column) for name, column in columns.items()}
+
+    monkeypatch.setattr(pitch_lost, "fly", fly)
+    monkeypatch.setattr(
+        pitch_lost, "measure", lambda landing: SimpleNamespace(departure=made, engine_power=power)
+    )
+    found = pitch_lost._outcome("flight")
+    assert found == {
+        "q_rms_deg_s": None if lost else pytest.approx(np.degrees(np.sqrt(0.00125))),
+        "theta_swing_deg": None if lost else pytest.approx(np.degrees(0.25)),
+        "airspeed_mps": [38.0, 45.0], "bank_deg": pytest.approx(np.degrees(0.5)), "outside_share": 0.25,
+        "departure": {"time_s": 50.0} if lost else None, "engine_power": {"from_s": 13.0} if lost else None,
+    }  # fmt: skip

@@ -3,7 +3,15 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.sweep.one_flight import Keep, columns_of, counts_of_rows, fly_one, scenario_of
+from beaver_ftc.results.writer import NotAllWritten
+from beaver_ftc.studies.sweep.one_flight import (
+    Keep,
+    columns_of,
+    counts_of_rows,
+    fly_one,
+    keep_flight,
+    scenario_of,
+)
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
 
 from .conftest import SHORT, sweep_of
@@ -129,3 +137,22 @@ def test_an_alarm_without_a_fault_is_no_detection_among_the_counts():
     flights += [("failed", None, None)] * 6
     rows = [dict(zip(("status", "fault.type", "detection.detected"), one, strict=True)) for one in flights]
     assert counts_of_rows(rows) == {"done": 13, "failed": 6, "faulted": 5, "detected": 3}
+
+
+@pytest.mark.parametrize("scheme", ["adaptive-estimators", "zhang2005"])
+def test_a_kept_flight_has_its_certificate_where_the_scheme_has_one(monkeypatch, tmp_path, scheme):
+    """Of one whose files cannot all be written log and scenario are kept as they are."""
+    given = []
+
+    def run(scenario, folder, report, certified):
+        given.append((scenario.name, folder, report, certified))
+        raise NotAllWritten("a picture")
+
+    monkeypatch.setattr("beaver_ftc.results.writer.run", run)
+    sweep = sweep_of(SHORT.replace("set: {", f"set: {{fdi: {{scheme: {scheme}}}, "))
+    (flight,) = Plan(sweep).assignments([7])
+    keep_flight(sweep, flight, Keep(folder=tmp_path, certified=True), report=True)
+    keep_flight(sweep, flight, Keep(folder=tmp_path))
+    certified = scheme == "adaptive-estimators"
+    assert given == [("short-0007", tmp_path, True, certified), ("short-0007", tmp_path, False, False)]
+    assert list(tmp_path.iterdir()) == []

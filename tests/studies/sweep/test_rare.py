@@ -235,6 +235,16 @@ def test_which_expectations_have_a_score(drift):
     assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
 
 
+def test_an_alarm_or_a_loss_that_is_wanted_has_no_score(tmp_path):
+    """What is expected then is the event itself."""
+    wanted = {"no_false_alarm": False, "no_departure": False, "post_fault_rms_deg_s": {"p": 3, "r": 2.5}}
+    (tmp_path / "other.yaml").write_text(
+        yaml.safe_dump({**SWEEP, "base": SWEEP["base"] | {"expect": wanted}})
+    )
+    found = scored(load_sweep(tmp_path / "other.yaml"))
+    assert found == ["post_fault_rms_deg_s.p", "post_fault_rms_deg_s.r"]
+
+
 @pytest.mark.parametrize("name", ["isolated_as", "no_departur", "", "x" * 500])
 def test_what_the_base_does_not_expect_is_refused(name, drift, tmp_path):
     with pytest.raises(BadInput, match=r"^--rare: .* is nothing that drift expects.* allowed: detected_"):

@@ -3,6 +3,7 @@
 from math import sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
@@ -11,7 +12,7 @@ from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
 from beaver_ftc.studies.sweep.summary import estimate_of, evaluate, names, summarise
 
-from .counted import ROWS, SWEEP, detected, flights_of
+from .counted import ROWS, SWEEP, detected, flights_of, row
 
 
 @pytest.fixture
@@ -135,6 +136,62 @@ def test_expectations_hold_the_flights_to_their_bounds(flights, expect, actual, 
     (found,) = evaluate(SweepExpect(**expect), flights)
     assert found["passed"] is passed
     assert found["actual"] == (None if actual is None else pytest.approx(actual, abs=1e-3))
+
+
+RMS = "tracking.{}_fault_rms_deg_s.{}"
+
+
+def tracked(before, *after):
+    """Tracking errors of q before the fault, and of all axes after it, deg/s."""
+    of = {RMS.format("post", axis): rms for axis, rms in zip("pqr", after, strict=True)}
+    return of | {RMS.format("pre", "q"): before}
+
+
+ODD = [
+    detected(0, 0.5, **tracked(0.25, 0.1, 0.5, 0.2), fault_free_s=12.0),
+    detected(1, 0.25, "aileron", **tracked(0.0, 0.4, 0.3, 0.7), fault_free_s=11.0),  # stood still before
+    # an alarm before the fault, and the aircraft lost: the fault tells nothing
+    detected(2, 2.0, **tracked(0.1, 0.9, 0.2, 0.3), fault_free_s=3.0, false_alarm=True)
+    | {"status": "departed"},
+    row(3, "departed", **tracked(0.5, 0.1, 0.6, 0.2), fault_free_s=13.0, flown_s=20.0),
+    row(4, **tracked(0.4, 0.5, 0.6, None), fault_free_s=14.0) | {"isolation.correct": True},  # but unseen
+    detected(5, 0.75, **tracked(0.1, 0.2, 0.3, 0.4), fault_free_s=15.0) | {"status": "failed"},
+    row(6, **tracked(0.2, None, None, None), fault_free_s=30.0) | {"fault.at_s": 30.5},  # not in this flight
+]  # fmt: skip
+ODD[5] |= {"false_alarm": True, "reason": "it broke"}
+for place, share in ((0, 0.0), (1, 0.25), (5, 0.5), (6, 0.01)):
+    ODD[place]["detection.inconclusive.share"] = share
+
+
+def test_what_each_flight_counts_for(tmp_path, sweep):
+    """Of flights that are odd in one way each."""
+    flights = flights_of(ODD, tmp_path)
+    masks = {
+        "measured": [1, 1, 1, 1, 1, 0, 1], "departed": [0, 0, 1, 1, 0, 0, 0],
+        "faulted": [1, 1, 0, 1, 1, 0, 0], "detected": [1, 1, 0, 0, 0, 0, 0],
+        "isolated": [1, 0, 0, 0, 0, 0, 0],
+    }  # fmt: skip
+    assert {name: getattr(flights, name).astype(int).tolist() for name in masks} == masks
+    assert flights.false_alarms == (1, pytest.approx((12 + 11 + 3 + 13 + 14 + 30) / 3600))
+    assert flights.detection_delay_s.tolist() == [0.5, 0.25, *[np.inf] * 5]
+    assert flights.isolation_delay_s.tolist() == [0.6, *[np.inf] * 6]
+    numbers = {
+        "error of q": (flights.post_fault_rms_deg_s("q"), [0.5, 0.3, 0.2, np.inf, 0.6, 0.3, np.nan]),
+        "over that before": (flights.tracking_ratio("q"), [2.0, np.nan, 2.0, np.inf, 1.5, 3.0, np.nan]),
+        "of the worst axis": (flights.worst_rms_deg_s, [0.5, 0.7, 0.9, np.inf, np.nan, 0.4, np.nan]),
+    }
+    for found, expected in numbers.values():
+        np.testing.assert_allclose(found, expected)
+    worst = {flight["run"]: flight["why"] for flight in worst_flights(flights, sweep, "again")}
+    assert worst[2][:2] == ["false alarm", "departed: "]
+    assert worst[5] == ["failed: it broke"]  # no false alarm of one that was not flown
+    assert worst[1][:2] == ["named aileron", "detected after 0.25 s"]
+    assert worst[4] == ["fault not detected"]
+    found = summarise(flights, sweep)
+    assert found["tracking"]["q"]["pre_fault_rms_deg_s"]["of"] == 6
+    assert found["on_the_bound"]["of"] == 4
+    assert (found["passes"]["count"], found["passes"]["of"], found["inconclusive"]["of"]) == (6, 6, 6)
+    assert found["inconclusive"]["count"] == 2
 
 
 EVERY = {  # of the dozen flights: nine with a fault that no alarm came before, eleven with metrics

@@ -107,8 +107,18 @@ def test_compacting_joins_the_parts_in_order_and_removes_them(store, short):
     assert table.column_names[0] == "run"
     assert table.column("run").to_pylist() == list(range(9))
     assert parts_in(store.folder) == 0
+    for runs in (range(3, 6), range(6, 9)):  # of the whole the rows of a batch alone
+        assert store.landed(runs[0] // 3, runs).column("run").to_pylist() == list(runs)
     assert store.is_compacted(9)
     assert not store.is_compacted(10)
+
+
+def test_where_nothing_has_been_flown_there_is_nothing_to_go_on_with(store, short):
+    """And no harm in asking for it."""
+    with store:
+        store.begin(identity_of(short), resume=True)
+        assert store.landed(0, range(3)) is None
+        assert (store.folder / "sweep.json").exists()
 
 
 def test_a_second_process_is_kept_out(store, short):

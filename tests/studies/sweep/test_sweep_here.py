@@ -89,6 +89,28 @@ def test_a_search_goes_on_from_generation_to_generation(hired, tmp_path, changed
     assert document["folder"].endswith("short-search-tracking/flights/short-search-tracking-0017")
 
 
+def test_as_many_workers_as_are_asked_for_fly_and_warm_up_the_sweep(hired, monkeypatch):
+    """On this machine one a core unless it is said; of a cluster it is the cluster that says."""
+    flown = []
+    monkeypatch.setattr(one_flight, "fly_one", lambda *given, keep: flown.append((*given, keep)))
+    monkeypatch.setattr(one_flight, "warm_up", flown.append)
+    sweep, keep = sweep_of(), Keep("failed")
+    campaign._workers(sweep, Options(workers=3, keep=keep))
+    ((work, number),) = hired
+    assert number == 3
+    work.fly("flight")
+    work.warm_up()
+    assert flown == [(sweep, "flight", keep), sweep]
+    asked = []
+    monkeypatch.setattr(
+        "beaver_ftc.studies.engine.ray_workers.RayWorkers", lambda *given: asked.append(given[1:]) or "ray"
+    )
+    there = Options(workers=5, backend="ray", address="there:1")
+    assert campaign._workers(sweep, there) == "ray"
+    assert campaign._workers(sweep, Options(backend="ray")) == "ray"
+    assert asked == [("there:1", 5), (None, None)]
+
+
 @pytest.mark.parametrize(
     ("duration_s", "rate_hz", "substeps", "flights", "size"),
     [

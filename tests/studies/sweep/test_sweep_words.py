@@ -83,6 +83,9 @@ def test_what_there_is_nothing_of_is_not_said():
         "sensitivity": {"detection_delay": [], "missed_detection": []},
     }  # fmt: skip
     assert words.facts(SUMMARY | nothing) == [("flights", "12, 0.123 h in the air")]
+    few = words.facts(SUMMARY | {"on_the_bound": rate(1, 11)})
+    assert "warning" not in dict(few)
+    assert "warning" in dict(words.facts(SUMMARY | {"on_the_bound": rate(1, 10)}))  # a tenth is many
     search = {"score": None, "objective": "delay", "run": 3}
     assert ("searched for", "the worst delay: none in flight 3") in words.facts(SUMMARY | {"search": search})
 

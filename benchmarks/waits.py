@@ -7,8 +7,8 @@ Every wait is a whole process of its own, and the processor time is that of the 
 starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
 The waits of a flight in a sweep are ratios to JSBSim's frames alone (`flight_cost.py`). `--long` takes also
 what needs minutes or the network (`matrix`, `power`, rare events, `reproduce`, `make demo` from a fresh
-clone); `import gtm` needs the user's copy of the data base. The processor time of a study leaves out its
-workers, which are no children of the command.
+clone); `import gtm` needs the user's copy of the data base. The processor time of a study includes its
+workers, on Linux: they are no children of the command, and become this process's when it ends.
 
 `--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
 of both and of their ratio, which a busy machine changes little.
@@ -16,6 +16,7 @@ of both and of their ratio, which a busy machine changes little.
 
 import argparse
 import asyncio
+import ctypes
 import fnmatch
 import json
 import os
@@ -25,13 +26,15 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-BODY = "from beaver_ftc.cli.begin import main; main()"
+ADOPT_ORPHANS = 36  # prctl(2): PR_SET_CHILD_SUBREAPER
 FAULT = "elevator-partial-loss"  # 30 s at 100 Hz
 OTHER_AIRCRAFT, OTHER_KIND = "mission-split-elevator-lost", "elevator-loss-in-turbulence"
 RARE = "elevator-effectiveness"
@@ -61,6 +64,13 @@ class Place:
     folder: Path
     gtm: Path | None = None
 
+    @cached_property
+    def body(self) -> str:
+        """What the installed command of the tree does: each revision has an entry point of its own."""
+        project = tomllib.loads((self.tree / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        module, _, function = project["scripts"]["beaver-ftc"].partition(":")
+        return f"from {module} import {function}; {function}()"
+
     def environment(self, cache: str) -> dict[str, str]:
         """The code of the tree, and a cache by its name."""
         own = {"PYTHONPATH": str(self.tree / "src"), "XDG_CACHE_HOME": str(self.folder / cache)}
@@ -83,7 +93,7 @@ class Place:
 
     def said(self, *words: str, cache: str = "warm") -> Taken:
         """What a command of beaver-ftc takes."""
-        return self.taken([sys.executable, "-c", BODY, *words], cache)
+        return self.taken([sys.executable, "-c", self.body, *words], cache)
 
     def file(self, name: str, text: str) -> str:
         """A file with this text."""
@@ -97,6 +107,26 @@ def ended(process: "subprocess.Popen[Any]", began: float, wall_s: float | None =
     process.returncode = os.waitstatus_to_exitcode(status)
     peak_mb = used.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
     return Taken(wall_s or time.perf_counter() - began, used.ru_utime + used.ru_stime, peak_mb)
+
+
+def with_workers(measure: Callable[[], Taken]) -> Taken:
+    """What a process takes with the workers that it leaves behind, which end after it: adopted meanwhile."""
+    if not sys.platform.startswith("linux"):
+        return measure()
+    ctypes.CDLL(None).prctl(ADOPT_ORPHANS, 1, 0, 0, 0)
+    try:
+        taken, left_s, peak_mb = measure(), 0.0, 0.0
+        while True:
+            try:
+                _, _, used = os.wait3(0)
+            except ChildProcessError:  # none is left
+                break
+            left_s, peak_mb = left_s + used.ru_utime + used.ru_stime, max(peak_mb, used.ru_maxrss / 2**10)
+    finally:
+        ctypes.CDLL(None).prctl(ADOPT_ORPHANS, 0, 0, 0, 0)
+    assert taken.processor is not None
+    assert taken.peak_mb is not None
+    return replace(taken, processor=taken.processor + left_s, peak_mb=max(taken.peak_mb, peak_mb))
 
 
 def after_a_first_flight(place: Place, scenario: str) -> Taken:
@@ -138,7 +168,7 @@ def live(place: Place) -> Taken:
     from live import Watcher
 
     began = time.perf_counter()
-    command = [sys.executable, "-c", BODY, "live", "--out", "cockpit"]
+    command = [sys.executable, "-c", place.body, "live", "--out", "cockpit"]
     process = subprocess.Popen(
         command, cwd=place.folder, env=place.environment("warm"), stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL, text=True,
@@ -199,7 +229,7 @@ def study(*words: str) -> Callable[[Place], Taken]:
 
     def measure(place: Place) -> Taken:
         shutil.rmtree(place.folder / "study", ignore_errors=True)
-        return place.said(*words, "--out", "study")
+        return with_workers(lambda: place.said(*words, "--out", "study"))
 
     return measure
 

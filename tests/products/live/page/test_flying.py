@@ -240,3 +240,37 @@ def test_a_flight_that_is_late_takes_what_was_asked_before_it_flies_on(
     late._listen()
     assert handled == [(1, f"request {i}") for i in range(taken)]
     assert asked == polls
+
+
+@pytest.mark.parametrize(
+    ("request_", "holds"),
+    [
+        ({"do": "save"}, True), ({"do": "fresh"}, True), ({"do": "game", "move": "stop"}, True),
+        ({"do": "repair"}, False), ({"do": "change"}, False),
+    ],
+)  # fmt: skip
+def test_what_takes_a_while_is_not_caught_up_with_and_its_reports_are_drawn_in_turn(
+    tmp_path, monkeypatch, request_, holds
+):
+    """The clock stands at 5 s when a page asks, and at 8 s when that is done."""
+    now_s, held, drawn = [5.0], [], []
+    monkeypatch.setattr(flying, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
+
+    def handle(request, by):
+        now_s[0] = 8.0
+        session.unreported += [tmp_path / "a", tmp_path / "b"]
+        return f"done by {by}"
+
+    session = SimpleNamespace(
+        sim="flight", scenario=SimpleNamespace(rate_hz=100.0), unreported=[], handle=handle
+    )
+    at = Flying(None, session)
+    at._names[3] = "Ada"
+    monkeypatch.setattr(at._pace, "hold", held.append)
+    monkeypatch.setattr(at._reports, "add", drawn.append)
+    request = flying.messages.parse(json.dumps(request_))
+    assert at._handle(3, request) == "done by Ada"
+    assert at._handle(4, request) == "done by "
+    assert held == ([8.0, 8.0] if holds else [])
+    assert drawn == [tmp_path / "a", tmp_path / "b"] * 2
+    assert session.unreported == []

@@ -14,6 +14,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.commands import live as live_command
 from beaver_ftc_live.page import messages, reports
+from beaver_ftc_live.page import serve as serve_module
 from beaver_ftc_live.page import session as session_module
 from beaver_ftc_live.page.session import Session, as_live, changes_of, fault_types
 
@@ -383,3 +384,52 @@ def test_an_autopilot_holds_what_the_aircraft_can_be_asked_for(monkeypatch):
     monkeypatch.setattr(session_module, "channels_of", lambda of: ("bank_deg", "heading_deg", "altitude_m"))
     held = {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}
     assert changes_of(fresh, load()) == {"autopilot": held}
+
+
+@pytest.mark.parametrize(
+    ("host", "guests", "found", "warned"),
+    [
+        ("127.0.0.1", None, 0, False), ("127.0.0.1", 3, 3, False), ("192.0.2.77", None, 10, True),
+        ("192.0.2.77", 0, 0, True), ("192.0.2.77", 4, 4, True),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("opens", [False, True])
+def test_the_command_listens_for_as_many_guests_as_are_asked_for(
+    monkeypatch, capsys, tmp_path, host, guests, found, warned, opens
+):
+    """Ten on an address that others reach, none on the loopback; who reaches it is said."""
+    served, opened = [], []
+    monkeypatch.setattr(serve_module, "serve", lambda *of: served.extend(of))
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    live_command.command("fault-free", "beaver-split", 8001, host, guests, tmp_path, opens)
+    load_it, out, place, say = served
+    assert (load_it().airframe.name, out) == ("beaver-split", tmp_path)
+    assert place == serve_module.Place(8001, host, found)
+    say("http://a", ["http://b"])
+    printed = capsys.readouterr().out
+    assert printed.startswith("live: http://a\nguest 1: http://b\n")
+    assert (f"live: {host} is no loopback: anyone" in printed) == warned
+    assert opened == (["http://a"] if opens else [])
+
+
+@pytest.mark.parametrize("fails", [[False, True, False], [False, False, False], [True, False, False]])
+def test_every_report_is_drawn_courteously_and_a_failure_is_the_end(tmp_path, monkeypatch, fails):
+    """A folder that is gone is passed over."""
+    folders, drawn, niced = [tmp_path / name for name in "abcd"], [], []
+    for folder in (folders[0], *folders[2:]):
+        folder.mkdir()
+        (folder / "metrics.json").write_text(json.dumps({"name": folder.name}))
+
+    def add_report(folder, document):
+        drawn.append((folder, document["name"]))
+        return f"no room for {folder.name}" if fails[len(drawn) - 1] else ""
+
+    monkeypatch.setattr("beaver_ftc.results.add_report", add_report)
+    monkeypatch.setattr(sys, "argv", ["draw", *map(str, folders)])
+    monkeypatch.setattr(reports.os, "nice", niced.append, raising=False)
+    with pytest.raises(SystemExit) as ended:
+        reports.draw()
+    assert drawn == [(folder, folder.name) for folder in (folders[0], *folders[2:])]
+    assert niced == [10]
+    names = [folder.name for (folder, _), failed in zip(drawn, fails, strict=True) if failed]
+    assert ended.value.code == (f"no room for {names[0]}" if names else 0)

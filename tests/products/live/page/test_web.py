@@ -1,6 +1,7 @@
 """The web side without a network: requests and websockets handed to the application as a server does."""
 
 import asyncio
+import contextlib
 import json
 import signal
 import socket
@@ -9,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from live_site import HOST, PORT, Site, says
 
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc_live.page import EVERYONE, MAX_BYTES, serve, server
 from beaver_ftc_live.page.gate import Seat
 from beaver_ftc_live.page.serve import Place
@@ -228,26 +230,119 @@ class Stopped:
 
 
 @pytest.mark.parametrize(
-    ("words", "ended"),
+    ("words", "ended", "host"),
     [
-        (((1, b"frame"), ("bad input", "cannot be trimmed")), ("bad input", "cannot be trimmed")),
-        (((1, b"frame"),), ("died", "the flight process has ended unexpectedly")),
+        (
+            ((1, b"frame"), ("bad input", "cannot be trimmed")),
+            ("bad input", "cannot be trimmed"),
+            "127.0.0.1",
+        ),
+        (((1, b"frame"),), ("died", "the flight process has ended unexpectedly"), "0.0.0.0"),
     ],
 )
-def test_the_server_ends_with_the_flight_and_says_why(monkeypatch, words, ended):
+def test_the_server_ends_with_the_flight_and_says_why(monkeypatch, words, ended, host):
+    """To the pilot an address, and one to each guest; only where it listens everywhere it is called by any
+    address that it has."""
     import uvicorn
 
-    said, told = [], []
+    said, told, made, sent = [], [], [], []
     monkeypatch.setattr(uvicorn, "Server", Stopped)
     monkeypatch.setattr(Pages, "tell", lambda self, number, text: told.append((number, text)))
-    with serve._listening(Place()) as listener:
+    monkeypatch.setattr(server, "application", lambda *of: made.extend(of))
+    monkeypatch.setattr(serve, "_outward", lambda: "198.51.100.9")
+    place, pipe = Place(host=host, guests=2), Pipe(*words)
+    pipe.send = sent.append
+    with serve._listening(place) as listener:
         port = listener.getsockname()[1]
-        assert asyncio.run(serve._serve(listener, Pipe(*words), lambda *said_: said.append(said_))) == ended
-    ((address, guests),) = said
-    assert guests == []
-    assert address.startswith(f"http://127.0.0.1:{port}/")
+        asked = serve._serve(listener, pipe, lambda *said_: said.append(said_), place)
+        assert asyncio.run(asked) == ended
+    ((address, links),) = said
+    gate, pages, ask, say = made
+    own = "127.0.0.1" if host == "127.0.0.1" else "198.51.100.9"
+    assert [link.split("/?token=")[0] for link in (address, *links)] == [
+        f"http://{own}:{port}{seat.room}" for seat in (gate.flyer, *gate.guests)
+    ]
+    assert (len(gate.guests), gate._any_own) == (2, host == "0.0.0.0")
+    assert gate.flyer.redeem(address.rpartition("=")[2])
+    assert isinstance(pages, Pages)
     assert told == [(1, b"frame")]
     config = Stopped.last.config
     names = "access_log", "log_level", "lifespan", "server_header", "ws_max_size", "ws_ping_interval"
     assert [getattr(config, name) for name in names] == [False, "error", "off", False, MAX_BYTES, 20.0]
     assert config.timeout_graceful_shutdown == 2
+    assert (config.proxy_headers, config.ws_per_message_deflate) == (False, False)
+    ask(7, "text")
+    say("http://again")
+    assert (sent, said[1:]) == ([(7, "text")], [("http://again", [])])
+
+    def gone(_):
+        raise BrokenPipeError
+
+    pipe.send = gone
+    ask(7, "text")  # the flight has died: somebody else says so
+
+
+@pytest.mark.parametrize(
+    ("ended", "raised"),
+    [
+        (None, None), (("bad input", "no trim"), BadInput), (("failed", "not finite"), SimulationFailed),
+        (("died", "it has ended"), SimulationFailed),
+    ],
+)  # fmt: skip
+def test_why_a_flight_has_ended_is_raised_as_what_it_is(monkeypatch, tmp_path, ended, raised):
+    begun, sent, done = [], [], []
+    place = Place(8001, guests=3)
+    process = SimpleNamespace(terminate=lambda: done.append("terminated"))
+    pipe = SimpleNamespace(send=sent.append)
+
+    async def serving(*of):
+        begun.append(of)
+        return ended
+
+    monkeypatch.setattr(serve, "_listening", lambda at: contextlib.nullcontext(("listener", at)))
+    monkeypatch.setattr(serve, "_flight", lambda out: contextlib.nullcontext((process, pipe)))
+    monkeypatch.setattr(serve, "_serve", serving)
+    with pytest.raises(raised, match=ended[1]) if raised else contextlib.nullcontext():
+        serve.serve(lambda: "scenario", tmp_path, place, print)
+    assert begun == [(("listener", place), pipe, print, place)]
+    assert (sent, done) == (["scenario"], [])
+
+    def wrong():
+        raise BadInput("no such scenario")
+
+    with pytest.raises(BadInput, match="no such scenario"):
+        serve.serve(wrong, tmp_path, place, print)
+    assert (len(begun), len(sent), done) == (1, 1, ["terminated"])
+
+
+@pytest.mark.parametrize("alive", [False, True])
+def test_the_flight_s_process_is_told_to_end_and_made_to(monkeypatch, tmp_path, alive):
+    made, done = [], []
+
+    def process(**how):
+        made.append(how)
+        return SimpleNamespace(
+            start=lambda: done.append("start"), join=lambda *wait_s: done.append(("join", *wait_s)),
+            is_alive=lambda: alive, terminate=lambda: done.append("terminate"),
+        )  # fmt: skip
+
+    ours = SimpleNamespace(send=done.append)
+    theirs = SimpleNamespace(close=lambda: done.append("closed"))
+    context = SimpleNamespace(Pipe=lambda: (ours, theirs), Process=process)
+    monkeypatch.setattr(serve.multiprocessing, "get_context", lambda how: context if how == "spawn" else None)
+    with serve._flight(tmp_path) as (_, pipe):
+        assert pipe is ours
+        assert done == ["start", "closed"]
+    assert done[2:] == [(EVERYONE, "end"), ("join", 3.0), *(["terminate", ("join",)] if alive else [])]
+    (how,) = made
+    assert (how["target"], how["args"], how["daemon"]) == (serve._fly, (theirs, str(tmp_path)), True)
+
+
+def test_a_token_that_opens_nothing_and_a_page_that_leaves_are_shown_to_the_pilot(monkeypatch):
+    monkeypatch.setattr(server, "SLOW_S", 0.0)
+    site, told = Site(), []
+    monkeypatch.setattr(site.pages, "tell_class", lambda gate: told.append((gate.wrong, len(site.pages))))
+    site.get(f"{site.gate.flyer.room}/", "token=wrong")
+    assert told == [(1, 0)]
+    site.talk(says(do="name", name="Ada"), cookie=site.keys[0], seat=site.gate.guests[0])
+    assert told == [(1, 0), (1, 1), (1, 1), (1, 0)]  # it joins, has a name, and is gone

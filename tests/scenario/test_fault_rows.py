@@ -3,7 +3,17 @@
 import pytest
 
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import TYPES, Past, fault_name, of_a_sensor, place_of
+from beaver_ftc.scenario.faults import (
+    HEALTHY,
+    HOLDING,
+    SENSOR_TYPES,
+    TYPES,
+    Past,
+    fault_name,
+    is_share,
+    of_a_sensor,
+    place_of,
+)
 from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 from scenario.damageable import damageable
@@ -117,3 +127,89 @@ def test_what_is_ideal_and_what_covers_what():
 def test_what_nobody_anticipates_comes_last_wherever_types_are_listed():
     assert list(TYPES)[-1] == "unanticipated"
     assert set(TYPES) == set(GIVEN)
+
+
+IN_WORDS = {  # each parameter in words, and an estimate of 0.4567 as a size and as a quantity
+    "loss_of_effectiveness": (
+        {"magnitude": "40 %", "kappa_per_s": "growing at 2.5 /s"}, "-45.7 %", "loss -45.7 %",
+    ),
+    "stuck": ({"position_deg": "45 deg"}, "0.457", "0.457"),
+    "hardover": ({"direction": "to the lower stop"}, "0.457", "0.457"),
+    "float": ({}, "0.457", "0.457"),
+    "bias": ({"bias_deg": "-18 deg", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
+    "rate_limit": ({"scale": "20 % of its rate", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
+    "oscillatory": (
+        {"amplitude_deg": "36 deg", "frequency_rad_s": "5 rad/s", "kappa_per_s": "growing at 2.5 /s"},
+        "0.457", "0.457",
+    ),
+    "unanticipated": ({"Cm_alpha3": "Cm_alpha3 8", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
+    "damage": ({"case": "tail off"}, "0.457", "0.457"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_a_fault_and_its_estimate_in_words(kind):
+    row, (words, size, quantity) = TYPES[kind], IN_WORDS[kind]
+    given = {**GIVEN[kind], "kappa_per_s": 2.5}
+    assert {key: says(given[key]) for key, says in row.in_words.items()} == words
+    assert (row.size_in_words(0.4567), row.estimate_in_words(0.4567)) == (size, quantity)
+    assert is_share(kind) == (kind == "loss_of_effectiveness")
+    assert TYPES["hardover"].in_words["direction"](1) == "to the upper stop"
+    assert TYPES["bias"].in_words["bias_deg"](3.0) == "+3 deg"
+    assert not is_share(None)
+
+
+def test_healthy_values_and_what_holds_a_surface():
+    assert HEALTHY == {
+        "effectiveness": 1.0, "stuck": 0.0, "stuck-at-rad": 0.0, "hardover": 0.0, "float": 0.0,
+        "bias-rad": 0.0, "rate-scale": 1.0, "oscillation-amplitude-rad": 0.0,
+        "oscillation-frequency-rad_sec": 0.0, "Cm-alpha3": 0.0,
+    }  # fmt: skip
+    assert sorted(HOLDING) == ["float", "hardover", "stuck"]
+    assert sorted(SENSOR_TYPES) == ["bias", "freeze", "lost", "noise", "scale"]
+
+
+G = 9.80665
+GRADES = {  # from data sheets: a random walk over an hour is a sample's noise at 100 Hz; else as assumed
+    "tactical-grade": {
+        ("p", "q", "r"): {
+            "noise_std_deg_s": 0.125 / 60 * 10, "bias_deg_s": 1 / 3600, "scale_error": 150e-6,
+        },
+        ("alpha", "beta"): {"noise_std_deg": 0.025, "bias_deg": 0.1},
+        ("phi", "theta", "psi"): {"noise_std_deg": 0.005, "bias_deg": 0.2, "drift_deg_h": 1.0},
+        ("ax", "ay", "az"): {
+            "noise_std_mps2": 0.065 * 0.3048 / 60 * 10, "bias_mps2": 1e-3 * G, "scale_error": 300e-6,
+        },
+        ("V",): {"noise_std_mps": 0.05, "bias_mps": 0.2}, ("qdyn",): {"noise_std_pa": 2.0, "bias_pa": 5.0},
+        ("altitude",): {"noise_std_m": 0.2, "bias_m": 3.0},
+        ("engine_rpm",): {"noise_std_rpm": 1.0, "bias_rpm": 2.0},
+        ("manifold_pressure",): {"noise_std_inhg": 0.01, "bias_inhg": 100.0 / 3386.39},
+    },
+    "consumer-grade": {
+        ("p", "q", "r"): {
+            "noise_std_deg_s": 0.1, "bias_deg_s": 30.0 * 2.0 / 125.0, "scale_error": 0.03,
+            "quantum_deg_s": 1 / 65.5,
+        },
+        ("alpha", "beta"): {"noise_std_deg": 0.043, "bias_deg": 0.5, "quantum_deg": 360 / 4096},
+        ("phi", "theta", "psi"): {"noise_std_deg": 0.05, "bias_deg": 1.0},
+        ("ax", "ay", "az"): {
+            "noise_std_mps2": 300e-6 * G * 144**0.5, "bias_mps2": 60e-3 * G, "scale_error": 0.03,
+            "quantum_mps2": G / 8192,
+        },
+        ("V",): {"noise_std_mps": 0.1, "bias_mps": 0.4},
+        ("qdyn",): {"noise_std_pa": 3.0, "bias_pa": 0.0025 * 6894.76},
+        ("altitude",): {"noise_std_m": 0.5, "bias_m": 5.0},
+        ("engine_rpm",): {"noise_std_rpm": 5.0, "bias_rpm": 10.0},
+        ("manifold_pressure",): {"noise_std_inhg": 0.05, "bias_inhg": 0.1},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("grade", GRADES)
+def test_instruments_of_a_grade_are_those_of_their_data_sheets(grade):
+    """To the digits that the presets have; of a bias that is zeroed 2 K away to 4 %."""
+    expected = {name: errors for names, errors in GRADES[grade].items() for name in names}
+    found = {name: sensor.model_dump(exclude_unset=True) for name, sensor in Sensors.model_validate(grade)}
+    assert found.keys() == expected.keys()
+    for name, errors in expected.items():
+        assert found[name] == pytest.approx(errors, rel=0.045), name

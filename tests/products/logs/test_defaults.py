@@ -35,6 +35,51 @@ def test_laws_and_air_are_taken_to_be_others_unless_labels_or_a_key_say(of, keys
     assert sum("as the vehicle file says" in line for line in lines) == len(keys)
 
 
+ASSUMED = {
+    (False, None): [
+        "other_laws: true, other laws may fly (logs of healthy flight do not tell)",
+        "moving_air: true, the air may move (logs of healthy flight do not tell)",
+    ],
+    (True, None): [
+        "other_laws: false, as fitted (labels show faults under it)",
+        "moving_air: false, as fitted (labels show faults under it)",
+    ],
+    (False, True): [
+        "other_laws: true, as the vehicle file says", "moving_air: true, as the vehicle file says",
+    ],
+    (True, False): [
+        "other_laws: false, as the vehicle file says", "moving_air: false, as the vehicle file says",
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("airspeeds", ["none", "of one flight", "with a reference"])
+@pytest.mark.parametrize(("labelled", "told"), ASSUMED)
+def test_what_is_assumed_is_told_with_its_reason(labelled, told, airspeeds):
+    """Of two flights, the second of which has labels or an airspeed, if any has."""
+    model = small.model(small.WING)
+    flight = small.flight(model, n=60)
+    bare = replace(flight, labels=np.full_like(flight.labels, np.nan), airspeed=None)
+    partly = np.where(np.arange(60)[:, None] < 50, np.nan, flight.labels)
+    other = replace(
+        flight,
+        labels=partly if labelled else bare.labels,
+        airspeed=None if airspeeds == "none" else np.full(60, 20.0),
+    )
+    keys = {} if told is None else {"other_laws": told, "moving_air": told}
+    keys |= {"reference_airspeed_mps": 20.0} if airspeeds == "with a reference" else {}
+    given = small.vehicle(small.WING, **keys)
+    vehicle, lines = with_assumed_law_and_air([bare, other], given)
+    taken = (not labelled) if told is None else told
+    assert vehicle == given.model_copy(update={"other_laws": taken, "moving_air": taken})
+    last = {
+        "none": ["reference_airspeed_mps: none, the airspeed is not logged"],
+        "of one flight": ["reference_airspeed_mps: none, the airspeed explains no more"],
+        "with a reference": [],
+    }
+    assert lines == ASSUMED[labelled, told] + last[airspeeds]
+
+
 def test_a_log_is_read_finely_unless_the_air_stands_still_or_labels_show_faults():
     rates = [small.vehicle(of, **keys).max_sample_rate_hz for of, keys in (
         (BARE, {}), (small.WING, {}), (BARE, {"moving_air": False}), (small.WING, {"moving_air": True}),

@@ -435,3 +435,204 @@ def test_the_remarks_on_the_rates_of_every_flight_are_in_the_error():
     flights = [SimpleNamespace(samples=SimpleNamespace(notes=of)) for of in notes]
     said = identification._rate_mistakes_text(flights, MODEL)
     assert said == "; q_rad_s: in deg/s; r_rad_s: late; p_rad_s: late"
+
+
+def scored(left_out, *values):
+    return {"left_out": left_out, "samples": 9, "score": dict(zip(SCORES, values, strict=True))}
+
+
+SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds", "side")
+FOLDS = [
+    scored("one", 0.9, 0.7, 0.05, 0.95, 0.1), {"left_out": "two", "samples": 0},
+    scored("three", 0.6, 0.8, 0.01, 0.85, 0.2), scored("four", 0.75, 0.3, 0.03, 0.9, 0.3),
+]  # fmt: skip
+
+
+def test_what_is_to_be_expected_of_another_day_is_mean_and_worst_of_what_was_left_out(monkeypatch):
+    """The worst is the least, of the error the most; alarms are counted where there is a tail and a
+    threshold, by the rate that was asked for, none where none was; what a fit said of it comes along."""
+    expected = {
+        "classes": {"mean": pytest.approx(0.75), "worst": 0.6},
+        "healthy_or_faulty": {"mean": pytest.approx(0.6), "worst": 0.3},
+        "mean_error": {"mean": pytest.approx(0.03), "worst": 0.05},
+        "held_by_bounds": {"mean": pytest.approx(0.9), "worst": 0.85},
+    }
+    assert identification.another_day_scores_and_false_alarms(FOLDS, MODEL) == expected
+    assert identification.another_day_scores_and_false_alarms(FOLDS[1:2], MODEL) == {}
+    tail = SimpleNamespace(healthy_minutes=11.5)
+    monkeypatch.setattr(
+        identification.extremes, "expected_false_alarms_per_hour",
+        lambda of, threshold: identification.extremes.ExpectedFalseAlarmsPerHour(
+            threshold * of.healthy_minutes, 0.25, 6.5
+        ),
+    )  # fmt: skip
+    monkeypatch.setattr(
+        identification.extremes, "missing_healthy_minutes", lambda of, rate: 100.0 * rate + of.healthy_minutes
+    )
+    for rate, asked in ((3.0, 3.0), (None, 0.0)):
+        settings = SimpleNamespace(alarm_threshold=2.0, false_alarms_per_hour=rate)
+        model = SimpleNamespace(
+            fitted_ranges=SimpleNamespace(alarm_peak_tail=tail), settings=settings,
+            identification_results={"parts": 7, "alarmed": 2},
+        )  # fmt: skip
+        found = identification.another_day_scores_and_false_alarms(FOLDS, model)
+        assert found == expected | {
+            "false_alarms_per_hour": {"asked": asked, "value": 23.0, "low": 0.25, "high": 6.5},
+            "minutes_left_out": 11.5, "minutes_missing": 100.0 * asked + 11.5, "parts": 7, "alarmed": 2,
+        }  # fmt: skip
+        for what in ("threshold", "tail", "ranges"):
+            lacking = SimpleNamespace(**vars(model))
+            if what == "threshold":
+                lacking.settings = SimpleNamespace(alarm_threshold=None, false_alarms_per_hour=rate)
+            else:
+                lacking.fitted_ranges = SimpleNamespace(alarm_peak_tail=None) if what == "tail" else None
+            assert identification.another_day_scores_and_false_alarms(FOLDS, lacking) == expected
+
+
+def test_each_further_flight_has_its_commands_compared_with_those_of_the_first(monkeypatch):
+    flights = [small.flight(MODEL, 80, seed=seed, name=f"flight {seed}") for seed in (1, 2, 3)]
+    asked = []
+    monkeypatch.setattr(
+        identification.trust, "refuse_commands_in_other_unit", lambda *these: asked.append(these)
+    )
+    monkeypatch.setattr(identification.trust, "central_ranges", lambda values: values[:2].tolist())
+    identification._check_command_units_alike(flights, MODEL.vehicle)
+    assert [name for name, *_ in asked] == ["flight 2", "flight 3"]
+    for (_, commands, rates, ranges, surfaces), flight in zip(asked, flights[1:], strict=True):
+        assert (commands is flight.commands, rates is flight.rates) == (True, True)
+        assert ranges.command_ranges == flights[0].commands[:2].tolist()
+        assert ranges.rate_ranges_rad_s == flights[0].rates[:2].tolist()
+        assert surfaces == ["right", "left"]
+
+
+def by_table(monkeypatch, criteria):
+    """Criteria by the reference airspeed, and by the powers of right and left, instead of fits."""
+    asked = []
+
+    def least(flights, vehicle):
+        if vehicle.reference_airspeed_mps is None:
+            key = "plain"
+        else:
+            powers = tuple(vehicle.airspeed_powers.get(name, 2.0) for name in ("right", "left"))
+            expected = (flights[0].airspeed[0] / vehicle.reference_airspeed_mps) ** np.array(powers)
+            if not vehicle.moving_air:  # commands are scaled by what is tried
+                np.testing.assert_allclose(flights[0].commands[0], FLOWN.commands[0] * expected)
+            key = powers
+        asked.append(key)
+        return criteria[key]
+
+    monkeypatch.setattr(identification, "_min_bic", least)
+    return asked
+
+
+FLOWN = replace(small.flight(MODEL, 60), airspeed=np.linspace(15.0, 25.0, 60))
+SPEEDY = MODEL.vehicle.model_copy(update={"airspeed": "V"})
+
+
+@pytest.mark.parametrize(("scaled", "taken"), [(90.0, True), (90.1, False), (110.0, False)])
+def test_commands_are_scaled_where_that_explains_decisively_more(monkeypatch, scaled, taken):
+    """By ten at least of the criterion; of a vehicle that leaves laws and air open they stay open."""
+    asked = by_table(monkeypatch, {"plain": 100.0, (2.0, 2.0): scaled})
+    (found,), vehicle = scale_by_dynamic_pressure_if_better([FLOWN], SPEEDY)
+    assert asked == ["plain", (2.0, 2.0)]
+    assert vehicle.reference_airspeed_mps == (20.0 if taken else None)
+    assert (vehicle.other_laws, vehicle.moving_air, vehicle.airspeed_powers) == (None, None, {})
+    ratio = (FLOWN.airspeed / 20.0)[:, None] ** 2 if taken else 1.0
+    np.testing.assert_allclose(found.commands, FLOWN.commands * ratio)
+
+
+@pytest.mark.parametrize(("of_right", "of_left", "powers"), [
+    ((45.0, 39.9, 39.8), (30.0, 39.9, 29.0), {"right": 3.0, "left": 3.0}),
+    ((20.0, 25.0, 20.0), (20.5, 19.0, 19.5), {"right": 0.0, "left": 1.0}),
+    ((40.0, 40.1, 60.0), (39.0, 40.0, 41.0), {"left": 0.0}),
+    ((41.0, 42.0, 43.0), (44.0, 45.0, 46.0), {}),
+])  # fmt: skip
+def test_the_power_of_each_surface_is_the_best_of_those_that_are_decisively_better(
+    monkeypatch, of_right, of_left, powers
+):
+    """Than the square, whose criterion is 50: of the powers 0, 1 and 3, the right surface first."""
+    right = powers.get("right", 2.0)
+    criteria = {(power, 2.0): of for power, of in zip((0.0, 1.0, 3.0), of_right, strict=True)}
+    criteria |= {(right, power): of for power, of in zip((0.0, 1.0, 3.0), of_left, strict=True)}
+    asked = by_table(monkeypatch, {"plain": 100.0, (2.0, 2.0): 50.0} | criteria)
+    told = SPEEDY.model_copy(update={"other_laws": True, "moving_air": False})
+    (found,), vehicle = scale_by_dynamic_pressure_if_better([FLOWN], told)
+    assert vehicle.airspeed_powers == powers
+    assert asked == ["plain", (2.0, 2.0), (2.0, 2.0), *criteria]
+    by = np.array([powers.get(name, 2.0) for name in ("right", "left")])
+    np.testing.assert_allclose(found.commands, FLOWN.commands * (FLOWN.airspeed / 20.0)[:, None] ** by)
+    assert (vehicle.other_laws, vehicle.moving_air, vehicle.reference_airspeed_mps) == (True, False, 20.0)
+
+
+def test_in_moving_air_powers_are_compared_in_white_and_given_back_as_they_are(monkeypatch):
+    """By the colour and the weight of each flight as it is with the square."""
+    colours = {"a": ((1.0, 0.5), 1.5), "b": ((1.0, -0.8, 0.16), 0.75)}
+    flights = [replace(FLOWN, name=name) for name in colours]
+    monkeypatch.setattr(
+        identification, "whiten_flights",
+        lambda these, vehicle: [identification.whiten_samples(one, *colours[one.name]) for one in these],
+    )  # fmt: skip
+    seen = []
+
+    def least(these, vehicle):
+        seen.append([(one.noise_ma_coefficients, one.fit_weight) for one in these])
+        return 100.0 if vehicle.reference_airspeed_mps is None else 50.0
+
+    monkeypatch.setattr(identification, "_min_bic", least)
+    told = SPEEDY.model_copy(update={"other_laws": True, "moving_air": True})
+    found, vehicle = scale_by_dynamic_pressure_if_better(flights, told)
+    assert seen == [[((), 1.0)] * 2] * 2 + [[*colours.values()]] * 7
+    assert (vehicle.airspeed_powers, [one.noise_ma_coefficients for one in found]) == ({}, [(), ()])
+    np.testing.assert_allclose(found[1].commands, FLOWN.commands * (FLOWN.airspeed / 20.0)[:, None] ** 2)
+
+
+def test_what_an_identification_is_of_goes_through_its_steps_in_order(monkeypatch):
+    """Whitened flights are fitted, the model is checked before its ranges are, all that is said is of them."""
+    its, flights = MODEL.vehicle.model_copy(update={"other_laws": True}), [FLOWN]
+    steps, usable = [], [SimpleNamespace(samples=FLOWN, is_usable=np.arange(60) % 3 > 0)]
+
+    def step(name, answer):
+        def said(*these):
+            steps.append((name, *these))
+            return answer
+
+        return said
+
+    fitted, ranged = MODEL.model_copy(update={"rate_hz": 11.0}), MODEL.model_copy(update={"rate_hz": 12.0})
+    heard = MODEL.model_copy(update={"rate_hz": 13.0, "identification_results": {"parts": 2}})
+    monkeypatch.setattr(identification, "_check_command_units_alike", step("units", None))
+    monkeypatch.setattr(identification, "whiten_flights", step("white", ["white"]))
+    monkeypatch.setattr(fitting, "flights_with_usable_rows", step("usable", usable))
+    monkeypatch.setattr(fitting, "fit_model", step("fit", fitted))
+    monkeypatch.setattr(fitting, "prediction_quality_by_fold", step("quality", ["quality"]))
+    monkeypatch.setattr(identification, "check_explained_variance", step("explained", None))
+    monkeypatch.setattr(fitting, "add_fitted_ranges_and_alarm_threshold", step("ranges", ranged))
+    monkeypatch.setattr(identification, "add_unseen_noise_models", step("unseen", heard))
+    monkeypatch.setattr(fitting, "score_folds_and_choose_credible_mass", step("folds", (["fold"], 0.875)))
+    told = {
+        "another_day": "another_day_scores_and_false_alarms", "collinear": "collinear_regressors",
+        "colour": "median_standard_error_inflation_by_axis", "spectrum": "residual_to_white_density_by_band",
+        "output_error": "fit_output_error",
+    }  # fmt: skip
+    for key, function in told.items():
+        monkeypatch.setattr(identification, function, step(key, f"said of {key}"))
+    found = identify(flights, its)
+    known = its.model_copy(update={"moving_air": False})
+    assert steps == [
+        ("units", flights, known), ("white", flights, known), ("usable", ["white"]), ("fit", usable, known),
+        ("quality", usable, fitted), ("explained", ["quality"], usable, fitted), ("ranges", usable, fitted),
+        ("unseen", ranged, flights), ("folds", usable, heard), ("another_day", ["fold"], heard),
+        ("collinear", usable, heard), ("colour", usable, heard), ("spectrum", usable, heard),
+        ("output_error", usable, [[0], [1]]),
+    ]  # fmt: skip
+    assert (found.rate_hz, found.settings.credible_mass) == (13.0, 0.875)
+    assert found.settings == heard.settings.model_copy(update={"credible_mass": 0.875})
+    assert found.identification_results == {
+        "assumed": [
+            "other_laws: true, as the vehicle file says",
+            "moving_air: false, as fitted (labels show faults under it)",
+            "reference_airspeed_mps: none, the airspeed explains no more",
+        ],
+        "flights": [{"name": "small", "samples": 40, "of": 60, "notes": []}], "tests": ["fold"],
+        **{key: f"said of {key}" for key in told},
+    }  # fmt: skip

@@ -13,16 +13,21 @@ from beaver_ftc_logs.model import FittedRanges, NoiseModel, load_model, model_fi
 from beaver_ftc_logs.regression import unexplained_rates_and_responses, whitened_rates_and_responses
 from beaver_ftc_logs.samples import whiten_samples
 from products.logs import small
+from telling import numbers
 
 AVERAGE = (1.0, -1.4, 0.49)
 
 
 def test_a_whitened_flight_averages_to_what_it_was():
     """C(z) of the filtered is C(1) times what was measured, sample by sample; a gap begins anew."""
-    flight = small.flight(small.model(), 80)
+    flight = small.flight(small.model(small.TAIL), 80)
     flight.rates[50] = np.nan
-    found = whiten_samples(replace(flight, stretch_number=(np.arange(80) >= 30).astype(np.int64)), AVERAGE)
-    for now, was in ((found.rates, flight.rates), (found.commands, flight.commands)):
+    gap = replace(flight, stretch_number=(np.arange(80) >= 30).astype(np.int64))
+    found = whiten_samples(gap, AVERAGE, 1.7)
+    assert (found.noise_ma_coefficients, found.fit_weight) == (AVERAGE, 1.7)
+    assert whiten_samples(gap, list(AVERAGE)).fit_weight == 1.0
+    columns = ("rates", "commands", "signals")
+    for now, was in ((getattr(found, name), getattr(flight, name)) for name in columns):
         again = now[2:] + AVERAGE[1] * now[1:-1] + AVERAGE[2] * now[:-2]
         inside = np.setdiff1d(np.arange(2, 80), [30, 31, 50, 51, 52])
         np.testing.assert_allclose(again[inside - 2], sum(AVERAGE) * was[inside], atol=1e-12)
@@ -296,6 +301,94 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     for j in (1, 2, 5):
         expected = -((-g1 / innovation) ** j)
         np.testing.assert_allclose(before.reshape(-1, 3, 3)[j - 1], np.diag(expected), atol=1e-6)
+
+
+def test_of_coupled_axes_and_two_lags_the_colour_of_gyro_noise_is_that_of_its_covariance():
+    """Against one large matrix: what the residuals of 6 samples are of the gyro's noise of 9 of them."""
+    past = [numbers(3, 3, seed=seed, size=0.2) for seed in (1, 2)]
+    model, gyro, lags = small.model(past=np.vstack(past).tolist()), 0.03, 5
+    root = np.array([[0.02, 0.0, 0.0], [0.007, 0.03, 0.0], [-0.004, 0.011, 0.05]])
+    process = root @ root.T
+    of_noise = np.zeros((3 * (lags + 1), 3 * (lags + 3)))
+    for k in range(lags + 1):  # the latest sample first, of rows w[k] = v[k] - v[k-1] A1 - v[k-2] A2
+        rows = slice(3 * k, 3 * k + 3)
+        of_noise[rows, rows] = np.eye(3)
+        for lag, share in enumerate(past, 1):
+            of_noise[rows, 3 * (k + lag) : 3 * (k + lag) + 3] = -share.T
+    covariance = gyro**2 * of_noise @ of_noise.T + np.kron(np.eye(lags + 1), process)
+    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, process, gyro, lags)
+    expected = np.linalg.solve(covariance[3:, 3:], covariance[3:, :3])
+    np.testing.assert_allclose(before, expected, atol=1e-9)
+    np.testing.assert_allclose(noise, covariance[:3, :3] - covariance[:3, 3:] @ expected, atol=1e-12)
+    assert np.abs(before).min() > 1e-5
+
+
+def test_noisier_gyros_are_added_to_the_quietest_noise_and_as_wide_as_the_widest(moving):
+    """Each with the predictor of as many lags as the fit has, by the covariance of least determinant."""
+    quiet, loud = np.diag([1.0, 2.0, 3.0]) * 1e-6, np.diag([0.5, 9.0, 8.0]) * 1e-6
+    known = [
+        NoiseModel(average=[1.0], noise=loud.tolist(), wider=1.5),
+        NoiseModel(average=[1.0, 0.5], noise=quiet.tolist(), wider=2.5),
+        NoiseModel(average=list(AVERAGE), noise=loud.tolist(), wider=1.25),
+    ]
+    model = moving.model_copy(update={"noise_models": known})
+    found = identification.add_unseen_noise_models(model, []).noise_models
+    assert found[:3] == known
+    assert len(found) == 3 + 7
+    for one, gyro in zip(found[3:], np.geomspace(1e-5, 1e-2, 7), strict=True):
+        before, noise = gyro_noise.residual_predictor_by_yule_walker(model, quiet, gyro, 20)
+        assert (one.ma_coefficients, one.covariance_inflation) == ([1.0], 2.5)
+        np.testing.assert_allclose(one.ar_coefficients, before, atol=1e-12)
+        np.testing.assert_allclose(one.residual_covariance, noise, atol=1e-15)
+
+
+def test_flights_weigh_by_what_their_own_colour_leaves_of_the_mean(monkeypatch):
+    """A sixth of the log determinant is a size. Colours that are as they were before end the rounds."""
+    flights = [replace(small.flight(small.model(), 30), name=name) for name in "abc"]
+    first = {"a": (1.0,), "b": (1.0, 0.5), "c": AVERAGE}
+    rounds = [
+        {"a": (2.0, (1.0, 0.5)), "b": (5.0, (1.0, 0.5)), "c": (-1.0, AVERAGE)},
+        {"a": (1.0, (1.0, 0.5)), "b": (4.0, (1.0, 0.5)), "c": (4.0, (1.0,))},
+        {"a": (7.0, (1.0, 0.5)), "b": (8.0, (1.0, 0.5)), "c": (9.0, (1.0,))},
+    ]
+    asked = []
+
+    def best(usable_flights, vehicle, lags, coefficients):
+        (one,) = usable_flights
+        asked.append(one.samples.name)
+        assert one.samples.noise_ma_coefficients == ()  # of the flight as it was logged
+        return rounds[(len(asked) - 1) // 3][one.samples.name]
+
+    monkeypatch.setattr(identification, "_choose_noise_ma_coefficients", lambda one, *_: first[one.name])
+    monkeypatch.setattr(identification, "_log_determinant_and_best_ma_coefficients", best)
+    found = identification.whiten_flights(flights, VEHICLE)
+    assert asked == list("abcabcabc")
+    mean = (1.0 + 4.0 + 4.0) / 3.0  # of the second round, whose colours the third confirms
+    for one, flight in zip(found, flights, strict=True):
+        left, colour = rounds[1][one.name]
+        assert one.noise_ma_coefficients == colour
+        assert one.fit_weight == pytest.approx(np.exp((mean - left) / 6.0))
+        np.testing.assert_array_equal(one.rates, whiten_samples(flight, colour).rates)
+    monkeypatch.setattr(identification, "_MAX_WHITENING_ROUNDS", 1)
+    asked.clear()
+    found = identification.whiten_flights(flights, VEHICLE)
+    assert [one.fit_weight for one in found] == pytest.approx(
+        np.exp([(2.0 - left) / 6.0 for left in (2, 5, -1)])
+    )
+
+
+@pytest.mark.parametrize("colour", [(1.0,), (1.0, 0.5), (1.0, -1.6, 0.64)])
+def test_the_colour_of_a_residual_leaves_least_of_it_and_how_much_is_told_by_its_size(monkeypatch, colour):
+    """Of white noise of known size through C(z) / C(1); the size is that of the noise."""
+    rng, size, n = np.random.default_rng(6), np.array([0.1, 0.2, 0.3]), 1500
+    white = size * rng.standard_normal((n + 2, 3))
+    noise = sum(c * white[2 - lag : n + 2 - lag] for lag, c in enumerate(colour)) / sum(colour)
+    regressors, coefficients = rng.standard_normal((n, 4)), numbers(4, 3, seed=3)
+    answer = regressors, noise + regressors @ coefficients, None
+    monkeypatch.setattr(fitting, "stacked_regression_data", lambda *_: answer)
+    left, found = identification._log_determinant_and_best_ma_coefficients([], VEHICLE, (1, 1), coefficients)
+    assert found == pytest.approx(colour)
+    assert left == pytest.approx(2.0 * np.log(size).sum(), abs=0.3)
 
 
 def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):

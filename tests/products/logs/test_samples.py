@@ -432,6 +432,8 @@ def test_a_sample_is_clipped_where_any_of_its_rates_was_at_its_last_row(axis):
     rows = 1 + 3 * np.arange(19)
     assert found.tolist() == [21 <= row < 30 for row in rows]
     assert not of._is_rate_clipped(rates, np.array([-1.0])).any()
+    log = recording(**dict(zip(small.RATES.values(), rates, strict=True)))
+    assert np.flatnonzero(of.resample(log, WING).is_rate_clipped).tolist() == [*range(21, 30)]
 
 
 def test_how_long_a_column_has_stood_still_counts_its_age():
@@ -568,3 +570,22 @@ def test_of_a_log_in_parts_every_so_many_stretch_is_kept(monkeypatch):
     assert (found.name, found.n_log_parts) == ("long", 9)
     monkeypatch.setattr(of, "read_parts_for_vehicle", lambda *asked: parts[:1])
     assert of._read_flight_for_fit(of.Path("logs/short.csv"), WING, None) is parts[0]
+
+
+def test_flights_come_one_by_one_and_a_long_one_in_all_its_parts(monkeypatch):
+    """What a fit took of the long one is not what is diagnosed."""
+    flights = [filled(name=name, n_log_parts=parts)[0] for name, parts in (("a", 1), ("b", 3), ("c", 1))]
+    asked = []
+
+    def parts_of(path, vehicle, reader_name):
+        asked.append((path, vehicle, reader_name))
+        return iter(["b-1", "b-2", "b-3"])
+
+    paths = [of.Path(name) for name in "abc"]
+    loaded = flights, (paths, WING, "ulog")
+    monkeypatch.setattr(of, "load_flights_for_fit", lambda *given: loaded[0] if given == loaded[1] else [])
+    monkeypatch.setattr(of, "read_parts_for_vehicle", parts_of)
+    monkeypatch.setattr(of, "resample", lambda recording, vehicle: (recording, vehicle))
+    found = [*of.stream_flights(paths, WING, "ulog")]
+    assert found == [flights[0], *((part, WING) for part in ("b-1", "b-2", "b-3")), flights[2]]
+    assert asked == [(paths[1], WING, "ulog")]

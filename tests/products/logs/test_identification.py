@@ -587,7 +587,7 @@ def test_in_moving_air_powers_are_compared_in_white_and_given_back_as_they_are(m
 
 
 def test_what_an_identification_is_of_goes_through_its_steps_in_order(monkeypatch):
-    """Whitened flights are fitted, the model is checked before its ranges are, all that is said is of them."""
+    """Whitened flights are fitted, then checked, then measured for ranges; all that is said is of them."""
     its, flights = MODEL.vehicle.model_copy(update={"other_laws": True}), [FLOWN]
     steps, usable = [], [SimpleNamespace(samples=FLOWN, is_usable=np.arange(60) % 3 > 0)]
 

@@ -134,7 +134,7 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     file = tmp_path / "trainer/aircraft.yaml"
     text = yaml.safe_load(file.read_text())
     del text["forces"]
-    text["damage"] = {"tip-off": {"property": "failures/damage/tip-off", "takes": ["aileron"]}}
+    text["damage"] = {"tip-off": {"property": "failures/unanticipated/Cm-alpha3", "takes": ["aileron"]}}
     file.write_text(yaml.safe_dump(text))
     monkeypatch.chdir(tmp_path)
     loop = Loop(

@@ -284,13 +284,13 @@ def _sampled_energy_height_rate_mps(
 
 def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
-    columns, attitude_columns, mistake = recording.columns, vehicle.attitude, None
+    columns, attitude_settings, mistake = recording.columns, vehicle.attitude, None
     rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
     if (
-        attitude_columns
+        attitude_settings
         and not signals.find_clipped_rows(next(iter(rate_column_by_name.values())).values).any()
     ):
-        angle_quantities = [attitude_columns.roll, attitude_columns.pitch, attitude_columns.yaw]
+        angle_quantities = [attitude_settings.roll, attitude_settings.pitch, attitude_settings.yaw]
         named_angle_columns_or_none = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
             for quantity in angle_quantities

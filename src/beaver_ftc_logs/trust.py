@@ -57,7 +57,7 @@ def compute_fitted_ranges(
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
     used; held_out_gain_standard_errors (G,) and held_out_max_noise_variance_scale: of parts not fitted."""
-    group_surface_indices = regression.surface_indices_of_each_group(model)
+    surface_indices_by_group = regression.surface_indices_of_each_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
     used_airspeeds = [
@@ -66,7 +66,7 @@ def compute_fitted_ranges(
         if samples.airspeed is not None
     ]
     group_commands = np.column_stack(
-        [commands[:, surface_indices].sum(axis=1) for surface_indices in group_surface_indices]
+        [commands[:, surface_indices].sum(axis=1) for surface_indices in surface_indices_by_group]
     )
     return FittedRanges(
         commands=central_ranges(commands),
@@ -166,7 +166,7 @@ def _effect_and_unexplained_powers(
 ) -> tuple[Floats, Floats]:
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
-    group_surface_indices = regression.surface_indices_of_each_group(model)
+    surface_indices_by_group = regression.surface_indices_of_each_group(model)
     lag_counts_and_label_scaling = (
         model.n_rate_lags,
         model.n_command_lags,
@@ -174,7 +174,7 @@ def _effect_and_unexplained_powers(
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     regressors_and_predictability_by_flight = [
-        regression.build_regressors(flight, group_surface_indices, *lag_counts_and_label_scaling)
+        regression.build_regressors(flight, surface_indices_by_group, *lag_counts_and_label_scaling)
         for flight, _ in flights_with_used_rows
     ]
     is_row_used_by_flight = [
@@ -202,12 +202,12 @@ def _effect_and_unexplained_powers(
     response_coefficients = np.array(model.command_response)
     residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
-    effect_power = np.zeros(len(group_surface_indices))
-    power_unexplained_by_other_regressors = np.zeros(len(group_surface_indices))
-    for group_index in range(len(group_surface_indices)):
+    effect_power = np.zeros(len(surface_indices_by_group))
+    power_unexplained_by_other_regressors = np.zeros(len(surface_indices_by_group))
+    for group_index in range(len(surface_indices_by_group)):
         other_lagged_commands = [
             lagged_group_commands[:, other_group_index]
-            for other_group_index in range(len(group_surface_indices))
+            for other_group_index in range(len(surface_indices_by_group))
             if other_group_index != group_index
         ]
         other_regressors = np.column_stack(

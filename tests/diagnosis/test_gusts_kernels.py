@@ -110,21 +110,21 @@ def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(tur
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
     assert (
-        not 0.8 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE
+        not 0.8 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
         < walk
-        < 1.3 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE
+        < 1.3 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
     )
     assert (
         bool(record["memory"]["has_fast_axes_turn"])
         == swings
-        == (walk > gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE)
+        == (walk > gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN)
     )
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
     record = new_air(gust_axes_in_body=np.eye(3))
-    most = np.sqrt(2.0 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE) * 45.0 / ROLLING
+    most = np.sqrt(2.0 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN) * 45.0 / ROLLING
     record["memory"]["gust_axes_rate"] = np.eye(3)
     record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
     record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT

@@ -63,11 +63,11 @@ MIN_UNMEASURED_GUST_INTENSITY_SHARES = (1.0, 0.003, 0.03)
 UNMEASURED_SHARE_FROM_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
 ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
-MAX_GUST_VELOCITY_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
+MAX_GUST_VELOCITY_OVER_STD = 4.0  # limit of the estimated gust velocity, standard deviations
 MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
 MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
 # share of a gust's own intensity below which the turn of its axes is ignored
-MIN_GUST_AXES_TURN_INTENSITY_SHARE = 0.01
+MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN = 0.01
 
 GUST_CONFIG_RECORD = record(
     has_force_model=int,  # whether the design model has forces
@@ -248,7 +248,7 @@ def fill_axes_rate_and_fast_turn(gust, dt, V):
             )
     gust.memory.has_fast_axes_turn = (
         0.5 * (largest_turn_rate_magnitude_so_far * gust.config.rolling_gust_correlation_length / V) ** 2
-        > MIN_GUST_AXES_TURN_INTENSITY_SHARE
+        > MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
     )
 
 
@@ -840,7 +840,7 @@ def configure_gust_velocity_and_speed_error(
         2.0 * acceleration_error_bound**2 * gust_return_rate_per_s / gust_velocity_std_mps**2
     ) ** (1.0 / 3.0)
     gust["config"]["gust_velocity_variance"] = gust_velocity_std_mps**2
-    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_SIGMA * gust_velocity_std_mps
+    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_OVER_STD * gust_velocity_std_mps
     gust["config"]["gust_velocity_decay_rate"] = gust_velocity_decay_rate
     gust["config"]["speed_error_variance"] = (
         gust_velocity_std_mps**2

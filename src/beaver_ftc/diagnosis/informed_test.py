@@ -172,7 +172,7 @@ def unit_term_acceleration(
         "qh": log_columns["q_rad_s"] * geometry.chord_m / V,
         "rh": log_columns["r_rad_s"] * geometry.span_m / (2.0 * V), term.surface: deflection_rad,
     }  # fmt: skip
-    unit_term_force = (
+    force_per_unit_coefficient = (
         log_columns["qdyn_pa"]
         * geometry.wing_area_m2
         * prod(value_by_factor_name[factor] for factor in term.factors)
@@ -182,4 +182,4 @@ def unit_term_acceleration(
         "Cm": (0.0, inertia_coefficient.Qm * geometry.chord_m, 0.0),
         "Cn": (inertia_coefficient.Pn * geometry.span_m, 0.0, inertia_coefficient.Rn * geometry.span_m),
     }[term.coefficient]
-    return np.multiply.outer(unit_term_force, acceleration_per_force)
+    return np.multiply.outer(force_per_unit_coefficient, acceleration_per_force)

@@ -418,10 +418,10 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
     method_titles = _method_titles(data_set)
     failure_of_flight = {entry["left_out"]: entry["failure"] for entry in data_set["flights"]}
-    distinct_surface_failures = [
+    distinct_failure_names = [
         failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
     ]
-    for i, surface_failure in enumerate(distinct_surface_failures):
+    for i, surface_failure in enumerate(distinct_failure_names):
         entries_of_failure = [
             entry
             for entry in data_set["flights"]
@@ -432,7 +432,7 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
             for entry in entries_of_failure
         ]
         heights_in_method_rows = [
-            method_titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
+            method_titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_failure_names) - 0.5)
             for entry in entries_of_failure
         ]
         label = surface_failure.replace("_", " ").replace("+", " + ")

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.rivals.kalman import TurbulenceModel
-from beaver_ftc.diagnosis.rivals.observer import SurfaceFit, healthy_residual_std
+from beaver_ftc.diagnosis.rivals.observer import FadingSurfaceFits, healthy_residual_std
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
 
@@ -239,7 +239,7 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
     rng = np.random.default_rng(3)
     eps, Omega = rng.normal(size=(40, 3)), rng.normal(size=(40, 3, 3))
     eps += -0.4 * Omega[:, :, 1]
-    fit = SurfaceFit(1.0)
+    fit = FadingSurfaceFits(1.0)
     for e, omega in zip(eps, Omega, strict=True):
         fit.step(e, omega)
     surface, theta, misfit = fit.fit_best_surface()
@@ -254,7 +254,7 @@ def test_a_surface_loses_no_more_than_all_its_effect_and_gains_none(share, theta
     """One surface acts, on roll: of eps = share Omega what the bound of theta leaves over is the misfit."""
     Omega = np.zeros((3, 3))
     Omega[0, 2] = 2.0
-    fit = SurfaceFit(1.0)
+    fit = FadingSurfaceFits(1.0)
     for _ in range(5):
         fit.step(share * Omega[:, 2], Omega)
     _, found, misfit = fit.fit_best_surface()

@@ -512,9 +512,11 @@ def advance_fdae(fdae, bound_record, x, predicted_acceleration, is_fault_detecte
     if is_fault_detected:
         train_network(fdae.network, fdae.output.residual, fdae.output.threshold, do_weights_leak, dt)
     for i in range(3):
-        estimated_acceleration = predicted_acceleration[i] + fdae.network.output[i]
+        acceleration_with_network_output = predicted_acceleration[i] + fdae.network.output[i]
         decay_factor = fdae.config.decay_factor[i]
-        fdae.memory.xhat[i] = x[i] + dt * estimated_acceleration + decay_factor * (fdae.memory.xhat[i] - x[i])
+        fdae.memory.xhat[i] = (
+            x[i] + dt * acceleration_with_network_output + decay_factor * (fdae.memory.xhat[i] - x[i])
+        )
         fdae.memory.threshold_uncertainty_part[i] = advance_residual_bound(
             fdae.memory.threshold_uncertainty_part[i], bound_record.eta_bar[i], decay_factor, dt
         )

@@ -573,7 +573,7 @@ def gust_estimate_of_view(view, gust, inertial_gust):
 
 
 @kernel
-def fill_gust_sensitivity(view, forces, rate_damping):
+def fill_air_rotation_sensitivity(view, forces, rate_damping):
     """Fill `rate_gust_sensitivity` and `force_gust_sensitivity` (3,), 1/s: the gust sensitivity of a view.
 
     It is the projected acceleration per rad/s of rotation of the air about each body axis. rate_damping (3,
@@ -627,7 +627,7 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
             + force_record.force_flow_lag_error_bound
         )
     if gust.output.accounts_for_gusts:
-        fill_gust_sensitivity(view, forces, gust.output.rate_damping)
+        fill_air_rotation_sensitivity(view, forces, gust.output.rate_damping)
         if subtracts_gust_estimate(view, gust):
             drift_intensity += remaining_gust_drift_intensity(
                 gust_estimate_of_view(view, gust, inertial_gust),

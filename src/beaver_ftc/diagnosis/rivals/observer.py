@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 
 
-class SurfaceFit:
+class FadingSurfaceFits:
     """Fading sums of residual and regressors, and what each surface makes of them.
 
     J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold.
@@ -109,7 +109,7 @@ class ConstantThresholdObserver:
             np.zeros((3, 3)),
         )
         self.previous_rates: np.ndarray | None = None
-        self.surface_fit = SurfaceFit(exp(-context.dt_s / self.options["window_s"]))
+        self.surface_fit = FadingSurfaceFits(exp(-context.dt_s / self.options["window_s"]))
         self.alarm_at_s: float | None = None
         self.alarm_axis, self.isolation_verdict = "p", Verdict()
 

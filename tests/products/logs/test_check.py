@@ -216,6 +216,10 @@ def test_of_several_logs_each_is_told_and_the_first_guess_is_proposed(tmp_path):
     assert lines[:3] == [f"{none}: cannot be used so", f"  {says}", f"{good}: can be used"]
     assert lines[-1] == f"vehicle file: {out}"
     assert f"{other}: can be used" in lines
+    assert list(yaml.safe_load(out.read_text())["surfaces"]) == [
+        "roll_cmd",
+        "pitch_cmd",
+    ]  # those of the first
     document = json.loads(run(*asked, none, good, other, "--format", "json").stdout)
     assert [(one["log"], one["usable"]) for one in document["logs"]] == [
         (str(none), False), (str(good), True), (str(other), True),

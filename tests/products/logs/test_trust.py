@@ -229,6 +229,9 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
     assert "explains less of p than the mean does (p -17.375)" in said
     assert said.endswith("follows; q_rad_s: stands still for 600 s")
     assert "more than these 1.9 min" in said
+    two = [tests[0], tests[1] | {"explained": {"p": 0.5, "q": -0.1, "r": -0.5}}]
+    with pytest.raises(BadInput, match=r"less of p, r than the mean does \(p -17\.375, r -0\.350\)"):
+        identification.check_explained_variance(two, usable_flights, small.model())
     identification.check_explained_variance(
         tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3,
         usable_flights,

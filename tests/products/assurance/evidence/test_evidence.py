@@ -351,7 +351,7 @@ def test_of_a_loops_margins_the_smaller_counts_upwards_and_downwards(
     ("value", "words"),
     [
         ([], "none"), (["a", 1.5], "a, 1.5"), ({"at_least": 2.5, "by_day": True}, "at least 2.5, by day yes"),
-        (False, "no"), (None, "none"), ("text", "text"),
+        ([True, None, {"at": 2}], "yes, none, at 2"), (False, "no"), (None, "none"), ("text", "text"),
     ],
 )  # fmt: skip
 def test_what_was_asked_and_found_in_words(value, words):

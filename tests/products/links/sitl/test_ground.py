@@ -180,7 +180,9 @@ def test_what_cannot_begin_on_the_ground():
     with pytest.raises(BadInput, match=r"fdi\.scheme: no plug-in knows that begins in flight"):
         Vehicle(base.with_({"fdi.scheme": "rls-monitor"}), pulses=True)
     low = base.with_({"initial.on_ground": None})
-    with pytest.raises(BadInput, match=r"initial\.altitude_m: 300 is at or below the ground at 299"):
+    with pytest.raises(
+        BadInput, match=r"altitude_m: 300 is at or below the ground at 299, allowed: above 305\.65,"
+    ):
         Vehicle(low, pulses=True, ground_m=299.0)
 
 

@@ -256,6 +256,9 @@ def test_by_which_names_it_is_called(host, names, monkeypatch):
         monkeypatch.setattr(serve.socket, "getaddrinfo", lambda *_, **__: found)
     with serve._listening(Place(host=host)) as listener:
         assert serve.names_of(listener, host) == names
+        if listener.family == socket.AF_INET6:  # every address: of both kinds, else those of its own
+            takes_one_kind = listener.getsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY)
+            assert bool(takes_one_kind) is (host != "::")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "0.0.0.0", "::"])

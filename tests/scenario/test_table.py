@@ -96,7 +96,9 @@ def test_what_is_no_file(tmp_path, file, says):
 
 
 def test_a_text_without_a_folder_has_no_files():
-    with pytest.raises(ScenarioError, match="no folder to read it from"):
+    with pytest.raises(
+        ScenarioError, match=r"reference\.q\[0\]\.csv\.file: there is no folder to read it from"
+    ):
         load_text("name: x\nreference: {q: [{csv: {file: ref.csv}}]}")
 
 

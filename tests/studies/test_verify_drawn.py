@@ -152,6 +152,7 @@ def test_what_is_missing_is_flown_in_chunks_and_told(unflown, tmp_path):
     [
         ("seed", 3, "another seed, allowed"),
         ("version", "0", "another version, a"),
+        ("code", "0", "another code, allowed"),
         ("schemes", [], "another schemes"),
     ],
 )

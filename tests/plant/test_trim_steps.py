@@ -114,6 +114,12 @@ def test_a_first_guess_carries_the_weight_with_no_pitching_moment():
         steps._first_guess(FlightState(50.0, 1000.0, aircraft=light), Plant(100, aircraft=light)).alpha_rad
         == -0.6
     )
+    beyond = trainer(forces={"CZ": [{"name": "CZ_0", "value": 1e308, "of": {}},
+                                    {"name": "CZ_alpha", "value": -4.7, "of": {"alpha": 1}}]})  # fmt: skip
+    assert (  # beside such a number no slope is left
+        steps._first_guess(FlightState(50.0, 1000.0, aircraft=beyond), Plant(100, aircraft=beyond)).alpha_rad
+        == 0.05
+    )
     bare = trainer(forces=None)
     assert (
         steps._first_guess(FlightState(50.0, 1000.0, aircraft=bare), Plant(100, aircraft=bare)).alpha_rad

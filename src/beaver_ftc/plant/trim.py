@@ -146,7 +146,9 @@ def _first_guess(wanted: FlightState, truth: Plant) -> FlightState:
     at_zero = aircraft.coefficient("Cm", of | {"alpha": alpha, pitch: 0.0})
     per_rad = aircraft.coefficient("Cm", of | {"alpha": alpha, pitch: 1.0}) - at_zero
     travel = aircraft.travel[pitch]
-    deflection = max(travel.min_rad, min(travel.max_rad, -at_zero / per_rad))
+    # a coefficient beyond all measure leaves no slope beside it: the search then says that there is no trim
+    balancing_rad = -at_zero / per_rad if per_rad else 0.0
+    deflection: Any = max(travel.min_rad, min(travel.max_rad, balancing_rad))
     return replace(wanted, alpha_rad=alpha, theta_rad=alpha, **{f"{pitch}_rad": deflection})
 
 
@@ -156,6 +158,8 @@ def _alpha_for_lift(aircraft: Aircraft, of: dict[str, float], truth: Plant) -> f
     lift = weight / (truth.read("aero/qbar-psf") * PA_PER_PSF * aircraft.geometry.wing_area_m2)
     at_zero = aircraft.coefficient("CZ", of)
     slope = (aircraft.coefficient("CZ", of | {"alpha": STEP_RAD}) - at_zero) / STEP_RAD
+    if not slope:
+        return _ALPHA_GUESS_RAD
     return max(-_ALPHA_LIMIT_RAD, min(_ALPHA_LIMIT_RAD, -(lift + at_zero) / slope))
 
 

@@ -980,9 +980,10 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
 def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
+    accounts_for_gusts = bool(statistical["gust"]["output"]["accounts_for_gusts"])
     subtracts_gust_estimate_from_rates = (
         forces["in_use"]
-        and statistical["gust"]["output"]["accounts_for_gusts"]
+        and accounts_for_gusts
         and all(
             aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
             for force_index in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
@@ -995,18 +996,16 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             view["confirming_force_component"] = (
                 NORMAL_FORCE if parity_direction.plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
             )
-        _configure_view(view, parity_direction, statistical)
+        _configure_view(view, parity_direction, accounts_for_gusts)
         rate_block = statistical["block"][
             PITCH_BLOCK if parity_direction.plane_axes == PITCH_AND_NORMAL_FORCE else LATERAL_BLOCK
         ]
         _configure_view_filter(view["block"], rate_block)
         _configure_view_regressors(view, parity_direction, rate_block, forces)
-        _configure_view_hypotheses(
-            view["block"], parity_direction, bool(statistical["gust"]["output"]["accounts_for_gusts"])
-        )
+        _configure_view_hypotheses(view["block"], parity_direction, accounts_for_gusts)
 
 
-def _configure_view(view: np.void, parity_direction: ParityDirection, statistical: np.void) -> None:
+def _configure_view(view: np.void, parity_direction: ParityDirection, accounts_for_gusts: bool) -> None:
     """Fill the direction of a view, the axis that its alarm names, and which errors it does not see."""
     is_axis_view = parity_direction.orthogonal_to_surface == AXIS_VIEW
     is_orthogonal_to_vane_error = parity_direction.orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
@@ -1020,7 +1019,7 @@ def _configure_view(view: np.void, parity_direction: ParityDirection, statistica
     view["is_orthogonal_to_rolling_gust"] = (
         is_orthogonal_to_vane_error
         and parity_direction.plane_axes == YAW_AND_SIDE_FORCE
-        and statistical["gust"]["output"]["accounts_for_gusts"]
+        and accounts_for_gusts
     )
     view["uses_inertial_flow_angle"] = parity_direction.uses_inertial_flow_angle
     view["is_immune_to_vane_error"] = parity_direction.uses_inertial_flow_angle or is_orthogonal_to_vane_error

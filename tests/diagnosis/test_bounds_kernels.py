@@ -17,6 +17,7 @@ from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import load as scenario
 from beaver_ftc.scenario.sensors import SIGNALS
 from flying import declared_in
+from telling import not_zero
 
 AIRCRAFT = load()
 
@@ -142,16 +143,6 @@ OTHERS = {
     "turbulence": "severe", "inertia_coupling": {"p": 0.1, "q": 0.2, "r": 0.3},
     "constant_rad_s2": {"p": 0.01, "q": 0.02, "r": 0.04},
 }  # fmt: skip
-
-
-def not_zero(record, path=""):
-    """{path: value} of all numbers of a record that are not zero."""
-    for name in record.dtype.names:
-        value = record[name]
-        if isinstance(value, np.void):
-            yield from not_zero(value, f"{path}{name}.")
-        elif value.dtype.names is None and np.any(value):
-            yield path + name, np.asarray(value)
 
 
 def bound_of(fault_class="all", bounds=None, **keys):

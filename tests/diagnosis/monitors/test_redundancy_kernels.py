@@ -29,6 +29,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, SENSORS
 from beaver_ftc.scenario.schema import Scenario
+from telling import not_zero
 
 H, GRAVITY, DRIFT, GUST = 0.02, 9.8, 2e-4, 0.7
 FLOWS = (ALPHA_FLOW_TEST, BETA_FLOW_TEST)
@@ -538,16 +539,6 @@ ERRORS = {
     "psi": {"drift_deg_h": 30.0}, "phi": {"drift_deg_h": -36.0}, "engine_rpm": {"bias_rpm": 4.0},
 }  # fmt: skip
 Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
-
-
-def not_zero(record, path=""):
-    """{path: value} of all numbers of a record that are not zero."""
-    for name in record.dtype.names:
-        value = record[name]
-        if isinstance(value, np.void):
-            yield from not_zero(value, f"{path}{name}.")
-        elif value.dtype.names is None and np.any(value):
-            yield path + name, np.asarray(value)
 
 
 def at_sensors(**values):

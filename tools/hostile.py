@@ -333,7 +333,7 @@ def run(case: Case) -> str:
     lines = [line for line in text.splitlines() if not line.startswith("beaver-ftc: ")]
     if cpu_s > MOST_CPU_S or size > MOST_BYTES:
         end = "WRONG, too much"
-    elif "Traceback" in text or "unexpected" in text or code not in (0, 1, 2, 3):
+    elif "Traceback" in text or re.search("^unexpected ", text, re.MULTILINE) or code not in (0, 1, 2, 3):
         end = "WRONG, broken"
     elif code in (2, 3) and not lines:
         end = "WRONG, without a line"

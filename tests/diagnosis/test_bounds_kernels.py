@@ -245,5 +245,6 @@ def test_surfaces_are_laid_out_by_axis_partner_and_estimator():
         without = SimpleNamespace(**{**vars(aircraft), "primary": primary})
         with pytest.raises(BadInput) as refused:
             state.configure_layout(layout, entries, without)
-        says = f"odd: no surface turns it most in {missing}, allowed: one for each axis"
+        allowed = "in `moments`, a term of some surface about each axis"
+        says = f"odd: no surface turns it in {missing}, allowed: {allowed}"
         assert str(refused.value) == says

@@ -150,10 +150,20 @@ def test_a_model_that_waits_is_refused(monkeypatch):
 
 
 def test_a_frame_that_takes_long_is_refused(monkeypatch):
-    clock = iter((0.0, 60 * 0.0021))
+    clock = iter((3.0, 3.69, 3.69 + 60 * 0.0021))
     monkeypatch.setattr(trial, "process_time", lambda: next(clock))
     monkeypatch.setattr(adapter, "bare", lambda model, absent: SimpleNamespace(run=lambda: True))
-    with pytest.raises(adapter.SimulationFailed, match=r"takes 2.1 ms of processor, allowed: up to 2 ms"):
+    with pytest.raises(adapter.SimulationFailed, match=r"takes 2.1 ms of processor, more than 2 ms"):
+        trial.probe(Path("m.xml"))
+
+
+def test_a_model_that_takes_long_to_load_is_refused_before_it_runs(monkeypatch):
+    """A command loads a new aircraft up to four times: its user waits four times as long."""
+    clock = iter((3.0, 3.75))
+    monkeypatch.setattr(trial, "process_time", lambda: next(clock))
+    monkeypatch.setattr(adapter, "bare", lambda model, absent: SimpleNamespace())
+    says = r"JSBSim takes 0.75 s of processor to load it, more than 0.7 s"
+    with pytest.raises(adapter.SimulationFailed, match=says):
         trial.probe(Path("m.xml"))
 
 

@@ -137,6 +137,12 @@ def test_an_elevator_that_cannot_is_guessed_at_its_stop():
         assert guess.elevator_rad == stop
 
 
+def test_an_aircraft_that_no_surface_turns_in_pitch_is_refused_before_a_trim_is_searched():
+    aircraft = trainer(moments={"Cm": [{"name": "Cm_0", "value": 0.1, "of": {}}]})
+    with pytest.raises(BadInput, match="no surface turns it in pitch, allowed: in `moments`"):
+        trim(50.0, 1000.0, plant=Plant(100, aircraft=aircraft))
+
+
 def test_a_quick_look_is_the_full_start_s_accelerations():
     truth = Plant(rate_hz=100)
     point = trim(45.0, 1000.0, plant=truth)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         imported_folder,
         is_derived,
         load,
+        main_surface_index_by_axis,
     )
     from beaver_ftc.aircraft.aircraft import DERIVED as DERIVED_FORMAT
     from beaver_ftc.aircraft.aircraft import FILE as AIRCRAFT_FILE

@@ -396,6 +396,22 @@ class Aircraft:
         return known and next(iter(self.file.signals), "") == "dpt"
 
 
+def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
+    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+    index_by_axis = {
+        axis: s
+        for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
+        if name in aircraft.primary
+    }
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        if axis not in index_by_axis:
+            raise BadInput(
+                f"{aircraft.name}: no surface turns it in {name}, "
+                "allowed: in `moments`, a term of some surface about each axis"
+            )
+    return [index_by_axis[axis] for axis in range(3)]
+
+
 def _sorted(section: object, coefficients: tuple[str, ...], constants: bool = False) -> tuple[Term, ...]:
     """Terms by coefficient, those without a surface first, of them the constant one."""
     terms: list[Term] = []

@@ -170,11 +170,11 @@ class MassSection(Section):
     sign."""
 
     mass_kg: Number | None = number(
-        None, unit="kg", says="mass. `engine.thrust` requires it", gt=0, le=1e7, examples=[2288.231]
+        None, unit="kg", says="mass. `engine.thrust` requires it", ge=1e-6, le=1e7, examples=[2288.231]
     )
-    Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9, examples=[5368.39])
-    Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", gt=0, le=1e9, examples=[6928.93])
-    Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", gt=0, le=1e9, examples=[11158.75])
+    Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", ge=1e-12, le=1e9, examples=[5368.39])
+    Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", ge=1e-12, le=1e9, examples=[6928.93])
+    Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", ge=1e-12, le=1e9, examples=[11158.75])
     Jxz_kgm2: Number = number(
         0.0, unit="kg m2", says="product of inertia", ge=-1e9, le=1e9, examples=[117.64]
     )
@@ -189,9 +189,9 @@ class MassSection(Section):
 class GeometrySection(Section):
     """Reference dimensions."""
 
-    wing_area_m2: Number = number(..., unit="m2", says="wing area", gt=0, le=1e4, examples=[23.23])
-    span_m: Number = number(..., unit="m", says="wing span", gt=0, le=500, examples=[14.63])
-    chord_m: Number = number(..., unit="m", says="mean aerodynamic chord", gt=0, le=500, examples=[1.5875])
+    wing_area_m2: Number = number(..., unit="m2", says="wing area", ge=1e-6, le=1e4, examples=[23.23])
+    span_m: Number = number(..., unit="m", says="wing span", ge=1e-3, le=500, examples=[14.63])
+    chord_m: Number = number(..., unit="m", says="mean aerodynamic chord", ge=1e-3, le=500, examples=[1.5875])
 
 
 class TermSection(Section):

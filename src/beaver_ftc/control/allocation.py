@@ -30,10 +30,10 @@ from math import pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, main_surface_index_by_axis
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
 
 LOW, FREE, HIGH = -1, 0, 1

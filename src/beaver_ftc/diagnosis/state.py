@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import record, sized
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.schema import Scenario
 
@@ -92,17 +91,6 @@ def configure_layout(
             layout["partner"][index_of_second_surface_in_group] = index_of_first_surface_in_group
     for estimator_index, (_, kind, surface_index) in enumerate(estimator_entries):
         layout["loss_estimator" if kind == LOSS else "position_estimator"][surface_index] = estimator_index
-
-
-def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
-    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    primary_surface_index_by_axis = {
-        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
-    }
-    for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in primary_surface_index_by_axis:
-            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [primary_surface_index_by_axis[axis] for axis in range(3)]
 
 
 _COMPILED_DETECTOR_ENTRY_BY_NAME = compiled_rows(DETECTORS)

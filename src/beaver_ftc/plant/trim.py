@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, Travel
+from beaver_ftc.aircraft import AXES, Aircraft, Travel, main_surface_index_by_axis
 from beaver_ftc.aircraft.aircraft import KG_PER_LB
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design import EXCEEDENCE, WIND_AT_20_FT
@@ -141,8 +141,7 @@ def _first_guess(wanted: FlightState, truth: Plant) -> FlightState:
     of |= {name: truth.read(signal.property) for name, signal in aircraft.signals.items()}
     of |= wanted.surfaces_rad
     alpha = _alpha_for_lift(aircraft, of, truth) if aircraft.forces else _ALPHA_GUESS_RAD
-    leading = {aircraft.dominant_axis[aircraft.surfaces.index(s)]: s for s in aircraft.primary}
-    pitch = leading[1]
+    pitch = aircraft.surfaces[main_surface_index_by_axis(aircraft)[1]]
     at_zero = aircraft.coefficient("Cm", of | {"alpha": alpha, pitch: 0.0})
     per_rad = aircraft.coefficient("Cm", of | {"alpha": alpha, pitch: 1.0}) - at_zero
     travel = aircraft.travel[pitch]

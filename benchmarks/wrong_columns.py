@@ -1,11 +1,11 @@
 """Healthy logs with one mistake in their columns: is any of them diagnosed as a fault?
 
-    python -m benchmarks.wrong_columns [--logs 10] [--seed 1] [--aircraft beaver] [--by identified aircraft]
+    python -m benchmarks.wrong_columns [--logs 10] [--seed 1] [--by identified] [--only TEXT] [--verbose]
 
 Healthy flights are drawn as in own_logs.py and read by the vehicle file that `run --as table` writes. Each of
 54 mistakes is made in each log: a sign, a unit, or two columns exchanged. The logs are diagnosed by a model
 that `identify` has of other healthy flights, and by the aircraft's design model. The table has a row for each
-way and group of mistakes, and, printed below it, each mistake in which a log was diagnosed as faulty:
+way and group of mistakes; `--verbose` prints each mistake in which a log was diagnosed as faulty:
 
 - refused: the log is refused in a line, before a diagnosis;
 - not credible: less than half of the samples are credible;
@@ -118,24 +118,26 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--aircraft", default="beaver")
     parser.add_argument("--by", choices=("aircraft", "identified"), nargs="*")
+    parser.add_argument("--only", default="", help="mistakes whose words have this")
+    parser.add_argument("--verbose", action="store_true", help="each alarm, too")
     asked = parser.parse_args()
+    by = asked.by or ["aircraft", "identified"]
     of = Campaign(asked.aircraft, seed=asked.seed)
     counts: Counter[tuple[str, str, str]] = Counter()
     seen: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
-        model = identified(of, [recorded(one, "table", Path(scratch)) for one in training(of)])
-        ways: dict[str, Callable[[Log], Said]] = {
-            "identified": lambda log: by_model(log, model),
-            "aircraft": lambda log: by_aircraft(log, of),
-        }
+        ways: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
+        if "identified" in by:
+            model = identified(of, [recorded(one, "table", Path(scratch)) for one in training(of)])
+            ways["identified"] = lambda log: by_model(log, model)
         healthy = [one for one in scenarios(of) if not one["faults"]][: asked.logs]
         logs = [recorded(one, "table", Path(scratch)) for one in healthy]
         folder = Path(scratch) / "mistaken"
         folder.mkdir()
-        for mistake in mistakes():
+        for mistake in (one for one in mistakes() if asked.only in one.said):
             for log in logs:
                 wrong = with_mistake(log, mistake, folder)
-                for way in asked.by or ways:
+                for way in by:
                     ends = ending(ways[way], wrong)
                     counts.update((way, mistake.group, end) for end in ("logs", *ends))
                     if "alarmed" in ends:
@@ -144,7 +146,8 @@ def main() -> None:
     print(markdown_table(HEAD, [
         [*group, *(str(counts[(*group, end)]) for end in HEAD[2:])] for group in groups
     ]))  # fmt: skip
-    print("\n".join(seen))
+    if asked.verbose:
+        print("\n".join(seen))
 
 
 if __name__ == "__main__":

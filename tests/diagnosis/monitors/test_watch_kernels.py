@@ -660,7 +660,7 @@ def looked(monitor, fdi, **signal):
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN] = 45.0, 1000.0
     for name, value in signal.items():
-        measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
+        measured["signal"][{"phi": PHI, "theta": THETA, "altitude": ALTITUDE, "p": 0}[name]] += value
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
     on(watching.check_sensors_and_replace_readings, fdi, monitor, prediction, measured, 3.0)
     return measured
@@ -850,3 +850,24 @@ def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
         monitor["redundancy"]["config"]["error_bound_at_zero_reading"][:] = 1.0
         looked(monitor, fdi)
         assert bool(monitor["memory"]["filtered_turn_difference"].any()) == bool(attitude_is_noisy)
+
+
+def test_a_pitch_too_steep_for_the_attitude_neither_clears_nor_excludes_a_gyro():
+    """A gyro's apparent error is gone only because its test restarts: it counts two whole frames later."""
+    shown = {"apparent_gyro_error": (0.0, 0.3, 0.0), "gyro_error_estimate": (0.0, 0.3, 0.0)}
+    monitor, fdi = new_watch(attitude_is_noisy=1, start_stage=3, gyros_excluded=0, **shown), new_fdi()
+    monitor["output"]["alarmed"], monitor["memory"]["filtered_turn_difference"] = 1, 0.2
+    monitor["memory"]["sound_gyro_estimate_bound"] = 0.1
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
+    memory = monitor["memory"]
+    for _ in range(5):
+        looked(monitor, fdi, theta=1.4)
+        assert (memory["start_stage"], memory["gyros_excluded"]) == (1, 0)
+        assert memory["gyro_error_verdict_by_axis"].tolist() == [GYRO_ERROR_UNDECIDED] * 3
+        assert not memory["filtered_turn_difference"].any()
+    stages = []
+    for _ in range(8):
+        looked(monitor, fdi, theta=1.2)
+        stages.append(int(memory["start_stage"]))
+    assert stages == [1, 1, 1, 2, 2, 2, 2, 3]
+    assert memory["filtered_turn_difference"][1].all()

@@ -82,7 +82,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     THETA_HYPOTHESIS,
-    max_pitch_angle,
+    pitch_is_too_steep,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
@@ -606,7 +606,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
 @kernel
 def update_initial_error_bounds(redundancy, initial_errors, readings):
     """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
-    if max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD:  # the tests of the attitude restart
+    if pitch_is_too_steep(redundancy, readings):
         initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
     update_recent_change_and_widen_bounds(redundancy, initial_errors)

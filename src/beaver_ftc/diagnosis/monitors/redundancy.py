@@ -572,6 +572,12 @@ def max_pitch_angle(redundancy, readings):
 
 
 @kernel
+def pitch_is_too_steep(redundancy, readings):
+    """Whether the tests of turning and of the angles restart, in this sample and the one before."""
+    return max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD
+
+
+@kernel
 def extrapolated_error_bound(redundancy, sensor_index):
     """Bound the error of 3/2 a - 1/2 a_before by the errors of the reading of a sensor in the two samples. A
     constant error counts once."""
@@ -928,9 +934,9 @@ def run_tests_with_equation(redundancy, readings, has_engine_sensors):
     fill_residuals(redundancy, readings)
     bound_residuals(redundancy, readings)
     memory.first_acceleration_error_bound = 0.0
-    pitch_is_too_steep = max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD
+    attitude_tests_restart = pitch_is_too_steep(redundancy, readings)
     for test_index in range(RPM_TEST):
-        if pitch_is_too_steep and test_index < SPEED_TEST:
+        if attitude_tests_restart and test_index < SPEED_TEST:
             restart_test(redundancy.test[test_index])
         else:
             filter_residual_and_update_bound_ratio(redundancy, redundancy.test[test_index])

@@ -96,6 +96,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     UNREACHABLE_FROZEN_SAMPLES,
     body_turn_per_euler_angle,
     compare_duplicate_sensors,
+    pitch_is_too_steep,
     run_tests_with_equation,
     set_accumulated_attitude_drift_bound,
     start_redundancy_tests,
@@ -389,8 +390,8 @@ def disable_accelerometers_if_suspect(monitor, measured):
 
 # A smaller share of the largest of three residuals is the effect of its error on the two other axes or angles
 MIN_SHARE_OF_LARGEST_RESIDUAL = 0.03
-# start_stage: 1 after the first sample, 2 with the first whole frame, 3 from the next frame on: only then the
-# innovation contains the change of a gyro's error between two frames
+# start_stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
+# the next frame on: only then the innovation contains the change of a gyro's error between two frames
 START_STAGE_SHOWING_GYRO_ERROR_CHANGE = 3
 MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
@@ -458,9 +459,11 @@ def check_sensors_and_replace_readings(
             memory.substep_gyro_error_peak[i] = max(
                 memory.substep_gyro_error_peak[i], abs(gyro_error_by_attitude)
             )
-    if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
+    if pitch_is_too_steep(redundancy, readings):
+        restart_comparison_of_gyros_and_attitude(memory)
+    elif memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
         advance_start_stage_and_widen_gyro_error_bound(monitor)
-    if monitor.config.attitude_is_noisy:
+    if monitor.config.attitude_is_noisy and not pitch_is_too_steep(redundancy, readings):
         exclude_all_gyros_on_turn_difference(monitor)
     raise_alarm_and_isolate_broken_sensor(
         monitor, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
@@ -500,6 +503,15 @@ def advance_start_stage_and_widen_gyro_error_bound(monitor):
     if memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE - 1 and memory.substep == 0:
         for i in range(3):
             memory.sound_gyro_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
+
+
+@kernel
+def restart_comparison_of_gyros_and_attitude(memory):
+    """Compare W with the attitude only from the next sample on: a test that restarts has no residual, and
+    shows neither an error nor its absence."""
+    memory.start_stage = 1
+    memory.filtered_turn_difference[:] = 0.0
+    memory.filtered_turn_difference_bound[:] = 0.0
 
 
 @kernel

@@ -15,7 +15,13 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
-from beaver_ftc_logs.readers import check_exists, read_parts, reader_name_for_path
+from beaver_ftc_logs.readers import (
+    NAMES_OF_READERS_OF_WANTED_COLUMNS,
+    check_exists,
+    read_flight,
+    read_parts,
+    reader_name_for_path,
+)
 from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers_of_column
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
@@ -195,10 +201,7 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
     check_exists(path)
     reader_name = reader_name or reader_name_for_path(path)
     time_column_and_unit = _require_time_column_and_unit(path, remarks) if reader_name == "table" else None
-    names_of_columns_to_read = (
-        _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
-    )
-    recording = next(read_parts(path, reader_name, time_column_and_unit, names_of_columns_to_read))
+    recording, names_in_log = _read_columns_for_guess(path, reader_name, time_column_and_unit)
     names_with_numbers = [
         name for name, column in recording.columns.items() if np.isfinite(column.values).any()
     ]
@@ -214,7 +217,7 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
             if missing_axes
             else "no column looks like a command"
         )
-        nearest_text = nearest_names_text("rate" if missing_axes else "command", recording.columns)
+        nearest_text = nearest_names_text("rate" if missing_axes else "command", names_in_log)
         remarks.append(
             f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest_text}"
         )
@@ -280,13 +283,26 @@ def _propose_vehicle(
     return vehicle
 
 
-def _names_of_columns_to_read(names: Iterable[str]) -> list[str]:
-    """Columns of a table that may be something: a wide one is not read whole."""
+def _read_columns_for_guess(
+    path: Path, reader_name: str, time_column_and_unit: tuple[str, str] | None
+) -> tuple[RecordedFlight, list[str]]:
+    """The columns of a log, of a long table its first part, that may be something; the names of all."""
+    if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+        all_names = list(read_flight(path, reader_name, columns=()).columns)
+        names_to_read = _names_of_columns_to_read(all_names, None)
+        return read_flight(path, reader_name, columns=names_to_read), all_names
+    names_to_read_or_all = _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
+    recording = next(read_parts(path, reader_name, time_column_and_unit, names_to_read_or_all))
+    return recording, list(recording.columns)
+
+
+def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
+    """Columns that may be something: a log with many is not read whole."""
     pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
     names_like_quantity_or_command = [
         name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or _is_name_like_command(name)
     ]
-    return names_like_quantity_or_command[:_MAX_READ_COLUMNS]
+    return names_like_quantity_or_command[:max_columns]
 
 
 def _is_name_like_command(column_name: str) -> bool:

@@ -96,36 +96,51 @@ def package_errors_as_bad_input(
 
 
 def columns_and_time_origin(
-    topics: dict[str, dict[str, Any]], stamp_field: str
+    topics: dict[str, dict[str, Any]], stamp_field: str, other_first_stamps_us: Iterable[float] = ()
 ) -> tuple[dict[str, Column], float]:
     """The fields of all topics as columns `topic.field`, and the first stamp, from which time counts, s.
 
-    topics: each topic's fields by name, one of them the stamps in us.
+    topics: each topic's fields by name, one of them the stamps in us; they are used up, so that no number is
+    in memory twice. other_first_stamps_us: of topics that are not kept.
     """
-    kept_rows_and_note_of_topic = {
-        name: rows_with_increasing_time(name, _as_float_array(fields[stamp_field]))
-        for name, fields in topics.items()
-    }
-    first_stamps_us = [
-        float(topics[name][stamp_field][kept_rows[0]])
-        for name, (kept_rows, _) in kept_rows_and_note_of_topic.items()
-        if len(kept_rows)
-    ]
+    stamps_of_topic = {name: _as_float_array(fields.pop(stamp_field)) for name, fields in topics.items()}
+    kept_rows_and_note_of_topic: dict[str, tuple[NDArray[np.int64] | None, str]] = {}
+    first_stamps_us = [*other_first_stamps_us]
+    for name, stamps in stamps_of_topic.items():
+        kept_rows, note = rows_with_increasing_time(name, stamps)
+        first_stamps_us += stamps[kept_rows[:1]].tolist()
+        kept_rows_and_note_of_topic[name] = (kept_rows if len(kept_rows) < len(stamps) else None), note
     origin_us = min(first_stamps_us, default=0.0)
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
-        kept_rows, note = kept_rows_and_note_of_topic[name]
-        t_s = (_as_float_array(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
-        columns |= {
-            f"{name}.{field}": Column(t_s, _as_float_array(values)[kept_rows], note)
-            for field, values in fields.items()
-            if field != stamp_field
-        }
+        kept_rows_or_all, note = kept_rows_and_note_of_topic.pop(name)
+        t_s = (_selected_rows(stamps_of_topic.pop(name), kept_rows_or_all) - origin_us) * _S_PER_US
+        for field_name in list(fields):
+            values = _selected_rows(_as_float_array(fields.pop(field_name)), kept_rows_or_all)
+            columns[f"{name}.{field_name}"] = Column(t_s, values, note)
     return columns, origin_us * _S_PER_US
+
+
+def columns_without_numbers(
+    fields_by_topic: Mapping[str, Iterable[str]], stamp_field: str
+) -> dict[str, Column]:
+    """The columns of all topics by their names, each without a row: those of a log that has none that is
+    wanted."""
+    no_rows = Column(np.empty(0), np.empty(0))
+    return {
+        f"{topic}.{field_name}": no_rows
+        for topic, field_names in fields_by_topic.items()
+        for field_name in field_names
+        if field_name != stamp_field
+    }
 
 
 def _as_float_array(values: Any) -> Floats:
     return np.asarray(values, dtype=float)
+
+
+def _selected_rows(values: Floats, rows_or_all: NDArray[np.int64] | None) -> Floats:
+    return values if rows_or_all is None else values[rows_or_all]
 
 
 def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.int64], str]:
@@ -134,8 +149,8 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.in
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
     nothing is said: autopilots write a stamp twice.
     """
-    if (np.diff(stamps) > 0).all() and np.isfinite(stamps).all():
-        return np.arange(len(stamps)), ""
+    if (np.diff(stamps) >= 0).all() and np.isfinite(stamps).all():
+        return np.flatnonzero(np.diff(stamps, prepend=-np.inf)), ""
     finite_stamp_rows = np.flatnonzero(np.isfinite(stamps))
     kept_rows = finite_stamp_rows[_longest_increasing_rows(stamps[finite_stamp_rows])]
     left_out_rows = np.setdiff1d(np.arange(len(stamps)), kept_rows)

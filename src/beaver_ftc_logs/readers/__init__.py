@@ -11,6 +11,8 @@ from beaver_ftc_logs.recording import RecordedFlight
 ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
 READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
+NAMES_OF_READERS_OF_WANTED_COLUMNS = ("ulog", "ardupilot")
+"""Of an autopilot's logs the columns that are wanted, the names alone where there are none of these."""
 _READER_NAME_BY_SUFFIX = {
     ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
     ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
@@ -34,8 +36,8 @@ def read_flight(
     """The recorded flight in a file or folder.
 
     reader_name: one of READER_NAMES; by the path's own form where None. time_column_and_unit: of a table.
-    columns: those that a log is read for, all where None. Raises BadInput with one line: why the log cannot
-    be used.
+    columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
+    why the log cannot be used.
     """
     return next(
         _read_with_reader(
@@ -79,8 +81,11 @@ def _read_with_reader(
             f"{path}: time: {' in '.join(time_column_and_unit)} is not its time, "
             f"allowed: {format_time_column} in {format_time_unit}"
         )
-    wanted_columns = columns_and_rows_per_part["columns"] if reader_name in ("ulog", "ardupilot") else None
-    yield module.read(path, wanted_columns) if wanted_columns is not None else module.read(path)
+    yield (
+        module.read(path, columns_and_rows_per_part["columns"])
+        if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS
+        else module.read(path)
+    )
 
 
 def check_exists(path: Path) -> None:

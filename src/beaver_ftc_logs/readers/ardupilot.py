@@ -6,16 +6,24 @@ extra `flights`.
 """
 
 import os
+import re
 import sys
 from array import array
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from math import nan
+from dataclasses import dataclass, field
+from importlib import import_module
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_and_time_origin, package_errors_as_bad_input
+from beaver_ftc_logs.recording import (
+    RecordedFlight,
+    columns_and_time_origin,
+    columns_without_numbers,
+    package_errors_as_bad_input,
+)
 
 _TIME_FIELD, _INSTANCE_FIELDS = "TimeUS", ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
@@ -23,53 +31,108 @@ _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 ValuesByField = dict[str, Any]
 
 
+@dataclass
+class _Stamps:
+    """The stamps of a message that is not kept, us: the first, the last, and whether they never decrease.
+
+    Where they do not, the first is the first that is kept of them (`rows_with_increasing_time`).
+    """
+
+    first: float
+    last: float = -inf
+    in_order: bool = True
+
+    def add(self, stamp: float) -> None:
+        self.in_order = self.in_order and self.last <= stamp < inf
+        self.last = stamp
+
+
+@dataclass
+class _Messages:
+    """What is kept of a log, by message and instance: its numeric fields, those of its first message; the
+    values of its wanted fields with their stamps; the stamps alone of one without such a field.
+
+    wanted_columns: all where None. wanted_messages: those whose stamps are kept in any case.
+    """
+
+    wanted_columns: Collection[str] | None
+    wanted_messages: Collection[str]
+    fields_by_message: dict[str, list[str]] = field(default_factory=dict)
+    values_by_message: dict[str, ValuesByField] = field(default_factory=dict)
+    stamps_by_message: dict[str, _Stamps] = field(default_factory=dict)
+
+    def fields_to_read(self, kind: str, fields: list[str]) -> list[str]:
+        """The fields of a kind of message that any instance of it is read for."""
+        if kind in _IGNORED_MESSAGES or _TIME_FIELD not in fields:
+            return []
+        name_of_instance = re.compile(re.escape(kind) + r"(-?\d+)?")
+        wanted_fields = {
+            column.partition(".")[2]
+            for column in self.wanted_columns or ()
+            if name_of_instance.fullmatch(column.partition(".")[0])
+        }
+        wanted_fields |= {_TIME_FIELD, *_INSTANCE_FIELDS}
+        return [name for name in fields if self.wanted_columns is None or name in wanted_fields]
+
+    def add(self, message: str, fields: list[str], numbers: Mapping[str, float]) -> None:
+        if message not in self.fields_by_message:
+            self._begin_message(message, fields, numbers[_TIME_FIELD])
+        if message in self.stamps_by_message:
+            self.stamps_by_message[message].add(numbers[_TIME_FIELD])
+        else:
+            for name, values in self.values_by_message[message].items():
+                values.append(numbers.get(name, nan))
+
+    def _begin_message(self, message: str, fields: list[str], stamp: float) -> None:
+        self.fields_by_message[message] = fields
+        wanted = self.wanted_columns
+        kept_fields = [name for name in fields if wanted is None or f"{message}.{name}" in wanted]
+        if kept_fields or message in self.wanted_messages:
+            self.values_by_message[message] = {name: array("d") for name in (_TIME_FIELD, *kept_fields)}
+        else:
+            self.stamps_by_message[message] = _Stamps(stamp)
+
+
 def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
-    wanted_columns: the columns that are kept in memory, all where None.
+    wanted_columns: the columns that are kept in memory, all where None. Where the log has none of them, all
+    columns are returned, without numbers: their names are known then.
     """
-    values_by_message_and_field = _read_messages(path, wanted_columns)
-    if not values_by_message_and_field:
+    messages = _read_messages(path, wanted_columns)
+    if not messages.fields_by_message:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
-    return RecordedFlight(path.stem, columns_and_time_origin(values_by_message_and_field, _TIME_FIELD)[0])
+    if not messages.values_by_message:
+        return RecordedFlight(path.stem, columns_without_numbers(messages.fields_by_message, _TIME_FIELD))
+    damaged_messages = [name for name, stamps in messages.stamps_by_message.items() if not stamps.in_order]
+    if damaged_messages:  # which of their stamps is the first depends on all of them
+        messages = _read_messages(path, wanted_columns, damaged_messages)
+    first_stamps_us = [stamps.first for stamps in messages.stamps_by_message.values()]
+    columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_stamps_us)
+    return RecordedFlight(path.stem, columns)
 
 
-def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, ValuesByField]:
-    """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
-    values_by_message_and_field: dict[str, ValuesByField] = {}
+def _read_messages(
+    path: Path, wanted_columns: Collection[str] | None, wanted_messages: Collection[str] = ()
+) -> _Messages:
+    """The messages with a stamp. wanted_messages: those whose stamps are kept, whatever else is wanted."""
+    found = _Messages(wanted_columns, wanted_messages)
     with (
         package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
     ):
-        from pymavlink import DFReader
+        import_module("pymavlink")  # here, since the module below may have been imported before
+        from beaver_ftc_logs.readers import dataflash
 
-        is_text_log = path.suffix.lower() == ".log"
-        log_reader = (DFReader.DFReader_text if is_text_log else DFReader.DFReader_binary)(str(path))
-        while (message := log_reader.recv_msg()) is not None:
-            fields = message.to_dict()
-            numeric_fields = {
-                field_name: float(value)
-                for field_name, value in fields.items()
-                if isinstance(value, int | float)
-            }
-            if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numeric_fields:
-                message_name = _message_name(message.get_type(), fields)
-                for field, field_values in values_by_message_and_field.setdefault(
-                    message_name, _empty_arrays_of_wanted_fields(message_name, numeric_fields, wanted_columns)
-                ).items():
-                    field_values.append(numeric_fields.get(field, nan))
-    return values_by_message_and_field
+        for kind, fields, numbers in dataflash.read_messages(path, found.fields_to_read):
+            if _TIME_FIELD in numbers:
+                found.add(_message_name(kind, numbers), fields, numbers)
+    return found
 
 
-def _empty_arrays_of_wanted_fields(
-    message_name: str, numeric_fields: ValuesByField, wanted_columns: Collection[str] | None
-) -> ValuesByField:
-    kept_fields = [
-        field
-        for field in numeric_fields
-        if wanted_columns is None or field == _TIME_FIELD or f"{message_name}.{field}" in wanted_columns
-    ]
-    return {field: array("d") for field in kept_fields}
+def _message_name(kind: str, numbers: Mapping[str, Any]) -> str:
+    instance_number = next((numbers[key] for key in _INSTANCE_FIELDS if isinstance(numbers.get(key), int)), 0)
+    return kind if instance_number == 0 else f"{kind}{instance_number}"
 
 
 @contextmanager
@@ -84,8 +147,3 @@ def _silence_stderr() -> Iterator[None]:
         os.dup2(saved_stderr, 2)
         os.close(saved_stderr)
         os.close(null_device)
-
-
-def _message_name(message_type: str, fields: dict[str, Any]) -> str:
-    instance_number = next((fields[key] for key in _INSTANCE_FIELDS if isinstance(fields.get(key), int)), 0)
-    return message_type if instance_number == 0 else f"{message_type}{instance_number}"

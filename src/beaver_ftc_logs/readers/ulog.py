@@ -5,11 +5,18 @@ Time counts from the first message of the log. Reading needs pyulog: the extra `
 
 import re
 from collections.abc import Collection
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_and_time_origin, package_errors_as_bad_input
+from beaver_ftc_logs.recording import (
+    Floats,
+    RecordedFlight,
+    columns_and_time_origin,
+    columns_without_numbers,
+    package_errors_as_bad_input,
+)
 
 _TIME_FIELD = "timestamp"
 _MAX_MESSAGE_BYTES = 65535
@@ -19,53 +26,58 @@ _MAX_MESSAGE_BYTES = 65535
 def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted_columns: the columns that are kept in memory, all where None.
+    wanted_columns: the columns that are kept in memory, all where None. Where the log has no topic of any of
+    them, all columns are returned, without numbers: their names are known then.
     """
-    data_by_topic = {
-        _topic_name(topic): topic.data
-        for topic in _read_topics(path, wanted_columns)
-        if len(topic.data.get(_TIME_FIELD, ()))
-    }
-    if wanted_columns is not None and data_by_topic:
-        data_by_topic = {
-            name: _select_wanted_fields(name, data, wanted_columns) for name, data in data_by_topic.items()
-        }
-    if not data_by_topic:
+    fields_by_topic, kept_by_topic = _read_topics(path, wanted_columns)
+    if not fields_by_topic:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    columns, origin_s = columns_and_time_origin(data_by_topic, _TIME_FIELD)
+    if not any(kept_by_topic.values()):
+        return RecordedFlight(path.stem, columns_without_numbers(fields_by_topic, _TIME_FIELD))
+    columns, origin_s = columns_and_time_origin(kept_by_topic, _TIME_FIELD)
     time_origin_notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
     return RecordedFlight(path.stem, columns, notes=time_origin_notes)
 
 
-def _topic_name(topic: Any) -> str:
-    return str(topic.name) if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
-
-
-def _select_wanted_fields(name: str, data: dict[str, Any], wanted_columns: Collection[str]) -> dict[str, Any]:
-    return {
-        field: values
-        for field, values in data.items()
-        if field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
-    }
-
-
-def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any]:
-    """Read the topics of the wanted columns, of any instance; all where none of these is in the log."""
+def _read_topics(
+    path: Path, wanted_columns: Collection[str] | None
+) -> tuple[dict[str, list[str]], dict[str, dict[str, Floats]]]:
+    """All fields and the numbers of the kept ones, by topic: of the topics of the wanted columns, of any
+    instance; where none of these is in the log, the fields of all topics, and no numbers."""
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
-        from pyulog import ULog
+        import_module("pyulog")  # here, since the module below may have been imported before
+        from beaver_ftc_logs.readers import ulog_blocks
 
-        formats = ULog(str(path), parse_header_only=True).message_formats
-        for name in formats:
-            if (
-                _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES
-            ):  # pyulog writes every field of one out
-                raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
-        topic_names = {re.sub(r"_\d+$", "", column.partition(".")[0]) for column in wanted_columns or ()}
-        topic_names = (topic_names | {column.partition(".")[0] for column in wanted_columns or ()}) & set(
-            formats
-        )
-        topics = list(ULog(str(path), sorted(topic_names) if topic_names else None).data_list)
-    return topics
+        topic_names = _check_formats_and_select_topics(path, wanted_columns)
+        is_any_wanted = wanted_columns is None or bool(topic_names)
+
+        def kept_fields(topic: str, fields: list[str]) -> list[str]:
+            return [
+                field
+                for field in fields
+                if is_any_wanted
+                and (field == _TIME_FIELD or wanted_columns is None or f"{topic}.{field}" in wanted_columns)
+            ]
+
+        fields_by_topic: dict[str, list[str]] = {}
+        kept_by_topic: dict[str, dict[str, Floats]] = {}
+        for topic, fields, kept in ulog_blocks.read_topics(path, topic_names or None, kept_fields):
+            if _TIME_FIELD in fields:
+                fields_by_topic[topic], kept_by_topic[topic] = fields, kept
+    return fields_by_topic, kept_by_topic
+
+
+def _check_formats_and_select_topics(path: Path, wanted_columns: Collection[str] | None) -> list[str]:
+    """The topics in a log that a wanted column may be of. Raises ValueError for a message too large."""
+    from pyulog import ULog
+
+    formats = ULog(str(path), parse_header_only=True).message_formats
+    for name in formats:
+        if _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES:  # pyulog writes every field of one out
+            raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
+    wanted_topics = {column.partition(".")[0] for column in wanted_columns or ()}
+    wanted_topics |= {re.sub(r"_\d+$", "", topic) for topic in wanted_topics}
+    return sorted(wanted_topics & set(formats))
 
 
 def _min_message_bytes(formats: dict[str, Any], name: str, enclosing_messages: tuple[str, ...]) -> int:

@@ -381,7 +381,11 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
     assert columns["early.y"].note.startswith("early: row 1: its stamp is out of order")
     assert columns["late.x"].note == ""
     assert set(columns) == {"late.x", "early.y", "early.z", "none.w"}
-    assert columns_and_time_origin({"none": topics["none"]}, "us")[1] == 0.0
+    assert columns_and_time_origin({"none": {"us": [np.nan, np.nan], "w": [1, 2]}}, "us")[1] == 0.0
+    early = {"early": {"us": [2_000_000, 2_500_000], "y": [2, 3]}}
+    columns, origin_s = columns_and_time_origin(early, "us", [1_750_000.0, 2_250_000.0])
+    assert origin_s == pytest.approx(1.75)
+    np.testing.assert_allclose(columns["early.y"].t_s, [0.25, 0.75])
 
 
 def test_the_bytes_of_a_message_are_those_of_all_that_is_in_it():
@@ -452,9 +456,16 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
 
 
 def test_a_dataflash_log_has_the_name_of_its_file_without_the_ending(monkeypatch):
-    monkeypatch.setattr(ardupilot, "_read_messages", lambda path, wanted: {"IMU": (path.name, wanted)})
-    monkeypatch.setattr(
-        ardupilot, "columns_and_time_origin", lambda messages, time: ((messages, time), "rest")
-    )
-    found = ardupilot.read(Path("logs/flight.2.bin"), ["GyrX"])
-    assert (found.name, found.columns) == ("flight.2", ({"IMU": ("flight.2.bin", ["GyrX"])}, "TimeUS"))
+    """And its time counts from the stamps of messages that are not kept, too."""
+
+    def read_messages(path, wanted):
+        found = ardupilot._Messages(wanted, ())
+        for kind, stamp in (("IMU", 2e6), ("IMU", 3e6), ("AHR", 1.5e6)):
+            found.add(kind, ["TimeUS", "GyrX"], {"TimeUS": stamp, "GyrX": stamp + len(path.name)})
+        return found
+
+    monkeypatch.setattr(ardupilot, "_read_messages", read_messages)
+    found = ardupilot.read(Path("logs/flight.2.bin"), ["IMU.GyrX"])
+    assert (found.name, list(found.columns)) == ("flight.2", ["IMU.GyrX"])
+    assert found.columns["IMU.GyrX"].values.tolist() == [2_000_012.0, 3_000_012.0]
+    np.testing.assert_allclose(found.columns["IMU.GyrX"].t_s, [0.5, 1.5])

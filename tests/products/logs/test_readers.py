@@ -327,3 +327,98 @@ def test_a_ulogs_messages_without_a_stamp_are_left_out(tmp_path):
     (column,) = read_flight(path).columns.values()
     assert column.values.tolist() == [7.0, 8.0, 9.0]
     assert column.t_s == pytest.approx([0.0, 0.1, 0.2])
+
+
+@pytest.mark.parametrize("suffix", ["ulg", "bin", "log"])
+def test_a_log_without_any_wanted_column_says_which_it_has(tmp_path, suffix):
+    pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
+    path = tmp_path / f"flight.{suffix}"
+    columns = {"t_s": np.arange(3) / 10.0, "P": np.ones(3), "Q": np.ones(3)}
+    if suffix == "bin":
+        synthetic.write_dataflash(path, [("RATE", {"TimeUS": k, "P": 1.0, "Q": 1.0}) for k in range(3)])
+    else:
+        {"ulg": synthetic.write_ulog, "log": synthetic.write_ardupilot}[suffix](path, columns, "RATE")
+    for nothing in ((), ["ATT.Roll"]):
+        found = read_flight(path, columns=nothing).columns
+        assert list(found) == ["RATE.P", "RATE.Q"]
+        assert not any(column.t_s.size or column.values.size for column in found.values())
+    (tmp_path / "wing.yaml").write_text(synthetic.vehicle("ATT"))
+    with pytest.raises(BadInput, match=r"no column ATT\.p_rad_s, .* it has RATE\.P, RATE\.Q$"):
+        load_flights_for_fit([path], load_vehicle(tmp_path / "wing.yaml"))
+
+
+@pytest.mark.parametrize("block_bytes", [1, 100, 240])
+def test_a_ulog_in_blocks_is_the_ulog(tmp_path, monkeypatch, block_bytes):
+    """Blocks of one message, of some, and one that ends before the log does; rows of 24 bytes."""
+    pytest.importorskip("pyulog")
+    from beaver_ftc_logs.readers import ulog_blocks
+
+    columns = {"t_s": np.arange(25) / 10.0, "P": np.arange(25) * 0.1, "Q": -np.arange(25.0)}
+    path = synthetic.write_ulog(tmp_path / "flight.ulg", columns, "RATE")
+    monkeypatch.setattr(ulog_blocks, "_BLOCK_BYTES", block_bytes)
+    for wanted in (None, ["RATE.Q"]):
+        found = read_flight(path, columns=wanted).columns
+        assert list(found) == (wanted or ["RATE.P", "RATE.Q"])
+        for name, column in found.items():
+            assert column.values.tolist() == columns[name[-1]].tolist()
+            np.testing.assert_allclose(column.t_s, columns["t_s"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stamps_us", "origin_us"),
+    [
+        ([500_000, 700_000, 700_000, 900_000], 500_000),  # a stamp twice is no damage
+        ([9_000_000, 600_000, 700_000, 800_000], 600_000),  # the first is damaged
+        ([500_000, 100_000, 600_000, 700_000], 500_000),  # one comes late
+        ([2_500_000, 400_000, 450_000, 2_600_000, 300_000], 400_000),  # the first and the last are damaged
+    ],
+)
+@pytest.mark.parametrize("wanted", [None, ["RATE.P"]])
+def test_time_counts_from_the_first_message_in_order_of_those_that_are_not_wanted_too(
+    tmp_path, stamps_us, origin_us, wanted
+):
+    pytest.importorskip("pymavlink")
+    rows = [("IMU", {"TimeUS": stamp, "G": 1.0}) for stamp in stamps_us]
+    rows += [("RATE", {"TimeUS": 2_000_000 + 100_000 * k, "P": 1.0 * k}) for k in range(3)]
+    found = read_flight(synthetic.write_dataflash(tmp_path / "flight.bin", rows), columns=wanted)
+    expected_s = (np.array([2_000_000, 2_100_000, 2_200_000]) - origin_us) * 1e-6
+    np.testing.assert_allclose(found.columns["RATE.P"].t_s, expected_s, atol=1e-9)
+
+
+def dataflash_format(number, size, name, codes, fields):
+    return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, size, name, codes, fields)
+
+
+def test_a_dataflash_log_with_numbers_in_hundredths_words_and_damage(tmp_path):
+    """Messages before their format, and bytes of none between messages; the last one is cut off."""
+    pytest.importorskip("pymavlink")
+    data = b""
+    for k in range(4):
+        body = struct.pack("<Q4shBi", 1_000_000 + 100_000 * k, b"word", -150 + k, 7, 473_000_000 + k)
+        data += b"\xa3\x95\x82" + body + (b"\xa3\x95\x00junk" if k == 1 else b"")
+    data = dataflash_format(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns") + data
+    data += dataflash_format(0x82, 3 + 19, b"POS", b"QncML", b"TimeUS,Name,Roll,Mode,Lat")
+    path = tmp_path / "flight.bin"
+    path.write_bytes(data + b"\xa3\x95\x82" + bytes(10))
+    for wanted in (None, ["POS.Lat", "POS.Mode", "POS.Roll"]):
+        columns = read_flight(path, columns=wanted).columns
+        assert list(columns) == ["POS.Roll", "POS.Mode", "POS.Lat"]
+        assert columns["POS.Roll"].values.tolist() == [-1.5, -1.49, -1.48, -1.47]
+        assert columns["POS.Mode"].values.tolist() == [7.0] * 4
+        assert columns["POS.Lat"].values == pytest.approx([47.3 + 1e-7 * k for k in range(4)], abs=1e-12)
+        np.testing.assert_allclose(columns["POS.Lat"].t_s, [0.0, 0.1, 0.2, 0.3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("size", "codes", "says"),
+    [
+        (20, b"QY", "Unsupported format char: 'Y' in message ODD"),
+        (2, b"", "a message ODD would have 2 bytes"),
+    ],
+)
+def test_a_format_of_no_sense_is_one_line(tmp_path, size, codes, says):
+    pytest.importorskip("pymavlink")
+    path = synthetic.write_dataflash(tmp_path / "flight.bin", [("RATE", {"TimeUS": 1, "P": 1.0})])
+    path.write_bytes(path.read_bytes() + dataflash_format(200, size, b"ODD", codes, b"TimeUS,Y"))
+    with pytest.raises(BadInput, match=rf"is no dataflash log that can be read \({says}\)"):
+        read_flight(path)

@@ -1,0 +1,187 @@
+"""Messages of a dataflash log one by one, and of each only the numbers that are asked for.
+
+pymavlink by itself makes an index of all messages, reads a log for the time of day, and converts every field.
+Here it reads the formats of the messages, and finds the next message where a log is damaged. A log's file is
+mapped into memory; the pages that were read are released, so that memory does not grow with the log.
+"""
+
+import mmap
+import struct
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pymavlink.DFReader import FORMAT_TO_STRUCT, DFFormat, DFReader_binary, DFReader_text, null_term
+
+_BYTES_BETWEEN_RELEASES = 8_000_000
+"""Bytes of a log that are read until their pages are released."""
+_HEADER, _HEADER_BYTES, _TYPE_OF_FORMATS = b"\xa3\x95", 3, 0x80
+
+Numbers = dict[str, Any]
+FieldsOfFormat = Callable[[Any], list[str]]
+
+
+def read_messages(
+    path: Path, fields_to_read: Callable[[str, list[str]], list[str]]
+) -> Iterator[tuple[str, list[str], Numbers]]:
+    """Of each message in a log: its type, its numeric fields, and the numbers of those that are read.
+
+    fields_to_read: gives these fields, by the type of a message and all its numeric fields.
+    """
+    is_text_log = path.suffix.lower() == ".log"
+
+    @cache
+    def numeric_fields_of_format(message_format: Any) -> list[str]:
+        return _numeric_fields(message_format, is_text_log)
+
+    @cache
+    def fields_of_format(message_format: Any) -> list[str]:
+        return fields_to_read(message_format.name, numeric_fields_of_format(message_format))
+
+    log = (_TextLog if is_text_log else _BinaryLog)(str(path))
+    try:
+        for message_format, numbers in log.messages_with_numbers(fields_of_format):
+            yield message_format.name, numeric_fields_of_format(message_format), numbers
+    finally:
+        log.data_map.close()
+        log.filehandle.close()
+
+
+def _numeric_fields(message_format: Any, is_text_log: bool) -> list[str]:
+    """The fields that hold numbers, in their order; in text a flight mode (M) is a word."""
+    is_number = [
+        kind in (int, float) and not (is_text_log and code == "M")
+        for kind, code in zip(message_format.msg_types, message_format.msg_fmts, strict=True)
+    ]
+    return [
+        field
+        for field, index in message_format.colhash.items()
+        if index < len(is_number) and is_number[index]  # a damaged format may have more fields than types
+    ]
+
+
+class _MappedLog:
+    """What is common to logs as text and as bytes: pymavlink's index and clock are left out, and the pages
+    behind the place of reading are released."""
+
+    data_map: mmap.mmap
+    data_len: int
+    offset: int
+    recv_msg: Callable[[], Any]
+    _released_offset = 0
+
+    def init_clock(self) -> None:
+        """No time of day is wanted, for which all of a log without GPS would be read."""
+
+    def messages_with_numbers(self, fields_of_format: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
+        """Of each message its format, and the numbers of the fields of that format."""
+        while (message := self.recv_msg()) is not None:
+            yield message.fmt, _numbers_of_message(message, fields_of_format)
+            self._release_pages_before(self.offset)
+
+    def _release_pages_before(self, offset: int) -> None:
+        """From time to time, and where the system can."""
+        if abs(offset - self._released_offset) >= _BYTES_BETWEEN_RELEASES:
+            self._released_offset = offset
+            if hasattr(mmap, "MADV_DONTNEED"):
+                self.data_map.madvise(mmap.MADV_DONTNEED)
+
+
+def _numbers_of_message(message: Any, fields_of_format: FieldsOfFormat) -> Numbers:
+    return {field: message.__getattr__(field) for field in fields_of_format(message.fmt)}
+
+
+class _TextLog(_MappedLog, DFReader_text):
+    def init_arrays(self, progress_callback: Any = None) -> None:
+        """Read the formats alone, wherever they are: a message may stand before its own."""
+        line_offset = self.offset
+        while line_offset >= 0:
+            self.offset = line_offset
+            self._parse_next()
+            line_offset = self._find_line_of_format(line_offset)
+        self.offset = 0
+
+    def _find_line_of_format(self, begin: int) -> int:
+        """Where the next line with a format begins, -1 if there is none."""
+        begin_of_line = b"\nFMT,"
+        for block in range(begin, self.data_len, _BYTES_BETWEEN_RELEASES):
+            end = block + _BYTES_BETWEEN_RELEASES + len(begin_of_line) - 1
+            found = self.data_map.find(begin_of_line, block, end)
+            if found >= 0:
+                return found + 1
+            self._release_pages_before(end)
+        return -1
+
+
+class _BinaryLog(_MappedLog, DFReader_binary):
+    def init_arrays(self, progress_callback: Any = None) -> None:
+        """Read the formats alone, wherever they are: a message may stand before its own."""
+        offset = 0
+        while offset + _HEADER_BYTES <= self.data_len:
+            message_format = self._format_at(offset)
+            end = offset + (message_format.len if message_format else 1)
+            if message_format and message_format.type == _TYPE_OF_FORMATS and end <= self.data_len:
+                self._read_format(self.data_map[offset + _HEADER_BYTES : end])
+            offset = end
+            self._release_pages_before(offset)
+        self.offset = 0
+
+    def _read_format(self, body: bytes) -> None:
+        kind, length, name, codes, columns = struct.unpack(self.formats[_TYPE_OF_FORMATS].msg_struct, body)
+        if length < _HEADER_BYTES:
+            raise ValueError(f"a message {null_term(name)} would have {length} bytes")
+        self.formats[kind] = DFFormat(kind, null_term(name), length, null_term(codes), null_term(columns))
+
+    init_arrays_fast = init_arrays
+
+    def _format_at(self, offset: int) -> Any:
+        """The format of the message that begins here, None if none does."""
+        header = self.data_map[offset : offset + _HEADER_BYTES]
+        return self.formats.get(header[2]) if header[:2] == _HEADER and len(header) == _HEADER_BYTES else None
+
+    def messages_with_numbers(self, fields_of_format: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
+        """The same; pymavlink reads what is damaged, and the formats, which it keeps."""
+        layout_of_format = cache(lambda message_format: _Layout(message_format, fields_of_format))
+        while True:
+            message_format = self._format_at(self.offset)
+            layout = None if message_format is None else layout_of_format(message_format)
+            if layout and layout.is_plain and self.offset + message_format.len <= self.data_len:
+                yield message_format, layout.read_numbers(self.data_map, self.offset)
+                self.offset += message_format.len
+            elif (message := self.recv_msg()) is not None:
+                yield message.fmt, _numbers_of_message(message, fields_of_format)
+            else:
+                return
+            self._release_pages_before(self.offset)
+
+
+class _Layout:
+    """Where some numbers of a message are, by its format.
+
+    is_plain: whether the message is as long as its fields, and no format itself.
+    """
+
+    def __init__(self, message_format: Any, fields_of_format: FieldsOfFormat) -> None:
+        field_of_index = {message_format.colhash[field]: field for field in fields_of_format(message_format)}
+        codes = [FORMAT_TO_STRUCT[code][0] for code in message_format.msg_fmts]
+        self._struct = struct.Struct(
+            f"<{_HEADER_BYTES}x"
+            + "".join(
+                code if index in field_of_index else f"{struct.calcsize(f'<{code}')}x"
+                for index, code in enumerate(codes)
+            )
+        )
+        self._fields = [field_of_index[index] for index in sorted(field_of_index)]
+        self._divisors = {
+            field_of_index[index]: 1.0 / factor
+            for index, factor in enumerate(message_format.msg_mults)
+            if factor is not None and index in field_of_index
+        }
+        self.is_plain = self._struct.size == message_format.len and message_format.name != "FMT"
+
+    def read_numbers(self, data: Any, offset: int) -> Numbers:
+        numbers = dict(zip(self._fields, self._struct.unpack_from(data, offset), strict=True))
+        for field, divisor in self._divisors.items():
+            numbers[field] /= divisor
+        return numbers

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
-from beaver_ftc_logs.readers import read_flight, read_parts
+from beaver_ftc_logs.readers import read_flight, read_parts, split_long_recording
 from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
 from beaver_ftc_logs.vehicle import Vehicle
@@ -518,8 +518,14 @@ def read_columns_of_vehicle(path: Path, vehicle: Vehicle, reader_name: str | Non
 def read_parts_for_vehicle(
     path: Path, vehicle: Vehicle, reader_name: str | None = None
 ) -> Iterator[RecordedFlight]:
-    """The same, a long table in parts."""
-    return read_parts(path, *_positional_reader_arguments(vehicle, reader_name))
+    """The same, a long log in parts."""
+    for recording in read_parts(path, *_positional_reader_arguments(vehicle, reader_name)):
+        column = recording.columns.get(vehicle.rates.p.column)
+        if column is None:  # said where the columns are used
+            yield recording
+            continue
+        rows_per_sample = 1.0 / (_median_step_of_first_stamps_s(column.t_s) * vehicle.max_sample_rate_hz)
+        yield from split_long_recording(recording, column.t_s, max(rows_per_sample, 1.0))
 
 
 def _positional_reader_arguments(

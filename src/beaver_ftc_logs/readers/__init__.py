@@ -1,15 +1,22 @@
 """Readers of recorded flights, by name. A new format is one file here and one line in `READER_NAMES`."""
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight
 
 ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
+SAMPLES_PER_PART = 400_000
+"""Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000."""
+MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
+"""So many times the rows of a part has the last at most; their share with which the next begins once more."""
 READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
 NAMES_OF_READERS_OF_WANTED_COLUMNS = ("ulog", "ardupilot")
 """Of an autopilot's logs the columns that are wanted, the names alone where there are none of these."""
@@ -86,6 +93,36 @@ def _read_with_reader(
         if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS
         else module.read(path)
     )
+
+
+def split_long_recording(
+    recording: RecordedFlight, row_stamps_s: Floats, rows_per_sample: float
+) -> Iterator[RecordedFlight]:
+    """A recording in parts as those of a long table: numbered, each begins with the end of the one before.
+
+    row_stamps_s: of the rows that are counted, increasing, of which so many are one sample later. A column of
+    a part begins with its last value before, if it has no value at the first of these rows.
+    """
+    rows_per_part = round(SAMPLES_PER_PART * rows_per_sample)
+    if len(row_stamps_s) <= MAX_LAST_PART_FACTOR * rows_per_part:
+        yield recording
+        return
+    begin, part_number, is_last = 0, 1, False
+    while not is_last:
+        is_last = len(row_stamps_s) - begin <= MAX_LAST_PART_FACTOR * rows_per_part
+        end = len(row_stamps_s) if is_last else begin + rows_per_part
+        columns = {
+            name: _select_period(column, row_stamps_s[begin], row_stamps_s[end - 1])
+            for name, column in recording.columns.items()
+        }
+        yield replace(recording, name=f"{recording.name}-part-{part_number}", columns=columns)
+        begin, part_number = end - round(PART_OVERLAP_SHARE * rows_per_part), part_number + 1
+
+
+def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
+    first_row = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
+    end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
+    return Column(column.t_s[first_row:end_row], column.values[first_row:end_row], column.note)
 
 
 def check_exists(path: Path) -> None:

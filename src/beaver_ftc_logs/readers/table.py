@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc_logs.readers import MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE
 from beaver_ftc_logs.readers.text import (
     TableCells,
     TableLayout,
@@ -25,8 +26,7 @@ TIME_COLUMN = "t_s"
 _BYTES_PER_NUMBER = 8
 _MAX_ROWS, _MAX_NUMBER_BYTES = 10_000_000, 2_000_000_000
 """Largest part of a file that is read at once: 2.8 h at 1000 Hz."""
-_MAX_LAST_PART_FACTOR, _PART_OVERLAP_SHARE, _BATCH_ROWS = 1.2, 0.1, 50_000
-"""So many times the rows of a part has the last at most; their share with which the next begins once more."""
+_BATCH_ROWS = 50_000
 
 NumberTable = dict[str, Floats]
 TablePart = tuple[TableCells, list[tuple[str, str]], bool]
@@ -195,11 +195,11 @@ def _join_blocks_into_parts(
             n_held_rows = sum(held_block.n_rows for held_block in held_blocks)
             if rows_per_part is None and n_held_rows > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
-            while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:
+            while rows_per_part is not None and n_held_rows > MAX_LAST_PART_FACTOR * rows_per_part:
                 joined_cells = join_and_consume_blocks(held_blocks)
                 part_cells = joined_cells.select_rows(0, rows_per_part)
                 remaining_cells = joined_cells.select_rows(
-                    rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)
+                    rows_per_part - round(PART_OVERLAP_SHARE * rows_per_part)
                 )
                 part_cells.text_cell_summaries, part_cells.broken_line_beginnings = (
                     joined_cells.text_cell_summaries,

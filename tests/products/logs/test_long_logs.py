@@ -16,6 +16,8 @@ from beaver_ftc_logs import readers, samples
 from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.readers import read_flight, read_parts, table
+from beaver_ftc_logs.recording import Column, RecordedFlight
+from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
 _PEAK = """
@@ -201,6 +203,69 @@ def text_with_ballast(path, columns, n_messages):
     with path.open("a") as file:
         file.write("FMT, 141, 51, IMU, Qffffffffff, TimeUS,a,b,c,d,e,f,g,h,i,j\n")
         file.write(("IMU, 1000000" + ", 0.12345" * 8 + ", 0.5, 1\n") * n_messages)
+
+
+@pytest.fixture
+def parted_log(tmp_path, monkeypatch):
+    """A ULog of 2400 rows at 10 Hz in parts of 500 samples, whose vehicle file may say a lower rate."""
+    pytest.importorskip("pyulog")
+    monkeypatch.setattr(readers, "SAMPLES_PER_PART", 500)
+    columns = synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5)
+    return synthetic.write_ulog(tmp_path / "long.ulg", columns, "RATE")
+
+
+def wing_of_topic(tmp_path, further_keys=""):
+    (tmp_path / "wing.yaml").write_text(synthetic.vehicle("RATE") + further_keys)
+    return load_vehicle(tmp_path / "wing.yaml")
+
+
+def test_a_long_log_of_an_autopilot_has_parts_that_share_a_tenth(tmp_path, parted_log):
+    vehicle = wing_of_topic(tmp_path)
+    whole = samples.read_columns_of_vehicle(parted_log, vehicle)
+    parts = list(samples.read_parts_for_vehicle(parted_log, vehicle))
+    assert [part.name for part in parts] == [f"long-part-{k}" for k in range(1, 6)]
+    assert {part.notes for part in parts} == {whole.notes}
+    for name, column in whole.columns.items():
+        rows = [len(part.columns[name].t_s) for part in parts]
+        assert rows == [500, 500, 500, 500, 600]  # of 2400, 50 of them twice at each of four borders
+        for k, part in enumerate(parts):
+            np.testing.assert_array_equal(part.columns[name].t_s, column.t_s[450 * k : 450 * k + rows[k]])
+            np.testing.assert_array_equal(part.columns[name].values, column.values[450 * k :][: rows[k]])
+
+
+def test_parts_of_a_log_that_is_averaged_have_so_many_samples_of_the_average(tmp_path, parted_log):
+    """At 5 Hz the 2400 rows are 1200 samples."""
+    vehicle = wing_of_topic(tmp_path, "max_rate_hz: 5.0\n")
+    parts = [samples.resample(part, vehicle) for part in samples.read_parts_for_vehicle(parted_log, vehicle)]
+    assert [len(part.t_s) for part in parts] == pytest.approx([500, 500, 300], abs=1)
+    assert all(part.dt_s == pytest.approx(0.2) for part in parts)
+
+
+def test_a_part_begins_with_the_last_value_of_a_slower_column(monkeypatch):
+    monkeypatch.setattr(readers, "SAMPLES_PER_PART", 10)
+    stamps = np.arange(25.0)
+    slow = Column(np.array([0.0, 8.5, 30.0]), np.array([1.0, 2.0, 3.0]), "a note")
+    late = Column(np.array([20.0]), np.array([4.0]))
+    whole = RecordedFlight("f", {"slow": slow, "late": late})
+    parts = list(readers.split_long_recording(whole, stamps, 1.0))
+    assert [part.columns["slow"].values.tolist() for part in parts] == [[1.0, 2.0], [2.0], [2.0]]
+    assert [part.columns["late"].values.tolist() for part in parts] == [[], [], [4.0]]
+    assert parts[1].columns["slow"].note == "a note"
+    assert list(readers.split_long_recording(whole, stamps, 2.5)) == [whole]
+
+
+def test_parts_of_a_ulog_say_what_the_whole_says(tmp_path, parted_log, wing_model):
+    vehicle = wing_of_topic(tmp_path)
+    whole = diagnose(
+        samples.resample(samples.read_columns_of_vehicle(parted_log, vehicle), vehicle), wing_model
+    )
+    parts = list(samples.stream_flights([parted_log], vehicle))
+    assert len(parts) == 5
+    for part in parts:
+        rows = diagnose(part, wing_model)
+        settled = rows.t_s > rows.t_s[0] + 25.0
+        known = np.searchsorted(whole.t_s, rows.t_s[settled])
+        assert (rows.isolated_surfaces[settled] == whole.isolated_surfaces[known]).mean() > 0.97
 
 
 @pytest.mark.parametrize(

@@ -328,3 +328,16 @@ def test_of_a_file_that_is_not_there_no_words_are_read(tmp_path, monkeypatch):
     monkeypatch.setattr(validation, "read_text", absent)
     with pytest.raises(ScenarioError, match="in its place"):
         validation.text_of(tmp_path / "x", 10, if_absent=lambda: "in its place")
+
+
+def test_what_stands_beside_a_reference_is_said_instead_of_what_it_refers_to():
+    own = {"description": "a front leg", "maximum": 2}
+    leg = {"type": "number", "description": "a leg", "maximum": 9, "unit": "m"}
+    root = {"$defs": {"Leg": dict(leg), "Front": {"$ref": "#/$defs/Leg", **own}}}
+    merged = {"type": "number", "description": "a front leg", "maximum": 2, "unit": "m"}
+    assert validation._branches({"$ref": "#/$defs/Leg"}, root, None) == [leg]
+    assert validation._branches({"$ref": "#/$defs/Leg", **own}, root, None) == [merged]
+    assert validation._branches({"$ref": "#/$defs/Front", "maximum": 1}, root, None) == [
+        merged | {"maximum": 1}
+    ]
+    assert root["$defs"]["Leg"] == leg

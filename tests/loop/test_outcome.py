@@ -220,3 +220,17 @@ def test_from_the_very_start_detection_may_be_certain():
     at_once = {**FAULTED, "truth.fault_at_s": 0.0, "accounts.guarantee.certain_after_s": 0.0}
     scenario, frame = _record({"faults": [{**FAULT, "at_s": 0.0}]}, at_once)
     assert guaranteed_delay_s(frame, scenario, False) == 0.0
+
+
+SHARES = {
+    "accounts.tracking.frames_since": 50, "accounts.authority.demanded": [4.0, 5.0, 0.0], "dt": 0.02,
+    "accounts.authority.lacking": [1.0, 2.0, 0.0], "accounts.authority.beyond_frames": [3, 7, 1],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("verdict", [None, PLUGGED])
+def test_the_authority_that_was_used_does_not_depend_on_who_diagnosed(verdict):
+    scenario, frame = _record({}, SHARES)
+    found = landing_of(scenario, frame, (), verdict).authority
+    shares = {axis: (of["given_share"], of["beyond_s"]) for axis, of in found.items()}
+    assert shares == {"p": (0.75, 0.06), "q": (0.6, 0.14), "r": (1.0, 0.02)}

@@ -12,6 +12,9 @@ from beaver_ftc.scenario.schema import Expect
 SAID = [
     ("detected_within_s", 0.5, 0.01, True, "detection delay ≤ 0.5 s, got 0.01 s (2 % of the limit)"),
     ("detected_within_s", 0.5, None, False, "detection delay ≤ 0.5 s, got none"),
+    ("detected_within_s", 1.0, 15.96, False, "detection delay ≤ 1 s, got 16 s (1600 % of the limit)"),
+    ("altitude_within_m", 2000, 1234.5, True,
+     "altitude deviation ≤ 2000 m, got 1230 m (61.7 % of the limit)"),
     ("isolated_within_s", 1.0, 0.256, True, "isolation delay ≤ 1 s, got 0.256 s (25.6 % of the limit)"),
     ("isolated_as", "elevator", "rudder", False, "isolated fault elevator, got rudder"),
     ("isolated_as", "elevator", None, False, "isolated fault elevator, got none"),
@@ -402,3 +405,12 @@ def test_the_title_and_the_mood(changes, title, outcome_class):
         f"a-flight: {title}",
         outcome_class,
     )
+
+
+def test_an_alarm_does_not_hide_where_nothing_could_be_concluded():
+    reason = {"quantity": "altitude_m", "flown": None, "share": 0.25, "says": "too high"}
+    blind = {"share": 0.25, "from_s": 3.5, "reasons": [reason]}
+    found = {"detected": True, "delay_s": 0.75, "time_s": 2.75, "axis": "r", "guaranteed_delay_s": None}
+    said = dict(verdict.verdict_lines(Metrics.of(flown(detection=found | {"inconclusive": blind}))))
+    assert said["detection"] == "after 0.75 s on r"
+    assert said["inconclusive"] == "nothing can be concluded in 25 % of the frames from 3.50 s on: too high"

@@ -1,5 +1,6 @@
 """What the detectability survey says and draws of rows made by hand; known moments; one flight."""
 
+import base64
 import json
 import re
 from itertools import permutations
@@ -583,3 +584,17 @@ def test_the_answers_or_tables_with_what_is_alike_and_the_engines(monkeypatch):
     assert command.as_text(document | {"engines": [engine]}, False).splitlines() == [*shown, says, "folder"]
     answered = command.as_text(document | {"answers": ["one", "two"]}, False)
     assert answered == "\n".join(["one", "two", detectability.POINTER])
+
+
+def test_the_page_shows_each_map_under_its_own_words(tmp_path):
+    """Not twice the same: each picture is the file of its name."""
+    parts = {"points": rows_made(), "pairs": pairs_made()}
+    write_files(tmp_path, contents(FILES, document_of("made", (parts,))))
+    page = (tmp_path / "detectability.html").read_text()
+    shown = re.findall(r'alt="([^"]*)" src="data:image/png;base64,([^"]*)"', page)
+    files = [(tmp_path / f"{name}.png").read_bytes() for name in ("detectability", "isolability")]
+    assert files[0] != files[1]
+    assert [(base64.b64decode(picture), words) for words, picture in shown] == [
+        (files[0], "smallest loss that is certain to be detected and isolated"),
+        (files[1], "smallest loss that is distinguished from each other surface"),
+    ]

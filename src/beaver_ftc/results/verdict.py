@@ -216,7 +216,7 @@ def _expectation_in_words(found: Expectation) -> ExpectationInWords:
         limit = f"{quantity} ≤ {_value_text(found.expected)} {unit}"
         if found.actual is not None:
             share = abs(float(found.actual)) / found.expected if found.expected else None
-            actual += f" {unit}{'' if share is None else f' ({100 * share:.3g} % of the limit)'}"
+            actual += f" {unit}{'' if share is None else f' ({_three_digits(100 * share)} % of the limit)'}"
     else:
         what = _TITLE_OF_NAME_EXPECTATION.get(found.name, _without_underscores(found.name))
         limit = f"{what} {_value_text(found.expected)}"
@@ -582,4 +582,9 @@ def _value_text(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, tuple):
         return ", ".join(_value_text(entry) for entry in value)
-    return value if isinstance(value, str) else f"{value:.3g}"
+    return value if isinstance(value, str) else _three_digits(value)
+
+
+def _three_digits(value: float) -> str:
+    """A number of three significant digits, without an exponent below a million: 1230, not 1.23e+03."""
+    return f"{float(f'{value:.3g}'):g}"

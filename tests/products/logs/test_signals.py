@@ -403,3 +403,16 @@ def test_an_exchange_is_told_whole_with_how_well_each_agrees():
         without_it = [None if k == axis else one for k, one in enumerate(angles)]
         if axis:
             assert physics.find_attitude_mistake(columns, without_it, {"spare": other}) is None
+
+
+@pytest.mark.parametrize("values", [[np.nan] * 3, [np.nan, np.inf, -np.inf]])
+def test_a_column_without_a_number_has_none_at_other_times_either(values):
+    found = physics._interpolate_column(Column(np.array([0.0, 1.0, 2.5]), np.array(values)), T_S[:7])
+    assert found.shape == (7,)
+    assert np.isnan(found).all()
+
+
+def test_a_column_at_other_times_lies_on_the_line_between_its_numbers():
+    column = Column(np.array([1.0, 2.0, 3.0, 5.0]), np.array([4.0, np.nan, 10.0, -2.0]))
+    found = physics._interpolate_column(column, np.array([0.5, 1.0, 2.0, 4.0, 5.5]))
+    np.testing.assert_allclose(found, [np.nan, 4.0, 7.0, 4.0, np.nan])

@@ -38,7 +38,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
+from beaver_ftc.documents.errors import NO_FAILURE, BadInput, Stopped, suggestion
 
 __all__ = [
     "DETECTORS", "LAWS", "OF_THE_CORE", "OURS", "SERVICES", "WHEN_IMPORTED", "Range", "Registered", "entries",
@@ -386,7 +386,9 @@ def _load(what: str, target: str) -> type:
     module, _, attribute = target.partition(":")
     try:
         found = getattr(import_module(module), attribute)
-    except (Exception, SystemExit) as error:
+    except (KeyboardInterrupt, Stopped):
+        raise
+    except BaseException as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"{what}: cannot load {target}: {type(error).__name__}: {reason}") from error
     missing = [method for method in _METHODS if not callable(getattr(found, method, None))]
@@ -400,8 +402,8 @@ def made(group: str, name: str) -> Any:
     """An instance of the class behind a name. Raises BadInput, naming it, if there can be none."""
     try:
         return plugin_class(group, name)()
-    except BeaverFtcError:
+    except NO_FAILURE:
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"plug-in {name}: cannot be made: {type(error).__name__}: {reason}") from error

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed, Stopped
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.plugin_frame import PluginFrame
 from beaver_ftc.scenario.schema import Scenario
@@ -112,8 +112,17 @@ def test_errors_are_put_in_one_line_and_bounded(frame):
         plugins._ask("mine", Answers(error=SystemExit(3)).step)
     with pytest.raises(BadInput, match=r"^as it says$"):
         plugins._ask("mine", Answers(error=BadInput("as it says")).step)
-    with pytest.raises(KeyboardInterrupt):
-        plugins._ask("mine", Answers(error=KeyboardInterrupt()).step)
+    for failure in (GeneratorExit("g"), BaseException("g")):
+        with pytest.raises(SimulationFailed, match=f"step raised {type(failure).__name__}: g"):
+            plugins._ask("mine", Answers(error=failure).step)
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt(), Stopped(143)])
+def test_a_signal_that_ends_the_command_is_no_failure_of_the_code_it_arrives_in(frame, end):
+    plugins, _ = frame
+    with pytest.raises(type(end)) as ended:
+        plugins._ask("mine", Answers(error=end).step)
+    assert ended.value is end
 
 
 def test_each_is_told_of_its_own_options_once_and_one_that_goes_on_not_again():

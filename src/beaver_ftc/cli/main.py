@@ -27,6 +27,7 @@ from beaver_ftc.cli import (
     status_of_stop,
 )
 from beaver_ftc.commands import Reporter, StudyCommand
+from beaver_ftc.documents.errors import Stopped
 from beaver_ftc.plugins import loaded
 
 
@@ -132,12 +133,16 @@ def every_command() -> dict[str, Any]:
     return {name: Row(name.rpartition(" ")[2], at).whole() for name, at in commands.registered().items()}
 
 
+def _stop(received: int, _: object) -> NoReturn:
+    raise Stopped(128 + received)
+
+
 def main() -> NoReturn:
     """Run the command line; an error becomes a line on standard error and the exit status of its kind."""
     for name in ("SIGTERM", "SIGHUP"):  # unwind: leave nothing half written
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
-            signal.signal(number, lambda received, _: sys.exit(128 + received))
+            signal.signal(number, _stop)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal that lacks a letter is no reason to fail

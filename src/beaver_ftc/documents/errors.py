@@ -30,6 +30,13 @@ class SimulationFailed(BeaverFtcError):
     exit_code = 3
 
 
+class Stopped(SystemExit):
+    """A signal ends the command: no failure of the code in which it arrives."""
+
+
+NO_FAILURE = (BeaverFtcError, KeyboardInterrupt, Stopped)  # of a plug-in: what passes through its code
+
+
 def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     """`, did you mean x?` if something known is near to what was given, and what is allowed."""
     names = list(known)

@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import declared_errors_for_plugin
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CASE_VARIANT_INDEX
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
-from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.outcome import verdict_of
@@ -137,9 +137,9 @@ class PluginFrame:
     def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
         try:
             return question(*arguments)
-        except BeaverFtcError:
+        except NO_FAILURE:
             raise
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             reason = " ".join(str(error).split())
             self._blame(name, f"{question.__name__} raised {type(error).__name__}: {reason}")
 

@@ -1,5 +1,6 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
+import os
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -251,7 +252,7 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
     verdicts = []
     for path in options.flights:
         check_exists(path)
-        vehicle_path_beside_log = path.with_name("vehicle.yaml")
+        vehicle_path_beside_log = Path(os.path.abspath(path)).parent / "vehicle.yaml"
         if options.vehicle is None and not vehicle_path_beside_log.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
         loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_path_beside_log))

@@ -5,7 +5,6 @@ of any sensor but the gyros were declared, that is what the diagnosis was
 given, and the verdicts are the same to the bit.
 """
 
-import json
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import Document, Metrics
+from beaver_ftc.results import Document, Metrics, read_metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
 from beaver_ftc_logs.readers.table import check_row_count_and_time, read_numbers
 from beaver_ftc_logs.recording import Floats
@@ -132,7 +131,10 @@ def _is_as_flown(path: Path, verdict: Document) -> bool | None:
     metrics_path = path.with_name("metrics.json")
     if not metrics_path.is_file():
         return None
-    metrics = Metrics.of(json.loads(metrics_path.read_text(encoding="utf-8")))
+    try:
+        metrics = Metrics.of(read_metrics(metrics_path))
+    except (OSError, ValueError):
+        raise BadInput(f"{metrics_path}: cannot be read, allowed: the metrics.json of the flight") from None
     flown_times_s = metrics.detection.time_s, metrics.isolation.time_s
     return all(map(_is_same_time, flown_times_s, (verdict["detection_s"], verdict["isolation_s"])))
 

@@ -1,5 +1,6 @@
 """The command line around its commands: signals, streams, exit status, helps and plug-ins."""
 
+import errno
 import io
 import signal
 import sys
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 
 import needs
 from beaver_ftc import __version__, commands, plugins
-from beaver_ftc.cli import as_typer_reads, complete_names
+from beaver_ftc.cli import as_typer_reads, complete_names, failure_of
 from beaver_ftc.cli import main as command_line
 from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import BadInput
@@ -43,6 +44,12 @@ def test_a_signal_unwinds_with_its_status(monkeypatch, as_started, number):
     assert ended(monkeypatch, lambda: signal.raise_signal(number)) == 128 + number
 
 
+def test_a_signal_in_the_code_of_a_plug_in_is_not_blamed_on_it(monkeypatch, as_started):
+    """Its constructor runs when the signal arrives: 143, not "cannot be made" with 2."""
+    monkeypatch.setattr(plugins, "plugin_class", lambda *_: lambda: signal.raise_signal(signal.SIGTERM))
+    assert ended(monkeypatch, lambda: plugins.made("beaver_ftc.laws", "mine")) == 128 + signal.SIGTERM
+
+
 def test_what_is_ignored_stays_ignored(monkeypatch, as_started):
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     assert ended(monkeypatch, lambda: signal.raise_signal(signal.SIGHUP)) == 0
@@ -55,6 +62,14 @@ def test_letters_that_a_terminal_lacks_are_replaced(monkeypatch, as_started):
     monkeypatch.setattr(sys, "stderr", streams[1])
     assert ended(monkeypatch, lambda: None) == 0
     assert said == [{"errors": "replace"}]
+
+
+@pytest.mark.parametrize("number", [errno.ENAMETOOLONG, errno.ELOOP])
+def test_a_path_that_no_file_can_have_is_bad_input(number):
+    found = failure_of(OSError(number, "Of No Use", "a/path"))
+    assert (type(found), str(found)) == (BadInput, "a/path: of no use, allowed: the path of a file")
+    assert failure_of(OSError(number, "Of No Use")).exit_code == 3  # whose path is not known
+    assert failure_of(OSError(errno.EIO, "broken", "a/path")).exit_code == 3
 
 
 @pytest.mark.parametrize(("error", "status"), [(BadInput("no"), 2), (ValueError("no"), 3)])

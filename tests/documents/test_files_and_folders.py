@@ -322,3 +322,24 @@ def test_data_lie_in_the_package_where_it_is_installed(tmp_path, monkeypatch):
     assert files.data_root() == tmp_path / "root"
     (tmp_path / "data").mkdir()
     assert files.data_root() == tmp_path / "data"
+
+
+@pytest.mark.parametrize(
+    ("user", "group", "mode", "says"),
+    [
+        (0, 1, 0o700, ""), (1, 0, 0o700, "it belongs to user {}"), (0, 0, 0o770, "its mode is 0770"),
+        (0, 1, 0o702, "its mode is 0702"), (0, 0, 0o755, ""), (1, 1, 0o722, "it belongs to user {}"),
+    ],
+)  # fmt: skip
+def test_the_owner_decides_who_else_can_write_and_not_the_group(user, group, mode, says):
+    """0: that of this process, 1: another."""
+    own = os.getuid()
+    status = os.stat_result((mode, 0, 0, 1, own + 17 * user, os.getgid() + 5 * group, 0, 0, 0, 0))
+    assert files._other_writer(status) == says.format(own + 17)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000, "{", "", "\x00"])
+def test_a_damaged_document_is_a_value_error_however_deep(tmp_path, text):
+    (tmp_path / "f").write_text(text)
+    with pytest.raises(ValueError, match=r"nested|Expecting"):
+        files.read_json(tmp_path / "f")

@@ -155,3 +155,26 @@ def test_a_figure_for_a_paper_is_a_column_wide_in_small_letters(flight):
     assert max(text.get_fontsize() for text in figure.findobj(matplotlib.text.Text) if text.get_text()) <= 8
     with pytest.raises(bf.BadInput, match="style: 'poster' is not known, allowed: screen, paper"):
         flight.plot(style="poster")
+
+
+DAMAGED = (
+    "",
+    "{",
+    "null",
+    "[]",
+    "3",
+    "{}",
+    "[" * 100_000,
+    '{"flight": 3}',
+    '{"flight": {}, "detection": null}',
+)
+
+
+@pytest.mark.parametrize("text", DAMAGED)
+def test_a_folder_whose_metrics_are_damaged_is_no_result(tmp_path, text):
+    (tmp_path / "metrics.json").write_text(text)
+    (tmp_path / "scenario.yaml").write_text("name: x")
+    with pytest.raises(
+        bf.BadInput, match=r"no metrics\.json can be read there, allowed: the result folder of a run"
+    ):
+        bf.open_run(tmp_path)

@@ -7,6 +7,7 @@ checked before the first one flies.
 """
 
 import contextlib
+import errno
 import os
 import signal
 import sys
@@ -144,6 +145,8 @@ def failure_of(error: Exception) -> BeaverFtcError:
     if isinstance(error, BeaverFtcError):
         return error
     said = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.errno in (errno.ENAMETOOLONG, errno.ELOOP) and error.filename:
+        return BadInput(f"{error.filename}: {str(error.strerror).lower()}, allowed: the path of a file")
     if isinstance(error, MemoryError):
         text = "there is not enough memory for this" + (f": {said}" if said else "")
     else:

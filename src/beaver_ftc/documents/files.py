@@ -11,6 +11,7 @@ child, and keeps the answer.
 
 import contextlib
 import hashlib
+import json
 import os
 import shutil
 import stat
@@ -195,6 +196,14 @@ def read_bytes(path: Path | str, max_bytes: int) -> bytes:
     if len(data) > max_bytes:
         raise UnreadableError(f"is too large, allowed: at most {max_bytes / 1e6:g} MB")
     return data
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file of ours. Raises OSError, and ValueError if it is damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("is nested too deeply") from None
 
 
 def _check_kind_and_size(status: os.stat_result, max_bytes: int) -> None:

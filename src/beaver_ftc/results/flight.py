@@ -1,6 +1,5 @@
 """A flight as Python has it: its log as a table, its metrics as a document and typed, its figures."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -274,7 +273,7 @@ def open_run(folder: str | PathLike[str]) -> Flight:
         raise BadInput(f"{folder!r:.60} is no folder, allowed: the result folder of a run")
     path = Path(folder)
     try:
-        document = json.loads((path / "metrics.json").read_text(encoding="utf-8"))
+        document = model.read_metrics(path / "metrics.json")
     except (OSError, ValueError) as error:
         raise BadInput(
             f"{path}: no metrics.json can be read there, allowed: the result folder of a run"

@@ -7,6 +7,7 @@ the flight, delays s since the first frame with the fault, rates deg/s; None is 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
+from pathlib import Path
 from types import UnionType
 from typing import Any, Self, Union, get_args, get_origin, get_type_hints
 
@@ -568,3 +569,18 @@ class Metrics(Part):
     def fault_named(self) -> bool:
         """Whether the fault was named rightly, and no false alarm came before."""
         return bool(self.isolation.correct) and not self.false_alarm
+
+
+_READ_BY_ALL = ("flight", "detection", "isolation", "tracking")  # sections that every flight has
+
+
+def read_metrics(path: Path) -> Document:
+    """The document metrics.json of a flight. Raises OSError, and ValueError for any other document."""
+    document: Document = files.read_json(path)
+    try:
+        found = Metrics.of(document)
+    except (AttributeError, TypeError) as error:
+        raise ValueError("holds no metrics of a flight") from error
+    if any(getattr(found, section) is None for section in _READ_BY_ALL):
+        raise ValueError("lacks a section that every flight has")
+    return document

@@ -21,6 +21,7 @@ from beaver_ftc import __version__
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import Truth, fault_free_s, is_late
@@ -263,7 +264,7 @@ def _open(folder: Path, campaign: Campaign) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         if not manifest.exists():
             write_whole(manifest, json.dumps(mine).encode())
-        theirs = json.loads(manifest.read_text(encoding="utf-8"))
+        theirs = read_json(manifest)
     except (OSError, ValueError) as error:
         raise SimulationFailed(f"{folder}: cannot be used for a campaign: {error}") from error
     if not isinstance(theirs, dict):
@@ -278,7 +279,7 @@ def _kept(folder: Path, kind: str) -> dict[int, Row]:
     rows: dict[int, Row] = {}
     for file in sorted(folder.glob(f"{kind}-*.json")):
         try:
-            rows.update((row["index"], row) for row in json.loads(file.read_text(encoding="utf-8")))
+            rows.update((row["index"], row) for row in read_json(file))
         except (ValueError, KeyError, TypeError):
             set_aside(file, UNREADABLE)
     return rows

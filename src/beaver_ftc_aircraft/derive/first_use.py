@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.aircraft import AIRCRAFT_FILE as FILE
 from beaver_ftc.aircraft import AXES, FROM_JSBSIM, Aircraft, is_derived
 from beaver_ftc.design import inertia_coefficients
-from beaver_ftc.documents import BeaverFtcError, cache_base
+from beaver_ftc.documents import BeaverFtcError, cache_base, read_json
 from beaver_ftc.plant import Plant, digest_of_aircraft, translated
 from beaver_ftc.plant import trim_plant as trim
 from beaver_ftc.scenario import Bounds
@@ -55,7 +55,7 @@ def kept_or_compared(aircraft: Aircraft) -> list[str]:
         return compared(aircraft)
     file = base / "compared" / f"{digest_of_aircraft(aircraft.folder)}.json"
     try:
-        return list(json.loads(file.read_text(encoding="utf-8")))
+        return list(read_json(file))
     except (OSError, ValueError):
         lines = compared(aircraft)
     with contextlib.suppress(OSError):  # nowhere to keep it, or another process was first

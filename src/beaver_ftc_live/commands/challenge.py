@@ -1,5 +1,6 @@
 """`beaver-ftc challenge`: hidden flights for a class, what its students hand in, and the grades."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -67,7 +68,7 @@ def submit(
     from beaver_ftc_live.challenge import folders
     from beaver_ftc_live.challenge.grading import tried
 
-    name = folders.check_student(student or file.resolve().stem)
+    name = folders.check_student(student or Path(os.path.abspath(file)).stem)
     source = folders.source_of(file)
     document = {"student": name, **tried(source, file.name), "submitted": None}
     if to is not None:

@@ -300,6 +300,14 @@ def test_options_that_contradict(tmp_path, options, says):
     assert says in str(done.exception)
 
 
+@pytest.mark.parametrize("flight", [".", "/"])
+def test_a_folder_without_a_name_has_no_vehicle_file_beside_it(tmp_path, monkeypatch, flight):
+    (tmp_path / "flight").mkdir()
+    monkeypatch.chdir(tmp_path / "flight")
+    done = CliRunner().invoke(app, ["diagnose", flight, "--aircraft", "beaver"])
+    assert str(done.exception) == f"{flight}: no vehicle.yaml beside it, allowed: --vehicle FILE"
+
+
 def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     path, _ = exported(flown[0], "table", tmp_path)
     truth = arrow.read_csv(path).to_pandas()

@@ -64,6 +64,18 @@ def test_a_damaged_log_is_told(run, tmp_path, rows, stamp, says):
         replay_run_log(tmp_path / "log.parquet")
 
 
+@pytest.mark.parametrize("text", ["{", "null", "{}", '{"detection": 3}', "[" * 100_000])
+def test_damaged_metrics_beside_the_log_are_told(run, tmp_path, text):
+    folder, _ = run
+    for name in ("scenario.yaml", "log.parquet"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    (tmp_path / "metrics.json").write_text(text)
+    with pytest.raises(
+        BadInput, match=r"metrics\.json: cannot be read, allowed: the metrics\.json of the flight"
+    ):
+        replay_run_log(tmp_path / "log.parquet")
+
+
 def test_the_command_writes_rows_and_verdict(run, tmp_path):
     folder, flight = run
     arguments = ["diagnose", str(folder / "log.parquet"), "--out", str(tmp_path), "--format", "json"]

@@ -220,20 +220,30 @@ def test_runs_leave_a_figure_a_document_and_a_report(monkeypatch, tmp_path):
 
 
 def test_folders_that_are_no_runs_are_all_named(tmp_path):
-    for name, metrics in (("a", "{"), ("b", None), ("c", "{}")):
+    for name, metrics in (("a", "{"), ("b", None), ("c", "{}"), ("e", "[" * 100_000), ("f", "null")):
         (tmp_path / name).mkdir()
         for file, content in (("metrics.json", metrics), ("log.parquet", ""), ("scenario.yaml", "{}")):
             if content is not None:
                 (tmp_path / name / file).write_text(content)
     (tmp_path / "d").mkdir()
-    (tmp_path / "d" / "metrics.json").write_text("{}")
+    (tmp_path / "d" / "metrics.json").write_text(
+        json.dumps({key: {} for key in ("flight", "detection", "isolation", "tracking")})
+    )
+    (tmp_path / "g").mkdir()
+    for file, content in (
+        ("metrics.json", (tmp_path / "d" / "metrics.json").read_text()),
+        ("log.parquet", ""),
+    ):
+        (tmp_path / "g" / file).write_text(content)
+    (tmp_path / "g" / "scenario.yaml").write_text("[" * 100_000)
     with pytest.raises(BadInput) as said:
-        runs.read_runs([tmp_path / name for name in "abcd"])
+        runs.read_runs([tmp_path / name for name in "abcdefg"])
     allowed = "allowed: a result folder of beaver-ftc run"
     unreadable = f"metrics.json or scenario.yaml cannot be read, {allowed}"
     assert str(said.value).splitlines() == [
         f"{tmp_path / 'a'}: {unreadable}", f"{tmp_path / 'b'}: holds no metrics.json, {allowed}",
         f"{tmp_path / 'c'}: {unreadable}", f"{tmp_path / 'd'}: holds no log.parquet, {allowed}",
+        *(f"{tmp_path / name}: {unreadable}" for name in "efg"),
     ]  # fmt: skip
 
 

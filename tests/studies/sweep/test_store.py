@@ -97,6 +97,16 @@ def test_damaged_results_are_set_aside(store, short):
             assert (store.folder / name).read_bytes() == whole[: len(whole) // 2]
 
 
+def test_a_folder_in_the_place_of_the_results_is_set_aside(store, short):
+    with store:
+        store.begin(identity_of(short), resume=False)
+        store.results.mkdir()
+        assert not store.is_compacted(3)
+        assert store.landed(0, range(3)) is None
+        assert not store.results.exists()
+        assert (store.folder / "results.parquet.damaged").is_dir()
+
+
 def test_compacting_joins_the_parts_in_order_and_removes_them(store, short):
     with store:
         store.begin(identity_of(short), resume=False)

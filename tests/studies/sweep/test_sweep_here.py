@@ -153,9 +153,9 @@ def test_tables_are_joined_into_groups_worth_reading(monkeypatch):
         (["flights"], None),
         ([".x.partial", "sweep.json"], None),
         (["parts", "figures", "sweep.json", "report.html"], None),
-        (["figures"], "figures"),
-        (["report.html", "parts"], "parts"),
-        (["sweep.json", "my.txt"], r"my\.txt"),
+        (["figures"], r"no sweep\.json, but other files"),
+        (["report.html", "parts"], r"no sweep\.json, but other files"),
+        (["sweep.json", "my.txt"], r"my\.txt, which is no part of a sweep"),
     ],
 )
 def test_whose_folder_it_is(names, said, tmp_path):
@@ -164,7 +164,7 @@ def test_whose_folder_it_is(names, said, tmp_path):
     if said is None:
         store._refuse_foreign(tmp_path)
         return
-    with pytest.raises(SimulationFailed, match=f"it holds {said}, which is no part of a sweep"):
+    with pytest.raises(SimulationFailed, match=f"it holds {said}; move it away"):
         store._refuse_foreign(tmp_path)
 
 

@@ -1,6 +1,5 @@
 """Finished runs side by side: what `beaver-ftc compare RUN...` shows."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import one_line
-from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.model import Document, Metrics, read_metrics
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.page import save
@@ -62,11 +61,11 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
 def _read(folder: Path) -> Run:
     import yaml
 
-    document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    document = read_metrics(folder / "metrics.json")
     (folder / "log.parquet").stat()
     try:
         flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         raise ValueError("no YAML") from error
     run = Run(folder, document, flown)
     rows_of(run)  # a document that lacks a section is refused here

@@ -22,6 +22,7 @@ from beaver_ftc.diagnosis.rivals import (
     tuned_values,
 )
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, is_compiled, options_of, plugin_class, tunable
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
@@ -170,7 +171,7 @@ def write_tuned(document: Document, folder: Path) -> Path:
 def read_tuned(path: Path) -> Document:
     """The values in a file that `compare --tune` wrote. Raises BadInput."""
     try:
-        grades: Document = json.loads(path.read_text(encoding="utf-8"))["grades"]
+        grades: Document = read_json(path)["grades"]
         assert set(grades) <= set(FLIGHT_GRADES)
         return grades
     except (OSError, ValueError, KeyError, TypeError, AssertionError) as error:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, say_once
-from beaver_ftc.documents.files import data_root
+from beaver_ftc.documents.files import data_root, read_json
 from beaver_ftc.plugins import SERVICES, folders
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
@@ -147,7 +147,7 @@ class RowsAsJson:
         file.write(plain.encode())
 
     def read(self, path: Path, runs: Sequence[int]) -> Any:
-        rows = self._adapter.validate_python(json.loads(path.read_text(encoding="utf-8")))
+        rows = self._adapter.validate_python(read_json(path))
         return rows if len(rows) == len(runs) else None
 
 

@@ -1,10 +1,10 @@
 """The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
-import json
 from html import escape
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
 from beaver_ftc.studies.present.page import picture_data
@@ -176,7 +176,7 @@ def mismatch_section(folder: Path) -> str:
     path = folder / "mismatch.json"
     if not path.exists():
         return ""
-    found = json.loads(path.read_text(encoding="utf-8"))
+    found = read_json(path)
     pictures = [_picture(folder / "figures" / f"{name}.png", says) for name, says in PICTURES.items()]
     shown = [html_table(head, rows, caption) for caption, head, rows in tables(found)]
     parts = [_heading(found), *shown, *pictures]

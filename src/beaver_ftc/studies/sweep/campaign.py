@@ -1,6 +1,5 @@
 """A sweep from beginning to end: fly what is missing, then say what it all shows."""
 
-import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import clear_disk_errors
@@ -199,6 +199,6 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
     scenario = one_flight.scenario_of(sweep, assignment_of(sweep, options, index))
     document = run(scenario, folder / "flights", options.report, certified=options.keep.certified)
     if (folder / "report.html").exists():  # let it lead to the flight
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_json(folder / "summary.json")
         write_whole(folder / "report.html", render(summary, folder).encode("utf-8"))
     return document | {"folder": str(folder / "flights" / scenario.name)}

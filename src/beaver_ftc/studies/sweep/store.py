@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
@@ -113,6 +114,8 @@ class Store:
             return table
         if self._compacted is None and self.results.exists():
             try:
+                if self.results.is_dir():  # which Arrow would read as a table of many files
+                    raise OSError(f"{self.results} is a folder")
                 self._compacted = read_table(self.results, schema=self.schema)
             except (ArrowException, OSError, ValueError):
                 files.set_aside(self.results, files.UNREADABLE)
@@ -147,7 +150,7 @@ class Store:
     def _identity(self) -> dict[str, Any] | None:
         """Whose flights these are; None where no file says so, or it is damaged."""
         try:
-            there = json.loads(self._manifest.read_text(encoding="utf-8"))
+            there = read_json(self._manifest)
         except (OSError, ValueError):
             return None
         whole = isinstance(there, dict) and all(isinstance(there.get(key), dict) for key in _IDENTITY)
@@ -220,9 +223,9 @@ def _refuse_foreign(folder: Path) -> None:
     foreign = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
     known = {"sweep.json", "lock", files.LOCK, "flights"}
     if foreign or (names and not known & set(names) and not any(map(_is_leftover, names))):
+        why = f"{foreign[0]}, which is no part of a sweep" if foreign else "no sweep.json, but other files"
         raise SimulationFailed(
-            f"will not write into {folder}: it holds {(foreign or names)[0]}, which is no part of a sweep; "
-            "move it away or choose another --out"
+            f"will not write into {folder}: it holds {why}; move it away or choose another --out"
         )
 
 

@@ -413,3 +413,12 @@ def test_a_verdict_goes_over_the_line_as_numbers_and_comes_back():
 def test_what_is_no_verdict_is_told(said, error, says):
     with pytest.raises(error, match=says):
         pilot.verdict_numbers(said, ("aileron", "elevator"))
+
+
+def test_a_link_to_itself_is_no_file_to_hand_in(tmp_path):
+    (tmp_path / "mine").symlink_to("mine")
+    done = beaver("submit", tmp_path / "mine")
+    assert (
+        str(done.exception)
+        == f"{tmp_path / 'mine'}: is no Python file, allowed: one .py file, or a folder with one"
+    )

@@ -129,12 +129,12 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
 @pytest.mark.parametrize("i", range(3))
 def test_what_each_angle_turns_the_axes_by(i):
     """By a small step of the angle, as a rotation vector in body axes."""
-    relations, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
-    relations["memory"]["previous_reading"][PHI : PHI + 3] = angles
+    readings, angles, small = np.zeros(N_SENSORS), np.array([0.4, -0.3, 2.0]), 1e-6
+    readings[PHI : PHI + 3] = angles
     moved = angles + small * (np.arange(3) == i)
     one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
     turned = (one.inv() * other).as_rotvec() / small
-    assert [redundancy.body_turn_per_euler_angle(relations, axis, i) for axis in range(3)] == pytest.approx(
+    assert [redundancy.body_turn_per_euler_angle(readings, axis, i) for axis in range(3)] == pytest.approx(
         turned, abs=1e-5
     )
 

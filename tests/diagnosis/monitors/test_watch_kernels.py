@@ -6,6 +6,7 @@ from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.model import DPT, measured_slipstream
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
+from beaver_ftc.diagnosis.monitors import redundancy as relations
 from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
@@ -84,11 +85,17 @@ def seen(*missing):
 
 
 def with_shares(shares, **fields):
-    """Tests {test: share of its bound}, of which the residual is as large."""
+    """Tests {test: share of its bound}, of which the residual is as large; in level flight, where each angle
+    turns the aircraft about one axis."""
     monitor = new_watch(**fields)
+    residuals = monitor["redundancy"]["test"]["filtered_residual"]
     for test, share in shares.items():
         monitor["redundancy"]["test"]["residual_bound_ratio"][test] = share
-        monitor["redundancy"]["test"]["filtered_residual"][test] = share
+        residuals[test] = share
+    turns, angles = residuals[FIRST_TURN_TEST:][:3], residuals[FIRST_ANGLE_TEST:][:3]
+    monitor["memory"]["max_turn_per_angle"] = np.eye(3)
+    for i in range(3):
+        monitor["memory"]["filtered_turn_beyond_angle"][i] = turns - np.eye(3)[i][:, None] * angles[i]
     return monitor
 
 
@@ -151,6 +158,47 @@ def suspects(shares, lead=None, **fields):
 )
 def test_who_is_suspected_of_what_the_tests_show(shares, who):
     assert suspects(shares) == who
+
+
+@pytest.mark.parametrize("wrong", range(3))
+def test_the_error_of_one_angle_leaves_nothing_beyond_it(wrong):
+    """Of random attitudes the reading of one angle is off by random steps: nothing is left beyond that angle,
+    but beyond the others; the sizes of its residuals add up."""
+    rng = np.random.default_rng(wrong)
+    monitor, readings, size = new_watch(), np.zeros(N_SENSORS), 0.0
+    redundancy = monitor["redundancy"]
+    redundancy["config"]["filter_decay_by_pole"] = 1.0
+    readings[AIRSPEED], redundancy["memory"]["previous_reading"][AIRSPEED] = 45.0, 45.0
+    for _ in range(20):
+        attitude, step = rng.uniform((-3, -1.2, -3), (3, 1.2, 3)), rng.uniform(-1e-3, 1e-3)
+        redundancy["memory"]["predicted_reading"][PHI : PHI + 3] = attitude
+        relations.fill_quaternion(*attitude, redundancy["memory"]["predicted_quaternion"])
+        readings[PHI : PHI + 3] = attitude + step * (np.arange(3) == wrong)
+        relations.fill_residuals(redundancy, readings)
+        watching.update_turn_beyond_each_angle(monitor, readings)
+        size += abs(step)
+    beyond = abs(monitor["memory"]["filtered_turn_beyond_angle"]).max(axis=(1, 2))
+    assert (beyond < 1e-8).tolist() == [i == wrong for i in range(3)]
+    sizes = monitor["memory"]["filtered_angle_residual_size"]
+    assert sizes[wrong] == pytest.approx(size, rel=1e-9)
+    assert abs(np.delete(sizes, wrong, axis=0)).max() < 1e-12
+
+
+def test_an_angle_that_has_turned_an_axis_before_is_still_suspected():
+    """In level flight a heading turns the yaw axis alone. The filters still have what it turned the roll axis
+    by in a steeper attitude, at most 0.5 of the heading."""
+    shares = {FIRST_TURN_TEST: 5.0, FIRST_TURN_TEST + 2: 9.0, FIRST_ANGLE_TEST + 2: 9.0}
+    monitor = with_shares(shares)
+    watching.latch_exceeded_tests_and_refutations(monitor)
+    monitor["memory"]["max_turn_per_angle"][2, 0] = 0.5
+    for beyond, explains in ((5.0, False), (1.6, False), (1.4, True), (-1.4, True), (-1.6, False)):
+        monitor["memory"]["filtered_turn_beyond_angle"][2, 0] = beyond
+        assert watching.angle_error_explains_turn_tests(monitor, 2) == explains
+    monitor["redundancy"]["memory"]["reading_error_bound"][PHI] = 0.1
+    monitor["memory"]["filtered_turn_beyond_angle"][2, 0] = 1.9
+    for size, explains in ((3.9, False), (4.1, True)):  # 1.5 and a tenth of the size
+        monitor["memory"]["filtered_angle_residual_size"][2] = size
+        assert watching.angle_error_explains_turn_tests(monitor, 2) == explains
 
 
 def test_an_angle_that_is_frozen_is_no_gyro_s_doing():

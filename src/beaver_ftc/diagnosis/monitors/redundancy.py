@@ -179,6 +179,11 @@ MONITOR_CONFIG_RECORD = record(
 
 MONITOR_MEMORY_RECORD = record(
     start_stage=int, started_at_s=float, substep=int, tests_exceeded_since_alarm=(int, N_TESTS),
+    # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
+    # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
+    # largest size of body_turn_per_euler_angle
+    filtered_turn_beyond_angle=(3, 3, N_POLES), filtered_angle_residual_size=(3, N_POLES),
+    max_turn_per_angle=(3, 3),
     # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
     # largest size in the other samples of this frame, of the one before, of the one before that
     apparent_gyro_error=3, previous_apparent_gyro_error=3,
@@ -419,10 +424,10 @@ def small_rotation_angle(from_quaternion, to_quaternion, quaternion_component):
 
 
 @kernel
-def body_turn_per_euler_angle(redundancy, axis, angle_index):
-    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (angle_index 0, 1, 2),
-    rad/rad."""
-    phi, theta = redundancy.memory.previous_reading[PHI], redundancy.memory.previous_reading[THETA]
+def body_turn_per_euler_angle(readings, axis, angle_index):
+    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (angle_index 0, 1, 2), rad/rad,
+    at the attitude of the readings (N_SENSORS,)."""
+    phi, theta = readings[PHI], readings[THETA]
     if axis == 0:
         return (1.0, 0.0, -np.sin(theta))[angle_index]
     if axis == 1:

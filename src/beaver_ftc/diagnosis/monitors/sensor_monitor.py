@@ -512,6 +512,9 @@ def restart_comparison_of_gyros_and_attitude(memory):
     memory.start_stage = 1
     memory.filtered_turn_difference[:] = 0.0
     memory.filtered_turn_difference_bound[:] = 0.0
+    memory.filtered_turn_beyond_angle[:] = 0.0
+    memory.filtered_angle_residual_size[:] = 0.0
+    memory.max_turn_per_angle[:] = 0.0
 
 
 @kernel
@@ -589,6 +592,7 @@ def raise_alarm_and_isolate_broken_sensor(
         output.alarm_test_index = output.worst_test_index
         store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
+        update_turn_beyond_each_angle(monitor, measured.signal)
         if memory.substep == 0 and memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
             judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt)
         latch_exceeded_tests_and_refutations(monitor)
@@ -973,15 +977,43 @@ def angle_error_explains_other_angle_tests(monitor, angle_index):
 
 
 @kernel
+def update_turn_beyond_each_angle(monitor, readings):
+    """Filter what the tests of turning show beyond an error of one angle, for each of phi, theta and psi.
+
+    An error that changes by e within a sample moves the residual of its angle by e and that of body axis j by
+    c_j e (body_turn_per_euler_angle). If this angle alone is wrong, r_j - c_j r_angle contains noise alone.
+    """
+    redundancy, memory = monitor.redundancy, monitor.memory
+    for i in range(3):
+        angle_residual = redundancy.test[FIRST_ANGLE_TEST + i].residual
+        for m, decay in enumerate(redundancy.config.filter_decay_by_pole):
+            memory.filtered_angle_residual_size[i, m] = decay * memory.filtered_angle_residual_size[
+                i, m
+            ] + abs(angle_residual)
+        for j in range(3):
+            turn_per_angle = body_turn_per_euler_angle(readings, j, i)
+            memory.max_turn_per_angle[i, j] = max(memory.max_turn_per_angle[i, j], abs(turn_per_angle))
+            turn_beyond_angle = (
+                redundancy.test[FIRST_TURN_TEST + j].residual - turn_per_angle * angle_residual
+            )
+            for m, decay in enumerate(redundancy.config.filter_decay_by_pole):
+                memory.filtered_turn_beyond_angle[i, j, m] = (
+                    decay * memory.filtered_turn_beyond_angle[i, j, m] + turn_beyond_angle
+                )
+
+
+@kernel
 def angle_error_explains_turn_tests(monitor, angle_index):
     """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
-    the residual of the angle's own test allows."""
+    the residual of the angle's own test allows now, or as its residuals since the alarm have shown."""
+    memory = monitor.memory
     redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[FIRST_ANGLE_TEST + angle_index]
     reading_error_bound = redundancy.memory.reading_error_bound
     tilt_error_bound = reading_error_bound[PHI] + reading_error_bound[THETA]
     for j in range(3):
         turn_test = redundancy.test[FIRST_TURN_TEST + j]
-        max_turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
+        turn_per_angle = body_turn_per_euler_angle(redundancy.memory.previous_reading, j, angle_index)
+        max_turn_per_angle = abs(turn_per_angle) + tilt_error_bound
         for m in range(redundancy.config.filter_decay_by_pole.size):
             max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
             max_initial_error_effect = (
@@ -991,12 +1023,17 @@ def angle_error_explains_turn_tests(monitor, angle_index):
                 if angle_index < 2
                 else 0.0
             )
+            max_sound_turn = turn_test.filtered_bound[m] + max_initial_error_effect
+            max_turn_beyond_angle = (
+                max_sound_turn
+                + memory.max_turn_per_angle[angle_index, j] * angle_test.filtered_bound[m]
+                + tilt_error_bound * memory.filtered_angle_residual_size[angle_index, m]
+            )
             if (
-                monitor.memory.tests_exceeded_since_alarm[FIRST_TURN_TEST + j]
+                memory.tests_exceeded_since_alarm[FIRST_TURN_TEST + j]
                 and abs(turn_test.filtered_residual[m])
-                > max_turn_per_angle * max_angle_error
-                + turn_test.filtered_bound[m]
-                + max_initial_error_effect
+                > max_turn_per_angle * max_angle_error + max_sound_turn
+                and abs(memory.filtered_turn_beyond_angle[angle_index, j, m]) > max_turn_beyond_angle
             ):
                 return False
     return True

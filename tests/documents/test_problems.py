@@ -341,3 +341,26 @@ def test_what_stands_beside_a_reference_is_said_instead_of_what_it_refers_to():
         merged | {"maximum": 1}
     ]
     assert root["$defs"]["Leg"] == leg
+
+
+class Herd(Section):
+    """At least two ants."""
+
+    ants: tuple[Ant, ...] = Field(min_length=2, max_length=5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("ants: [{type: ant, legs: x}, {type: ant, legs: y}]", ["ants[0].legs", "ants[1].legs"]),
+        ("ants: [{type: ant}, {type: ant, legs: y}]", ["ants[1].legs"]),
+        ("ants: [{type: ant, legs: x}]", ["ants[0].legs", "ants"]),
+        ("ants: []", ["ants"]),
+    ],
+)
+def test_a_list_is_too_short_only_if_its_items_are_too_few(text, said):
+    document = parse_document(text, "f")
+    with pytest.raises(ScenarioError) as caught:
+        validate(Herd, document, "f")
+    places = [line.split(": ")[1] for line in str(caught.value).splitlines()]
+    assert sorted(places) == sorted(said)

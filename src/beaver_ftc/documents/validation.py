@@ -90,12 +90,17 @@ def one_line(text: str, longest: int) -> str:
 
 def problems_of(error: ValidationError, document: Document, schema: dict[str, Any]) -> Iterator[Problem]:
     """The mistakes in a document's data, each at its line."""
-    details = error.errors(include_url=False)
+    details = [of for of in error.errors(include_url=False) if not _is_short_of_good_items(of)]
     places = [_in_document(of["loc"], document.data, of["type"] == "missing") for of in details]
     for detail, at in _of_branches_meant(list(zip(details, places, strict=True))):
         for where, said in _said_of(detail, at, document.data, schema):
             unknown_key, meant = said.unknown_key, said.meant
             yield Problem(document.line(where), where, said.text, unknown_key=unknown_key, meant=meant)
+
+
+def _is_short_of_good_items(detail: Any) -> bool:
+    """Whether a list is long enough, but for its items with mistakes, which pydantic does not count."""
+    return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
 
 
 class _Said(NamedTuple):
@@ -203,6 +208,8 @@ _SAYS = {
 
 def _wrong(detail: Any, given: Any) -> str:
     kind, shown = detail["type"], _shown(given)
+    if kind == "too_short" and not given:
+        return f"{shown} is empty"
     for says, kinds in _SAYS.items():
         if kind in kinds:
             return f"{shown} {says}"

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -79,3 +80,32 @@ def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
     assert b"Error" not in said
     assert TUNED_FILE.read_bytes() == before
     assert list(tmp_path.iterdir()) == []
+
+
+INTERRUPTED = """
+import signal, sys
+
+class Finder:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == sys.argv[1]:
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Finder)
+from importlib.metadata import EntryPoint
+sys.exit(EntryPoint("beaver-ftc", sys.argv[2], "console_scripts").load()())
+"""
+
+
+@pytest.mark.parametrize(
+    "imported", ["beaver_ftc", "beaver_ftc.public", "beaver_ftc.cli", "typer", "beaver_ftc.cli.main"]
+)
+def test_ctrl_c_during_any_import_leaves_no_trace(imported):
+    """As the script that an installer writes: it imports what pyproject.toml names, and calls it."""
+    pyproject = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    entry = pyproject["project"]["scripts"]["beaver-ftc"]
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, imported, entry], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "")

@@ -156,7 +156,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         _MIN_HYPOTHESIS_PROBABILITY,
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
-    any_change_to_fault_probability = (
+    change_from_any_hypothesis_to_fault_probability = (
         bank.change_probability_per_sample
         * bank.transition_share[bank.is_fault_hypothesis].sum()
         / bank.transition_share.sum()
@@ -165,7 +165,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         [
             [bank.prior_probability[bank.is_fault_hypothesis].sum()],
             (1.0 - bank.change_probability_per_sample) * fault_probability[:-1]
-            + any_change_to_fault_probability,
+            + change_from_any_hypothesis_to_fault_probability,
         ]
     )
     return np.asarray(

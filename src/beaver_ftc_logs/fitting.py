@@ -590,10 +590,10 @@ def _with_noise_inflated_for_gain_errors(
             n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses = _without_mean(group_responses[window_rows])
-                window_residual = _without_mean(residual[window_rows])
+                standardised_window_residual = _without_mean(residual[window_rows])
                 normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
-                    window_responses.reshape(window_residual.size, -1),
-                    window_residual.ravel(),
+                    window_responses.reshape(standardised_window_residual.size, -1),
+                    standardised_window_residual.ravel(),
                     prior_axis_gain_covariance,
                 )
                 window_inflations_by_ma_coefficients.setdefault(

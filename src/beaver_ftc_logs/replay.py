@@ -39,12 +39,12 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     ordered_input_arrays = [
         np.column_stack([log_columns[name] for name in names]) for names in column_names_of_each_input
     ]
-    verdicts_and_bounds = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
+    replayed_verdicts = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
     diagnosis_rows = stepped.diagnosis_rows_from_replay(
-        log_columns["t_s"], verdicts_and_bounds, aircraft.surfaces, scenario.fdi
+        log_columns["t_s"], replayed_verdicts, aircraft.surfaces, scenario.fdi
     )
     return diagnosis_columns(diagnosis_rows, aircraft.surfaces), _replay_verdict(
-        path, scenario, log_columns, verdicts_and_bounds.verdicts
+        path, scenario, log_columns, replayed_verdicts.verdicts
     )
 
 

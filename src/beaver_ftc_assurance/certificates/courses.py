@@ -236,7 +236,10 @@ def statement_by_course(
     held: the hypothesis that the surface is held at a position theta, rad, by which frames bound it.
     """
     diagnosis = tape.last.diagnosis
-    direction, actuator = TYPES[fault_type].stop_direction, diagnosis.surface_fault_types[surface].actuator
+    direction, actuator = (
+        TYPES[fault_type].stop_direction,
+        diagnosis.surface_fault_types[surface].actuator,
+    )
     rule = RULES[TYPES[fault_type].multi_frame_exclusion_test_name]
     slowest_rad_s = scenario.fdi.slowest_oscillation_rad_s
     for sign in (direction,) if direction else (1, -1):

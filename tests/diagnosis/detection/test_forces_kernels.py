@@ -109,8 +109,10 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
         slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
-        assert force["chord_scaled_force_per_surface_rad"][s] == pytest.approx(slope, abs=1e-9)
-        assert force["chord_scaled_force_of_surface_at_command"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        assert force["specific_force_over_chord_per_surface_rad"][s] == pytest.approx(slope, abs=1e-9)
+        assert force["specific_force_over_chord_of_surface_at_command"][s] == pytest.approx(
+            slope * U[s], abs=1e-9
+        )
         own = [
             t
             for t in AIRCRAFT.measurable_forces
@@ -119,7 +121,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
         size = sum(
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
-        assert force["chord_scaled_force_per_surface_rad_error_bound"][s] == pytest.approx(
+        assert force["specific_force_over_chord_per_surface_rad_error_bound"][s] == pytest.approx(
             0.05 * per_coefficient() * size
         )
 
@@ -442,7 +444,7 @@ def viewed():
 @pytest.mark.parametrize(("before", "begun", "expected"), [(1.0, 1, 0.3), (2.2, 1, 0.3), (1.0, 0, 0.0)])
 def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
     force = new_fdi()["statistical"]["forces"]["component"][0]
-    force["predicted_chord_scaled_force"] = 1.6
+    force["predicted_specific_force_over_chord"] = 1.6
     forces.fill_force_flow_lag_error_bound(force, before, begun, 0.004)
     assert force["force_flow_lag_error_bound"] == pytest.approx(expected)
 
@@ -460,10 +462,10 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
 def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     statistical = viewed["statistical"]
     component = statistical["forces"]["component"]
-    then, seen = component["predicted_chord_scaled_force"].copy(), measured()
+    then, seen = component["predicted_specific_force_over_chord"].copy(), measured()
     seen["y"][1] += 0.01
     update_all_force_innovations(statistical["forces"], statistical["gust"], seen, U, DT)
-    changed = np.abs(component["predicted_chord_scaled_force"] - then)
+    changed = np.abs(component["predicted_specific_force_over_chord"] - then)
     assert changed[SIDE_INDEX_AMONG_FORCES] > 0.01
     assert component["force_flow_lag_error_bound"] == pytest.approx(
         forces.MAX_LAG_BETWEEN_FORCE_AND_FLOW_S * changed / DT
@@ -499,7 +501,7 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     of_it = (
         force["axis_and_force_innovation_per_vane_error"]
         if s == ORTHOGONAL_TO_VANE_ERROR
-        else (G[first, s], force["chord_scaled_force_per_surface_rad"][s])
+        else (G[first, s], force["specific_force_over_chord_per_surface_rad"][s])
     )
     assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
@@ -676,7 +678,7 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
     view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
     moment = viewed["statistical"]["forces"]["component"][NORMAL_INDEX_AMONG_FORCES][
-        "chord_scaled_force_of_surface_at_command"
+        "specific_force_over_chord_of_surface_at_command"
     ][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]

@@ -689,9 +689,9 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
-    assert on(held_surface.start_position_interval_and_frame, fdi, surface) == (0.1, 0.2, 9)
+    assert on(held_surface.position_interval_at_frame_start_and_its_frame, fdi, surface) == (0.1, 0.2, 9)
     fdi["types"]["config"]["frame_shows_single_instant"] = 0
-    assert on(held_surface.start_position_interval_and_frame, fdi, surface) == (0.3, 0.4, 8)
+    assert on(held_surface.position_interval_at_frame_start_and_its_frame, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])

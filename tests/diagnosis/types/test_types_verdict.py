@@ -1153,7 +1153,7 @@ def acted(**left):
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         -1,
@@ -1177,7 +1177,7 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 1, 0, 0
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         accommodation_mode,
@@ -1190,7 +1190,7 @@ def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lea
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
         AILERON,
         SUBTRACT_OFFSET,
@@ -1200,10 +1200,10 @@ def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SUBTRACT_OFFSET, -1, -1]
     fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR] = 1
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, GIVE_UP, -1, -1]
     (
         fdi["types"]["surface"]["last_observation"]["position_low"],
@@ -1214,7 +1214,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
         0.4,
         99,
     )
-    take_lead(fdi, pairs.set_pair_accommodation_choose_lead)
+    take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
 

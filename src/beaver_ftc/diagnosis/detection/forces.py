@@ -52,16 +52,17 @@ FORCE_RECORD = record(
     innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
     innovation_per_flow_angle_drift=float, inertial_innovation_drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    chord_scaled_force_per_surface_rad=MAX_SURFACES, previous_chord_scaled_force_per_surface_rad=MAX_SURFACES,
-    chord_scaled_force_of_surface_at_command=MAX_SURFACES,
-    chord_scaled_force_per_surface_rad_error_bound=MAX_SURFACES,
+    specific_force_over_chord_per_surface_rad=MAX_SURFACES,
+    previous_specific_force_over_chord_per_surface_rad=MAX_SURFACES,
+    specific_force_over_chord_of_surface_at_command=MAX_SURFACES,
+    specific_force_over_chord_per_surface_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     axis_and_force_innovation_per_vane_error=2, roll_innovation_per_vane_error=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
     trim_noise_variance_with_without_vane=2, noise_variance_with_without_vane=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
     innovation_per_air_rotation=3, deflection_error_effect_bound=float,
-    predicted_chord_scaled_force=float,  # e of the model, rad/s2
+    predicted_specific_force_over_chord=float,  # e of the model, rad/s2
     force_flow_lag_error_bound=float,  # bound on its error by a time lag, rad/s2
     # variance of e by noise of the accelerometer; independent of the pressure
     accelerometer_innovation_variance=float,
@@ -91,11 +92,13 @@ def update_all_force_innovations(forces, gust, measured_signals, u, dt):
     evaluate(gust.memory.force_table, measured_signals.x, measured_signals.y)
     forces.dynamic_pressure_over_trim = measured_signals.y[QDYN] / forces.trim_dynamic_pressure
     for force_index in range(2):
-        previous_predicted_chord_scaled_force = forces.component[force_index].predicted_chord_scaled_force
+        previous_predicted_specific_force_over_chord = forces.component[
+            force_index
+        ].predicted_specific_force_over_chord
         update_force_innovation_and_regressors(forces, gust, force_index, measured_signals, u)
         fill_force_flow_lag_error_bound(
             forces.component[force_index],
-            previous_predicted_chord_scaled_force,
+            previous_predicted_specific_force_over_chord,
             forces.n_updates_capped_at_minimum,
             dt,
         )
@@ -108,13 +111,13 @@ def update_all_force_innovations(forces, gust, measured_signals, u, dt):
 
 @kernel
 def fill_force_flow_lag_error_bound(
-    force_record, previous_predicted_chord_scaled_force, has_earlier_update, dt
+    force_record, previous_predicted_specific_force_over_chord, has_earlier_update, dt
 ):
     """Fill `force_flow_lag_error_bound` from the change of the model's e since
-    `previous_predicted_chord_scaled_force`: force and flow differ in time."""
+    `previous_predicted_specific_force_over_chord`: force and flow differ in time."""
     force_record.force_flow_lag_error_bound = (
         MAX_LAG_BETWEEN_FORCE_AND_FLOW_S
-        * abs(force_record.predicted_chord_scaled_force - previous_predicted_chord_scaled_force)
+        * abs(force_record.predicted_specific_force_over_chord - previous_predicted_specific_force_over_chord)
         / dt
         if has_earlier_update
         else 0.0
@@ -171,57 +174,60 @@ def update_force_innovation_and_regressors(forces, gust, force_index, measured_s
     all_forces_term_table, force_record = gust.memory.force_table, forces.component[force_index]
     first_term_index = all_forces_term_table.free_from[SIDE_FORCE_INDEX_IN_TABLE + force_index]
     end_term_index = all_forces_term_table.surface_to[SIDE_FORCE_INDEX_IN_TABLE + force_index]
-    chord_scaled_force_per_coefficient = (
+    specific_force_over_chord_per_coefficient = (
         measured_signals.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
-    predicted_chord_scaled_force = 0.0
-    force_record.previous_chord_scaled_force_per_surface_rad[:] = (
-        force_record.chord_scaled_force_per_surface_rad
+    predicted_specific_force_over_chord = 0.0
+    force_record.previous_specific_force_over_chord_per_surface_rad[:] = (
+        force_record.specific_force_over_chord_per_surface_rad
     )
-    force_record.chord_scaled_force_per_surface_rad[:] = 0.0
-    force_record.chord_scaled_force_per_surface_rad_error_bound[:] = 0.0
+    force_record.specific_force_over_chord_per_surface_rad[:] = 0.0
+    force_record.specific_force_over_chord_per_surface_rad_error_bound[:] = 0.0
     for k in range(first_term_index, end_term_index):
         s = all_forces_term_table.surface[k]
         term_regressor_per_unit_coefficient = (
-            chord_scaled_force_per_coefficient
+            specific_force_over_chord_per_coefficient
             * all_forces_term_table.power[all_forces_term_table.monomial[k]]
         )
         if s >= 0:
-            force_record.chord_scaled_force_per_surface_rad[s] += (
+            force_record.specific_force_over_chord_per_surface_rad[s] += (
                 all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
             )
-            force_record.chord_scaled_force_per_surface_rad_error_bound[s] += (
+            force_record.specific_force_over_chord_per_surface_rad_error_bound[s] += (
                 force_record.regressor_tolerance[k - first_term_index]
                 * abs(term_regressor_per_unit_coefficient)
             )
             term_regressor_per_unit_coefficient *= u[s]
         force_record.regressor[k - first_term_index] = term_regressor_per_unit_coefficient
-        predicted_chord_scaled_force += all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
+        predicted_specific_force_over_chord += (
+            all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
+        )
     if force_index == SIDE_INDEX_AMONG_FORCES:
-        chord_scaled_force_from_sideslip_rate = (
-            chord_scaled_force_per_coefficient
+        side_force_over_chord_due_to_sideslip_rate = (
+            specific_force_over_chord_per_coefficient
             * forces.sideslip_rate_coefficient
             * forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES]
             * forces.wing_span
             / (2.0 * measured_signals.y[AIRSPEED])
         )
-        force_record.regressor[end_term_index - first_term_index] = chord_scaled_force_from_sideslip_rate
-        predicted_chord_scaled_force += chord_scaled_force_from_sideslip_rate
-    force_record.regressor[force_record.n_regressors - 1] = predicted_chord_scaled_force
-    force_record.predicted_chord_scaled_force = predicted_chord_scaled_force
+        force_record.regressor[end_term_index - first_term_index] = side_force_over_chord_due_to_sideslip_rate
+        predicted_specific_force_over_chord += side_force_over_chord_due_to_sideslip_rate
+    force_record.regressor[force_record.n_regressors - 1] = predicted_specific_force_over_chord
+    force_record.predicted_specific_force_over_chord = predicted_specific_force_over_chord
     if forces.n_updates_capped_at_minimum == 0:
-        force_record.previous_chord_scaled_force_per_surface_rad[:] = (
-            force_record.chord_scaled_force_per_surface_rad
+        force_record.previous_specific_force_over_chord_per_surface_rad[:] = (
+            force_record.specific_force_over_chord_per_surface_rad
         )
     for s in range(u.size):
-        force_record.chord_scaled_force_of_surface_at_command[s] = (
-            force_record.previous_chord_scaled_force_per_surface_rad[s] * u[s]
+        force_record.specific_force_over_chord_of_surface_at_command[s] = (
+            force_record.previous_specific_force_over_chord_per_surface_rad[s] * u[s]
         )
     force_record.innovation = (
-        measured_signals.force[1 + force_index] * forces.inverse_chord_per_m - predicted_chord_scaled_force
+        measured_signals.force[1 + force_index] * forces.inverse_chord_per_m
+        - predicted_specific_force_over_chord
     )
     pressure_noise_innovation_std = (
-        predicted_chord_scaled_force * forces.dynamic_pressure_noise_std / measured_signals.y[QDYN]
+        predicted_specific_force_over_chord * forces.dynamic_pressure_noise_std / measured_signals.y[QDYN]
     )
     for k in range(2):
         force_record.noise_variance_with_without_vane[k] = (
@@ -314,22 +320,22 @@ def _configure_force(
     forces, gust_config = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
     force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
     vane_index_in_y, axis = ((BETA, 2), (ALPHA, 1))[force_index]
-    chord_scaled_force_per_coefficient = (
+    specific_force_over_chord_per_coefficient = (
         y[QDYN] * gust_config["wing_area_per_mass"] * forces["inverse_chord_per_m"]
     )
-    chord_scaled_force_slopes_with_slipstream = (
-        chord_scaled_force_per_coefficient
+    specific_force_over_chord_slopes_with_slipstream = (
+        specific_force_over_chord_per_coefficient
         * _force_coefficient_slopes(aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim)
     )
-    chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1]
+    specific_force_over_chord_slopes = specific_force_over_chord_slopes_with_slipstream[:-1]
     force_record["axis_and_force_innovation_per_vane_error"] = (
         -acceleration_slopes_by_air_data[axis, vane_index_in_y],
-        -chord_scaled_force_slopes[vane_index_in_y],
+        -specific_force_over_chord_slopes[vane_index_in_y],
     )
     force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index_in_y]
-    force_record["innovation_per_air_rotation"] = chord_scaled_force_slopes[3:]
+    force_record["innovation_per_air_rotation"] = specific_force_over_chord_slopes[3:]
     force_record["trim_noise_variance_with_without_vane"] = _force_prediction_noise_variances(
-        fdi, sensor_errors, y, chord_scaled_force_slopes_with_slipstream, vane_index_in_y
+        fdi, sensor_errors, y, specific_force_over_chord_slopes_with_slipstream, vane_index_in_y
     )
     accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
     force_record["accelerometer_innovation_variance"] = (
@@ -340,15 +346,15 @@ def _configure_force(
         declared,
         terms,
         y,
-        chord_scaled_force_slopes[vane_index_in_y] / chord_scaled_force_per_coefficient,
+        specific_force_over_chord_slopes[vane_index_in_y] / specific_force_over_chord_per_coefficient,
         force_index,
         forces["inverse_chord_per_m"],
     )
-    max_chord_scaled_force_per_deflection_rad = chord_scaled_force_per_coefficient * sum(
+    max_specific_force_over_chord_per_deflection_rad = specific_force_over_chord_per_coefficient * sum(
         abs(term.value) for term in terms if term.surface
     )
     force_record["deflection_error_effect_bound"] = (
-        max_chord_scaled_force_per_deflection_rad * declared.actuators.deflection_rad
+        max_specific_force_over_chord_per_deflection_rad * declared.actuators.deflection_rad
     )
     force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
         sensor_errors, gust_config["gravity"], y[AIRSPEED], force_index
@@ -356,31 +362,33 @@ def _configure_force(
     flow_angle_drift_intensity = (
         FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
     ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-    force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[vane_index_in_y] ** 2 * (
-        flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
-    )
+    force_record["inertial_innovation_drift_intensity"] = specific_force_over_chord_slopes[
+        vane_index_in_y
+    ] ** 2 * (flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED]))
 
 
 def _force_prediction_noise_variances(
     fdi: np.void,
     sensor_errors: SensorErrors,
     y: np.ndarray,
-    chord_scaled_force_slopes_with_slipstream: np.ndarray,
+    specific_force_over_chord_slopes_with_slipstream: np.ndarray,
     vane_index_in_y: int,
 ) -> tuple[float, float]:
     """Variance of a predicted force by the noise of all readings, and without that of its vane."""
-    chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1].copy()
-    chord_scaled_force_per_slipstream = chord_scaled_force_slopes_with_slipstream[-1]
+    specific_force_over_chord_slopes = specific_force_over_chord_slopes_with_slipstream[:-1].copy()
+    specific_force_over_chord_per_slipstream = specific_force_over_chord_slopes_with_slipstream[-1]
     slipstream_slope_per_airspeed, slipstream_variance_from_other_readings = (
         _slipstream_slope_and_noise_variance(y, fdi["bound"]["declared_errors"], sensor_errors)
     )
-    chord_scaled_force_slopes[AIRSPEED] += chord_scaled_force_per_slipstream * slipstream_slope_per_airspeed
+    specific_force_over_chord_slopes[AIRSPEED] += (
+        specific_force_over_chord_per_slipstream * slipstream_slope_per_airspeed
+    )
     innovation_variance_by_reading = (
-        chord_scaled_force_slopes * sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
+        specific_force_over_chord_slopes * sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
     ) ** 2
     total_variance = (
         innovation_variance_by_reading.sum()
-        + chord_scaled_force_per_slipstream**2 * slipstream_variance_from_other_readings
+        + specific_force_over_chord_per_slipstream**2 * slipstream_variance_from_other_readings
     )
     return total_variance, total_variance - innovation_variance_by_reading[vane_index_in_y]
 

@@ -464,8 +464,8 @@ def cancelled_column_entry_and_error_bound(view, forces, bound_record, G, plane_
         return cancelled_column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(cancelled_column_entry)
     if component >= SIDE_FORCE:
         force_record = forces.component[component - SIDE_FORCE]
-        cancelled_column_entry = force_record.previous_chord_scaled_force_per_surface_rad[s]
-        return cancelled_column_entry, force_record.chord_scaled_force_per_surface_rad_error_bound[s]
+        cancelled_column_entry = force_record.previous_specific_force_over_chord_per_surface_rad[s]
+        return cancelled_column_entry, force_record.specific_force_over_chord_per_surface_rad_error_bound[s]
     error_bound = (
         bound_record.surface_term_error_bound_per_rad[component, s]
         if bound_record.has_surface_term_errors
@@ -483,17 +483,22 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
     if view.is_orthogonal_to_rolling_gust:
         return set_vane_gust_free_direction_and_return_leak_share(view, forces, gust)
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
-    first_entry, first_error_bound = cancelled_column_entry_and_error_bound(view, forces, bound_record, G, 0)
-    second_entry, second_error_bound = cancelled_column_entry_and_error_bound(
+    cancelled_entry_on_first_component, first_error_bound = cancelled_column_entry_and_error_bound(
+        view, forces, bound_record, G, 0
+    )
+    cancelled_entry_on_second_component, second_error_bound = cancelled_column_entry_and_error_bound(
         view, forces, bound_record, G, 1
     )
-    column_norm = np.sqrt(first_entry * first_entry + second_entry * second_entry)
+    column_norm = np.sqrt(
+        cancelled_entry_on_first_component * cancelled_entry_on_first_component
+        + cancelled_entry_on_second_component * cancelled_entry_on_second_component
+    )
     if column_norm == 0.0:
         return 0.0
-    view.direction[first_component] = -second_entry / column_norm
-    view.direction[second_component] = first_entry / column_norm
-    view.unit_column[first_component] = first_entry / column_norm
-    view.unit_column[second_component] = second_entry / column_norm
+    view.direction[first_component] = -cancelled_entry_on_second_component / column_norm
+    view.direction[second_component] = cancelled_entry_on_first_component / column_norm
+    view.unit_column[first_component] = cancelled_entry_on_first_component / column_norm
+    view.unit_column[second_component] = cancelled_entry_on_second_component / column_norm
     error_bound_along_direction = (
         abs(view.direction[first_component]) * first_error_bound
         + abs(view.direction[second_component]) * second_error_bound
@@ -783,7 +788,8 @@ def can_surface_fault_change_view(view, forces, s, angular_effectiveness_column)
         projected_effect_per_rad += m[i] * angular_effectiveness_column[i]
     for force_index in range(2):
         projected_effect_per_rad += (
-            m[SIDE_FORCE + force_index] * forces.component[force_index].chord_scaled_force_per_surface_rad[s]
+            m[SIDE_FORCE + force_index]
+            * forces.component[force_index].specific_force_over_chord_per_surface_rad[s]
         )
     return projected_effect_per_rad != 0.0
 
@@ -1111,6 +1117,6 @@ def fill_view_signatures(view, forces, Gu):
             for force_index in range(2):
                 projected_surface_acceleration += (
                     m[SIDE_FORCE + force_index]
-                    * forces.component[force_index].chord_scaled_force_of_surface_at_command[s]
+                    * forces.component[force_index].specific_force_over_chord_of_surface_at_command[s]
                 )
             hypothesis.signature[0] = projected_surface_acceleration

@@ -94,7 +94,7 @@ def update_detection_filters(fdi, prediction, measured):
 
 
 @kernel
-def update_fault_effects_and_estimators(fdi, prediction):
+def update_fault_effects_and_isolation_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
     config = fdi.config
     bound_record = fdi.bound
@@ -536,7 +536,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     update_detection_filters(fdi, prediction, measured)
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
-    update_fault_effects_and_estimators(fdi, prediction)
+    update_fault_effects_and_isolation_estimators(fdi, prediction)
     record_commands_in_variant(fdi.config.isolation_variant, fdi, prediction)
     do_weights_leak = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
     filters.advance_fdae(

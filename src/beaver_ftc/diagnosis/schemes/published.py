@@ -207,7 +207,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     adaptive_estimators.update_detection_filters(fdi, prediction, measured)
-    adaptive_estimators.update_fault_effects_and_estimators(fdi, prediction)
+    adaptive_estimators.update_fault_effects_and_isolation_estimators(fdi, prediction)
     train_fdae_network_if_due(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
         fdi.fdae,

@@ -411,7 +411,9 @@ def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, 
             types, previous_conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
         )
     )
-    accommodated_surface_index, accommodation_mode = set_pair_accommodation_choose_lead(types, layout)
+    accommodated_surface_index, accommodation_mode = accommodate_isolated_surfaces_and_choose_lead(
+        types, layout
+    )
     return (
         isolated_estimator_index,
         isolated_at_s,
@@ -471,7 +473,7 @@ def is_isolated_or_likeliest_in_pitch(types, layout, s):
 
 
 @kernel
-def set_pair_accommodation_choose_lead(types, layout):
+def accommodate_isolated_surfaces_and_choose_lead(types, layout):
     """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
     is done about it: a replaced elevator leads before all others."""
     accommodated_surface_index, accommodation_mode = NO_SURFACE, -1

@@ -259,7 +259,7 @@ def update_releases_returning_consistent_interval(
 
 
 @kernel
-def start_position_interval_and_frame(config, surface, k):
+def position_interval_at_frame_start_and_its_frame(config, surface, k):
     """Return the possible position at the start of the judged frame, (low, high) rad, and the frame that
     shows it.
 
@@ -362,7 +362,7 @@ def update_stuck_returning_consistent_interval(config, surface, type_index, k):
 def add_stuck_release(config, surface, type_index, k):
     """Add a release from the interval of the jammed position."""
     replace_impossible_release_and_store_set(surface, type_index)
-    frame_start_position_low, frame_start_position_high, _ = start_position_interval_and_frame(
+    frame_start_position_low, frame_start_position_high, _ = position_interval_at_frame_start_and_its_frame(
         config, surface, k
     )
     add_release(
@@ -426,7 +426,7 @@ def update_float_returning_consistent_interval(config, surface, type_index, k):
 @kernel
 def add_float_release(config, surface, type_index, k):
     """Add a release from the neutral position."""
-    frame_start_position_low, frame_start_position_high, _ = start_position_interval_and_frame(
+    frame_start_position_low, frame_start_position_high, _ = position_interval_at_frame_start_and_its_frame(
         config, surface, k
     )
     neutral_position = limit_to_travel(surface, 0.0)
@@ -560,8 +560,8 @@ def update_hardover_down_and_interval(config, surface, type_index, k):
 @kernel
 def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    start_position_low, start_position_high, start_position_frame_index = start_position_interval_and_frame(
-        config, surface, k
+    start_position_low, start_position_high, start_position_frame_index = (
+        position_interval_at_frame_start_and_its_frame(config, surface, k)
     )
     start_position_low = max(
         start_position_low, runaway_up_lower_limit(config, surface, start_position_frame_index)
@@ -574,8 +574,8 @@ def add_hardover_up_release(config, surface, type_index, k):
 @kernel
 def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
-    start_position_low, start_position_high, start_position_frame_index = start_position_interval_and_frame(
-        config, surface, k
+    start_position_low, start_position_high, start_position_frame_index = (
+        position_interval_at_frame_start_and_its_frame(config, surface, k)
     )
     start_position_high = min(
         start_position_high, runaway_down_upper_limit(config, surface, start_position_frame_index)

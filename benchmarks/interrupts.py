@@ -92,6 +92,8 @@ def interrupted(line: str, number: signal.Signals, after_s: float) -> tuple[str,
         time.sleep(1.0)
         left = _left(process.pid)
     traceback = "yes" if b"Traceback" in said else "no"
+    if traceback == "yes":
+        print(said.decode(errors="replace"), file=sys.stderr)
     return number.name, f"{after_s:g}", str(process.returncode), f"{took_s:.2f}", str(left), traceback
 
 

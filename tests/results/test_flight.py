@@ -1,6 +1,7 @@
 """A flight in Python: what a run would have written, as tables, records and figures."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.text
@@ -72,6 +73,12 @@ class TestFlown:
         assert files(saved) == files(folder)
         for name in files(folder):
             assert (saved / name).read_bytes() == (folder / name).read_bytes(), name
+
+    def test_an_interrupted_flight_gets_its_report_at_once_without_figures(self, flight, folder, tmp_path):
+        stopped = replace(flight, metrics=flight.metrics | {"interrupted_s": 2.5})
+        saved = stopped.save(tmp_path)
+        assert files(saved) == [name for name in files(folder) if not str(name).startswith("figures")]
+        assert "INTERRUPTED" in (saved / "report.html").read_text(encoding="utf-8")
 
     def test_opened_is_what_was_saved(self, flight, folder, tmp_path):
         opened = bf.open_run(folder)

@@ -195,7 +195,9 @@ class Flight:
             kept.copy_to(folder / "log.parquet")
             write_documents(folder, self.scenario, self.metrics)
             if report:
-                write_report_files(folder, self.metrics)
+                # After Ctrl-C somebody waits: the report draws its own curves at once, figures take seconds.
+                interrupted = self._typed_metrics.interrupted_s is not None
+                write_report_files(folder, self.metrics, formats=() if interrupted else ("png",))
         return Path(out) / self.name
 
     def _log_or_raise(self) -> Log:

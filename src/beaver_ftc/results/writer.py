@@ -176,7 +176,8 @@ def write_report_files(
     from beaver_ftc.results.report import write_report
 
     to = to or folder
-    (to / "figures").mkdir(exist_ok=True)
+    if formats:
+        (to / "figures").mkdir(exist_ok=True)
     pictures = pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures", formats)
     with drawing(pictures, painters):
         write_report(to / "report.html", [folder])

@@ -15,6 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
+from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
     NAMES_OF_READERS_OF_WANTED_COLUMNS,
     check_exists,
@@ -201,7 +202,8 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
     check_exists(path)
     reader_name = reader_name or reader_name_for_path(path)
     time_column_and_unit = _require_time_column_and_unit(path, remarks) if reader_name == "table" else None
-    recording, names_in_log = _read_columns_for_guess(path, reader_name, time_column_and_unit)
+    recording, names_in_log, mixing = _read_columns_for_guess(path, reader_name, time_column_and_unit)
+    remarks += mixing.lines
     names_with_numbers = [
         name for name, column in recording.columns.items() if np.isfinite(column.values).any()
     ]
@@ -209,9 +211,10 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
         quantity: _shortest_matching_column_name(pattern, names_with_numbers)
         for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
-    command_column_names = _command_column_names(names_with_numbers, column_name_by_quantity)
+    if not mixing.surfaces:
+        _guess_surfaces(mixing, recording, names_with_numbers, column_name_by_quantity)
     missing_axes = [axis for axis in "pqr" if column_name_by_quantity[axis] is None]
-    if missing_axes or not command_column_names:
+    if missing_axes or not mixing.surfaces:
         problem = (
             f"no column looks like the rate {missing_axes[0]}"
             if missing_axes
@@ -223,7 +226,7 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
         )
         return None
     return _propose_vehicle(
-        path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, command_column_names
+        path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, mixing
     )
 
 
@@ -233,7 +236,7 @@ def _propose_vehicle(
     reader_name: str,
     time_column_and_unit: tuple[str, str] | None,
     column_name_by_quantity: dict[str, str | None],
-    command_column_names: list[str],
+    mixing: Mixing,
 ) -> Document:
     columns = recording.columns
     roll_column = columns[column_name_by_quantity["roll"]] if column_name_by_quantity["roll"] else None
@@ -255,10 +258,8 @@ def _propose_vehicle(
         axis: _vehicle_file_column_entry(str(column_name_by_quantity[axis]), rate_unit, "rad/s")
         for axis in "pqr"
     }
-    vehicle["commands"] = [
-        _vehicle_file_command_entry(name, columns[name].values) for name in command_column_names
-    ]
-    vehicle["surfaces"] = {_as_vehicle_or_surface_name(name): {name: 1.0} for name in command_column_names}
+    vehicle["commands"] = mixing.commands
+    vehicle["surfaces"] = mixing.surfaces
     column_name_by_angle = {
         axis: column_name_by_quantity[axis] for axis in ("roll", "pitch") if column_name_by_quantity[axis]
     }
@@ -283,17 +284,32 @@ def _propose_vehicle(
     return vehicle
 
 
+def _guess_surfaces(
+    mixing: Mixing,
+    recording: RecordedFlight,
+    names_with_numbers: Sequence[str],
+    column_name_by_quantity: dict[str, str | None],
+) -> None:
+    """Make a surface of each column that is named like a command."""
+    for name in _command_column_names(names_with_numbers, column_name_by_quantity):
+        mixing.entry_by_column[name] = _vehicle_file_command_entry(name, recording.columns[name].values)
+        mixing.surfaces[_as_vehicle_or_surface_name(name)] = {name: 1.0}
+
+
 def _read_columns_for_guess(
     path: Path, reader_name: str, time_column_and_unit: tuple[str, str] | None
-) -> tuple[RecordedFlight, list[str]]:
-    """The columns of a log, of a long table its first part, that may be something; the names of all."""
+) -> tuple[RecordedFlight, list[str], Mixing]:
+    """The columns of a log, of a long table its first part, that may be something; the names of all; the
+    mixing by its parameters."""
     if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS:
-        all_names = list(read_flight(path, reader_name, columns=()).columns)
-        names_to_read = _names_of_columns_to_read(all_names, None)
-        return read_flight(path, reader_name, columns=names_to_read), all_names
+        names_and_parameters = read_flight(path, reader_name, columns=())
+        all_names = list(names_and_parameters.columns)
+        mixing = mixing_of_log(reader_name, names_and_parameters.parameters, all_names)
+        names_to_read = [*_names_of_columns_to_read(all_names, None), *mixing.entry_by_column]
+        return read_flight(path, reader_name, columns=names_to_read), all_names, mixing
     names_to_read_or_all = _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column_and_unit, names_to_read_or_all))
-    return recording, list(recording.columns)
+    return recording, list(recording.columns), Mixing()
 
 
 def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:

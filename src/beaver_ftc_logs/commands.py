@@ -66,14 +66,15 @@ def identify(
         identify,
         scale_by_dynamic_pressure_if_better,
     )
+    from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
     from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
     from beaver_ftc_logs.samples import load_flights_for_fit
-    from beaver_ftc_logs.vehicle import load_vehicle, with_false_alarm_rate
+    from beaver_ftc_logs.vehicle import with_false_alarm_rate
 
     page_path = out.with_suffix(".html")
     refuse_to_replace_foreign_file(page_path)
-    loaded_vehicle = load_vehicle(vehicle)
+    loaded_vehicle, mixing_lines = load_vehicle_for_logs(vehicle, flights, reader)
     if false_alarms_per_hour is not None:
         loaded_vehicle = with_false_alarm_rate(loaded_vehicle, false_alarms_per_hour)
     loaded_flights, loaded_vehicle = scale_by_dynamic_pressure_if_better(
@@ -88,6 +89,7 @@ def identify(
     document = {
         "model": str(out),
         "page": str(page_path),
+        "mixing": mixing_lines,
         "identified": model.identification_results,
         "settings": model.settings.model_dump(by_alias=True),
     }
@@ -98,7 +100,13 @@ def identify(
         format,
         document,
         lambda: "\n".join(
-            [identification_text(model), *long_log_lines, f"model: {out}", f"page: {page_path}"]
+            [
+                *mixing_lines,
+                identification_text(model),
+                *long_log_lines,
+                f"model: {out}",
+                f"page: {page_path}",
+            ]
         ),
     )
 
@@ -107,21 +115,27 @@ def _check_logs(
     flights: list[Path], vehicle: str | None, out: Path | None, reader: str | None, format: Format
 ) -> None:
     from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
-    from beaver_ftc_logs.vehicle import load_vehicle
+    from beaver_ftc_logs.mixing import load_vehicle_for_logs
 
-    loaded_vehicle = load_vehicle(vehicle) if vehicle is not None else None
+    loaded_vehicle, mixing_lines = (
+        load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
+    )
     if out is not None and (out.exists() or loaded_vehicle is not None):
         reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {reason}")
     findings = [check_log(path, loaded_vehicle, reader) for path in flights]
     guessed_vehicle = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
-    texts = [as_text(finding) for finding in findings]
+    texts = [*mixing_lines, *(as_text(finding) for finding in findings)]
     if guessed_vehicle is not None and out is not None:
         _write_vehicle_file(out, vehicle_file_text(guessed_vehicle))
         texts.append(f"vehicle file: {out}")
     elif guessed_vehicle is not None:
         texts.append(vehicle_file_text(guessed_vehicle))
-    answer(format, {"logs": findings, "vehicle": guessed_vehicle}, lambda: "\n".join(texts))
+    answer(
+        format,
+        {"logs": findings, "vehicle": guessed_vehicle, "mixing": mixing_lines},
+        lambda: "\n".join(texts),
+    )
     if not all(finding["usable"] for finding in findings):
         raise typer.Exit(2)
 
@@ -239,23 +253,26 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
         load_aircraft_and_declared_errors,
         read_diagnosis_inputs,
     )
+    from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.pages import write_diagnosis_with_aircraft_model
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import read_parts_for_vehicle
     from beaver_ftc_logs.scoring import score_diagnosis
-    from beaver_ftc_logs.vehicle import load_vehicle
 
     if options.certificate:
         from beaver_ftc_logs import certified
 
     diagnosed_aircraft = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
-    verdicts = []
+    verdicts: list[Document] = []
+    texts: list[str] = []
     for path in options.flights:
         check_exists(path)
+        n_verdicts_before = len(verdicts)
         vehicle_path_beside_log = Path(os.path.abspath(path)).parent / "vehicle.yaml"
         if options.vehicle is None and not vehicle_path_beside_log.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_path_beside_log))
+        vehicle_path = options.vehicle or str(vehicle_path_beside_log)
+        loaded_vehicle, mixing_lines = load_vehicle_for_logs(vehicle_path, [path], options.reader)
         for recording in read_parts_for_vehicle(path, loaded_vehicle, options.reader):
             aircraft_inputs = read_diagnosis_inputs(recording, loaded_vehicle, diagnosed_aircraft)
             rows, verdict = diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
@@ -271,7 +288,8 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
                 options.out, samples, surfaces, rows, verdict, certificate_writer
             )
             verdicts.append(verdict | {"folder": str(folder)})
-    answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
+        texts += [*mixing_lines, *map(as_text, verdicts[n_verdicts_before:])]
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
 
 
 def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:

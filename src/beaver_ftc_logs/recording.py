@@ -9,6 +9,7 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
+Parameters = Mapping[str, tuple[float, ...]]
+"""Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
 _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
@@ -44,12 +47,22 @@ class LoggedFailure:
 
 @dataclass(frozen=True)
 class RecordedFlight:
-    """One flight: its columns by name, what went wrong by the log's own word, and remarks on the reading."""
+    """One flight: its columns by name, what went wrong by the log's own word, remarks on the reading, and the
+    autopilot's parameters that the log carries."""
 
     name: str
     columns: Mapping[str, Column]
     logged_failures: tuple[LoggedFailure, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    parameters: Parameters = field(default_factory=dict)
+
+
+def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value: float) -> None:
+    """Note a value that a log gives to a parameter."""
+    values = values_by_name.get(name, ())
+    is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))
+    if not is_as_before:
+        values_by_name[name] = (*values[:1], float(value))
 
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:

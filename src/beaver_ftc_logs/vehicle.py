@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, model_serializer, model_validator
 from beaver_ftc.documents import (
     BadInput,
     Conflict,
+    Document,
     Location,
     Number,
     Section,
@@ -155,7 +156,8 @@ class Vehicle(Section):
         min_length=1,
         max_length=20,
         description="columns of the commands that the autopilot sends to the servos. Do not use measured "
-        "positions of the servos, because a fault of a servo changes them",
+        "positions of the servos, because a fault of a servo changes them. For a log of PX4 or ArduPilot you "
+        "can leave out this key, if the parameters in the log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[QuantityColumnOrName] = Field(
@@ -170,7 +172,8 @@ class Vehicle(Section):
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
         "each multiplied by a weight. The numbers are the weights. The positive sense of each deflection "
-        "is your choice, for example that of its servo",
+        "is your choice, for example that of its servo. For a log of PX4 or ArduPilot you can leave out this "
+        "key, if the parameters in the log state the surfaces",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
@@ -423,6 +426,12 @@ def unused_keys_as_comments(used_keys: Collection[str]) -> str:
 
 def load_vehicle(path_or_name: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
+    document, path = read_vehicle_document(path_or_name)
+    return validate(Vehicle, document, path)
+
+
+def read_vehicle_document(path_or_name: str | Path) -> tuple[Document, str]:
+    """The text of a vehicle file as data that is not checked yet, and its path. Raises ScenarioError."""
     file_or_name = str(path_or_name)
     built_in_names = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
     if looks_like_a_path(file_or_name):
@@ -434,7 +443,7 @@ def load_vehicle(path_or_name: str | Path) -> Vehicle:
         unknown_name_text = f"no such file or built-in vehicle{suggestion(file_or_name, built_in_names)}"
         text = text_of(file_or_name, _MAX_FILE_BYTES, lambda: unknown_name_text)
     path = str(Path(file_or_name))
-    return validate(Vehicle, parse_document(text, path), path)
+    return parse_document(text, path), path
 
 
 def with_false_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:

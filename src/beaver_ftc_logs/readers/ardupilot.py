@@ -20,6 +20,7 @@ from typing import Any
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
     RecordedFlight,
+    add_parameter,
     columns_and_time_origin,
     columns_without_numbers,
     package_errors_as_bad_input,
@@ -59,6 +60,7 @@ class _Messages:
     wanted_messages: Collection[str]
     fields_by_message: dict[str, list[str]] = field(default_factory=dict)
     values_by_message: dict[str, ValuesByField] = field(default_factory=dict)
+    parameters: dict[str, tuple[float, ...]] = field(default_factory=dict)
     stamps_by_message: dict[str, _Stamps] = field(default_factory=dict)
 
     def fields_to_read(self, kind: str, fields: list[str]) -> list[str]:
@@ -103,13 +105,17 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     if not messages.fields_by_message:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
     if not messages.values_by_message:
-        return RecordedFlight(path.stem, columns_without_numbers(messages.fields_by_message, _TIME_FIELD))
+        return RecordedFlight(
+            path.stem,
+            columns_without_numbers(messages.fields_by_message, _TIME_FIELD),
+            parameters=messages.parameters,
+        )
     damaged_messages = [name for name, stamps in messages.stamps_by_message.items() if not stamps.in_order]
     if damaged_messages:  # which of their stamps is the first depends on all of them
         messages = _read_messages(path, wanted_columns, damaged_messages)
     first_stamps_us = [stamps.first for stamps in messages.stamps_by_message.values()]
     columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_stamps_us)
-    return RecordedFlight(path.stem, columns)
+    return RecordedFlight(path.stem, columns, parameters=messages.parameters)
 
 
 def _read_messages(
@@ -125,7 +131,10 @@ def _read_messages(
         from beaver_ftc_logs.readers import dataflash
 
         for kind, fields, numbers in dataflash.read_messages(path, found.fields_to_read):
-            if _TIME_FIELD in numbers:
+            if kind == dataflash.PARAMETER_MESSAGE and dataflash.PARAMETER_NAME in numbers:
+                name, value = (numbers[key] for key in dataflash.PARAMETER_FIELDS)
+                add_parameter(found.parameters, name, value)
+            elif _TIME_FIELD in numbers:
                 found.add(_message_name(kind, numbers), fields, numbers)
     return found
 

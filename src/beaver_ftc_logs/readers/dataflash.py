@@ -18,6 +18,10 @@ _BYTES_BETWEEN_RELEASES = 8_000_000
 """Bytes of a log that are read until their pages are released."""
 _HEADER, _HEADER_BYTES, _TYPE_OF_FORMATS = b"\xa3\x95", 3, 0x80
 
+PARAMETER_MESSAGE, PARAMETER_FIELDS = "PARM", ("Name", "Value")
+PARAMETER_NAME = PARAMETER_FIELDS[0]
+"""Message of a parameter: read whatever is asked for, its name as text."""
+
 Numbers = dict[str, Any]
 FieldsOfFormat = Callable[[Any], list[str]]
 
@@ -37,6 +41,8 @@ def read_messages(
 
     @cache
     def fields_of_format(message_format: Any) -> list[str]:
+        if _is_format_of_parameter(message_format):
+            return list(PARAMETER_FIELDS)
         return fields_to_read(message_format.name, numeric_fields_of_format(message_format))
 
     log = (_TextLog if is_text_log else _BinaryLog)(str(path))
@@ -46,6 +52,14 @@ def read_messages(
     finally:
         log.data_map.close()
         log.filehandle.close()
+
+
+def _is_format_of_parameter(message_format: Any) -> bool:
+    if message_format.name != PARAMETER_MESSAGE or not set(PARAMETER_FIELDS) <= set(message_format.colhash):
+        return False
+    indices = [message_format.colhash[name] for name in PARAMETER_FIELDS]
+    types = message_format.msg_types
+    return max(indices) < len(types) and types[indices[0]] is str and types[indices[1]] in (int, float)
 
 
 def _numeric_fields(message_format: Any, is_text_log: bool) -> list[str]:
@@ -182,6 +196,8 @@ class _Layout:
 
     def read_numbers(self, data: Any, offset: int) -> Numbers:
         numbers = dict(zip(self._fields, self._struct.unpack_from(data, offset), strict=True))
+        if isinstance(name := numbers.get(PARAMETER_NAME), bytes):
+            numbers[PARAMETER_NAME] = null_term(name.decode("ascii", "replace"))
         for field, divisor in self._divisors.items():
             numbers[field] /= divisor
         return numbers

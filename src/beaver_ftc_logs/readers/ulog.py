@@ -29,21 +29,27 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     wanted_columns: the columns that are kept in memory, all where None. Where the log has no topic of any of
     them, all columns are returned, without numbers: their names are known then.
     """
-    fields_by_topic, kept_by_topic = _read_topics(path, wanted_columns)
+    parameters: dict[str, tuple[float, ...]] = {}
+    fields_by_topic, kept_by_topic = _read_topics(path, wanted_columns, parameters)
     if not fields_by_topic:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
     if not any(kept_by_topic.values()):
-        return RecordedFlight(path.stem, columns_without_numbers(fields_by_topic, _TIME_FIELD))
+        return RecordedFlight(
+            path.stem, columns_without_numbers(fields_by_topic, _TIME_FIELD), parameters=parameters
+        )
     columns, origin_s = columns_and_time_origin(kept_by_topic, _TIME_FIELD)
     time_origin_notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
-    return RecordedFlight(path.stem, columns, notes=time_origin_notes)
+    return RecordedFlight(path.stem, columns, notes=time_origin_notes, parameters=parameters)
 
 
 def _read_topics(
-    path: Path, wanted_columns: Collection[str] | None
+    path: Path, wanted_columns: Collection[str] | None, parameters: dict[str, tuple[float, ...]]
 ) -> tuple[dict[str, list[str]], dict[str, dict[str, Floats]]]:
     """All fields and the numbers of the kept ones, by topic: of the topics of the wanted columns, of any
-    instance; where none of these is in the log, the fields of all topics, and no numbers."""
+    instance; where none of these is in the log, the fields of all topics, and no numbers.
+
+    parameters: receives those of the log.
+    """
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
         import_module("pyulog")  # here, since the module below may have been imported before
         from beaver_ftc_logs.readers import ulog_blocks
@@ -61,7 +67,9 @@ def _read_topics(
 
         fields_by_topic: dict[str, list[str]] = {}
         kept_by_topic: dict[str, dict[str, Floats]] = {}
-        for topic, fields, kept in ulog_blocks.read_topics(path, topic_names or None, kept_fields):
+        for topic, fields, kept in ulog_blocks.read_topics(
+            path, topic_names or None, kept_fields, parameters
+        ):
             if _TIME_FIELD in fields:
                 fields_by_topic[topic], kept_by_topic[topic] = fields, kept
     return fields_by_topic, kept_by_topic

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.recording import Floats, add_parameter
 
 _BLOCK_BYTES = 1_000_000
 """Bytes of messages of a topic that are held before they are reduced."""
@@ -22,13 +22,21 @@ KeptFields = Callable[[str, list[str]], list[str]]
 
 
 def read_topics(
-    path: Path, topic_names: list[str] | None, kept_fields: KeptFields
+    path: Path,
+    topic_names: list[str] | None,
+    kept_fields: KeptFields,
+    parameters: dict[str, tuple[float, ...]],
 ) -> Iterator[tuple[str, list[str], dict[str, Floats]]]:
     """Of each topic with a message: its name in columns, all its fields, and the numbers of the kept ones.
 
-    topic_names: the topics that are read, of any instance, all where None.
+    topic_names: the topics that are read, of any instance, all where None. parameters: receives those of the
+    log.
     """
     log = _read_log(path, topic_names, kept_fields)
+    changes = [(name, value) for _, name, value in log.changed_parameters]
+    for name, value in [*log.initial_parameters.items(), *changes]:
+        if isinstance(value, int | float):
+            add_parameter(parameters, name, value)
     while log.data_list:
         topic = log.data_list.pop(0)
         name, fields = _column_topic_name(topic.name, topic.multi_id), list(topic.data)

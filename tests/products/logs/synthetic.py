@@ -116,32 +116,54 @@ def write_alfa(folder, duration_s=60.0, failure_s=None, seed=3):
     return folder
 
 
-def write_ulog(path, columns, name="vehicle_rates"):
-    """A PX4 ULog file with one topic that holds these columns as doubles, stamps in us."""
-    fields = [field for field in columns if field != "t_s"]
-    layout = "uint64_t timestamp;" + "".join(f"double {field};" for field in fields)
+def write_ulog(path, columns, name="vehicle_rates", further_topics=None, parameters=(), changes=()):
+    """A PX4 ULog file with one topic that holds these columns as doubles, stamps in us.
+
+    further_topics: columns by topic. parameters, changes: (name, value) before and after the first topic; a
+    whole number is an int32_t.
+    """
 
     def message(kind, body):
         return struct.pack("<HB", len(body), ord(kind)) + body
 
+    def parameter(key, value):
+        kind, code = ("int32_t", "i") if isinstance(value, int) else ("float", "f")
+        text = f"{kind} {key}".encode()
+        return message("P", bytes([len(text)]) + text + struct.pack(f"<{code}", value))
+
+    topics = {name: columns} | (further_topics or {})
+    fields = {topic: [field for field in of if field != "t_s"] for topic, of in topics.items()}
     data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
-    data += message("F", f"{name}:{layout}".encode())
-    data += message("A", struct.pack("<BH", 0, 0) + name.encode())
-    for i, t_s in enumerate(columns["t_s"]):
-        row = [columns[field][i] for field in fields]
-        data += message("D", struct.pack(f"<HQ{len(row)}d", 0, round(t_s * 1e6) + 1_000_000, *row))
+    for topic, names in fields.items():
+        layout = "uint64_t timestamp;" + "".join(f"double {field};" for field in names)
+        data += message("F", f"{topic}:{layout}".encode())
+    data += b"".join(parameter(*one) for one in parameters)
+    for number, topic in enumerate(topics):
+        data += message("A", struct.pack("<BH", 0, number) + topic.encode())
+    for number, (topic, of) in enumerate(topics.items()):
+        rows = np.column_stack([of[field] for field in fields[topic]])
+        for t_s, row in zip(of["t_s"], rows, strict=True):
+            stamp = round(t_s * 1e6) + 1_000_000
+            data += message("D", struct.pack(f"<HQ{len(row)}d", number, stamp, *row))
+        data += b"" if number else b"".join(parameter(*one) for one in changes)
     path.write_bytes(data)
     return path
 
 
-def write_ardupilot(path, columns, name="RATE"):
-    """An ArduPilot dataflash log (text form) with one message that holds these columns, stamps in us."""
+def write_ardupilot(path, columns, name="RATE", parameters=()):
+    """An ArduPilot dataflash log (text form) with one message that holds these columns, stamps in us.
+
+    parameters: (name, value) before the message.
+    """
     fields = [field for field in columns if field != "t_s"]
     short = [field[:12] for field in fields]
     lines = [
         "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
         f"FMT, 140, {11 + 8 * len(fields)}, {name}, Q{'d' * len(fields)}, TimeUS,{','.join(short)}",
     ]
+    if parameters:
+        lines.append("FMT, 64, 35, PARM, QNff, TimeUS,Name,Value,Default")
+    lines += [f"PARM, 900000, {key}, {value}, 0" for key, value in parameters]
     for i, t_s in enumerate(columns["t_s"]):
         row = ", ".join(repr(float(columns[field][i])) for field in fields)
         lines.append(f"{name}, {round(t_s * 1e6) + 1_000_000}, {row}")
@@ -149,12 +171,12 @@ def write_ardupilot(path, columns, name="RATE"):
     return path
 
 
-_DATAFLASH_TYPE = {"TimeUS": "Q", "I": "B", "C": "B", "Instance": "B", "Count": "i"}
+_DATAFLASH_TYPE = {"TimeUS": "Q", "I": "B", "C": "B", "Instance": "B", "Count": "i", "Name": "N"}
 
 
 def write_dataflash(path, messages):
     """An ArduPilot dataflash log (binary form) of (kind, row) in order; a row's names are its fields. TimeUS,
-    I, C, Instance and Count are whole numbers, the others floats of eight bytes."""
+    I, C, Instance and Count are whole numbers, Name is a text, the others are floats of eight bytes."""
     data, kinds = b"", {}
 
     def message(number, body):
@@ -162,14 +184,15 @@ def write_dataflash(path, messages):
 
     for kind, row in messages:
         layout = "".join(_DATAFLASH_TYPE.get(field, "d") for field in row)
+        packed = "<" + layout.replace("N", "16s")
         if kind not in kinds:
             kinds[kind] = 130 + len(kinds)
-            size = 3 + struct.calcsize(f"<{layout}")
+            size = 3 + struct.calcsize(packed)
             body = struct.pack(
                 "<BB4s16s64s", kinds[kind], size, kind.encode(), layout.encode(), ",".join(row).encode()
             )
             data += message(128, body)
-        data += message(kinds[kind], struct.pack(f"<{layout}", *row.values()))
+        data += message(kinds[kind], struct.pack(packed, *row.values()))
     own = struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     path.write_bytes(message(128, own) + data)
     return path

@@ -11,6 +11,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import check, physics
 from beaver_ftc_logs.check import _guess_angle_unit
+from beaver_ftc_logs.mixing import Mixing
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.units import nearest_unit
@@ -552,8 +553,9 @@ def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
         "az": "az",
         "airspeed": "V",
     }
+    mixing = Mixing({"u 1": "u 1"}, {"u_1": {"u 1": 1.0}})
     known = {} if acceleration is None else {"acceleration": acceleration}
-    assert check._propose_vehicle("my log", log, "table", ("time_ms", "ms"), found, ["u 1"]) == {
+    assert check._propose_vehicle("my log", log, "table", ("time_ms", "ms"), found, mixing) == {
         "name": "my_log", "reader": "table", "time": {"column": "time_ms", "unit": "ms"},
         "rates": {axis: {"column": found[axis], "unit": "deg/s"} for axis in "pqr"},
         "commands": ["u 1"], "surfaces": {"u_1": {"u 1": 1.0}},
@@ -561,7 +563,7 @@ def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
         **known, "airspeed": "V",
     }  # fmt: skip
     bare = found | {"roll": None, "az": None, "airspeed": None}
-    assert set(check._propose_vehicle("log", log, "table", ("t_s", "s"), bare, ["u 1"])) == {
+    assert set(check._propose_vehicle("log", log, "table", ("t_s", "s"), bare, mixing)) == {
         "name", "reader", "rates", "commands", "surfaces",
     }  # fmt: skip
 

@@ -1,0 +1,401 @@
+"""Surfaces by the parameters of an autopilot's log, against surfaces calculated by hand."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.mixing import load_vehicle_for_logs, mixing_of_log
+from beaver_ftc_logs.readers import read_flight
+from beaver_ftc_logs.regression import group_surfaces_by_commands
+from beaver_ftc_logs.samples import resample
+from beaver_ftc_logs.vehicle import Vehicle
+from products.logs import synthetic
+from products.logs.test_check import KINEMATIC, run
+
+T_S = KINEMATIC["t_s"]
+GYRO = {"t_s": T_S} | {
+    f"Gyr{axis}": KINEMATIC[f"{rate}_rad_s"] for axis, rate in zip("XYZ", "pqr", strict=True)
+}
+GYRO_TOPIC = "vehicle_angular_velocity"
+RATES = {"name": "wing", "rates": {axis: f"{GYRO_TOPIC}.xyz[{i}]" for i, axis in enumerate("pqr")}}
+ELEVONS = (
+    ("SERVO1_FUNCTION", 77), ("SERVO1_MIN", 1000), ("SERVO1_MAX", 2000), ("SERVO1_TRIM", 1500),
+    ("SERVO1_REVERSED", 1),
+    ("SERVO2_FUNCTION", 78), ("SERVO2_MIN", 1100), ("SERVO2_MAX", 1900), ("SERVO2_TRIM", 1480),
+    ("SERVO2_REVERSED", 0),
+    ("SERVO3_FUNCTION", 70), ("SERVO4_FUNCTION", 0), ("MIXING_GAIN", 0.5), ("MIXING_OFFSET", 0),
+)  # fmt: skip
+PX4_ELEVONS = (
+    ("CA_AIRFRAME", 1), ("CA_SV_CS_COUNT", 2),
+    ("CA_SV_CS0_TYPE", 5), ("CA_SV_CS0_TRQ_R", -0.5), ("CA_SV_CS0_TRQ_P", 0.5), ("CA_SV_CS0_TRQ_Y", 0.0),
+    ("CA_SV_CS1_TYPE", 6), ("CA_SV_CS1_TRQ_R", 0.5), ("CA_SV_CS1_TRQ_P", 0.5), ("CA_SV_CS1_TRQ_Y", 0.0),
+)  # fmt: skip
+
+
+def wave(low, high, rate_rad_s):
+    """Commands that move between two values."""
+    return 0.5 * (low + high) + 0.5 * (high - low) * np.sin(rate_rad_s * T_S)
+
+
+def write_bin(path, outputs, parameters, message="RCOU"):
+    """A dataflash log with a gyro, a message of outputs and parameters."""
+    rows = [("PARM", {"TimeUS": 900_000, "Name": key.encode(), "Value": value}) for key, value in parameters]
+    for k, t_s in enumerate(T_S):
+        stamp = 1_000_000 + round(t_s * 1e6)
+        rows.append(("IMU", {"TimeUS": stamp} | {key: GYRO[key][k] for key in GYRO if key != "t_s"}))
+        rows.append((message, {"TimeUS": stamp} | {key: values[k] for key, values in outputs.items()}))
+    return synthetic.write_dataflash(path, rows)
+
+
+def write_px4(path, parameters, topics, changes=()):
+    rates = {"t_s": T_S} | {f"xyz[{i}]": KINEMATIC[f"{axis}_rad_s"] for i, axis in enumerate("pqr")}
+    further = {topic: {"t_s": T_S} | columns for topic, columns in topics.items()}
+    return synthetic.write_ulog(path, rates, GYRO_TOPIC, further, parameters, changes)
+
+
+def with_value(parameters, **values):
+    """Parameters with other values; None leaves one out."""
+    return [(key, values.get(key, value)) for key, value in parameters if values.get(key, value) is not None]
+
+
+def proposed(path):
+    document = json.loads(run("identify", "--check", path, "--format", "json").stdout)
+    return document["vehicle"], document["logs"][0]["lines"]
+
+
+def deflections(path, vehicle):
+    """The deflection of each surface, as the fit receives it."""
+    samples = resample(read_flight(path), Vehicle.model_validate(vehicle))
+    return dict(zip(vehicle["surfaces"], samples.commands.T, strict=True))
+
+
+def test_elevons_of_ardupilot_by_their_channels(tmp_path):
+    """Of 500 us on either side of 1500, reversed, and of 400 us on either side of 1480."""
+    pytest.importorskip("pymavlink")
+    left, right = wave(1500.0, 2000.0, 1.1), wave(1080.0, 1880.0, 0.7)
+    path = write_bin(
+        tmp_path / "wing.bin", {"C1": left, "C2": right, "C3": wave(1200.0, 1300.0, 2.0)}, ELEVONS
+    )
+    vehicle, lines = proposed(path)
+    assert vehicle["surfaces"] == {"left_elevon": {"RCOU.C1": 1.0}, "right_elevon": {"RCOU.C2": 1.0}}
+    flown = deflections(path, vehicle)
+    np.testing.assert_allclose(flown["left_elevon"], -(left - 1500.0) / 500.0, atol=1e-9)
+    np.testing.assert_allclose(flown["right_elevon"], (right - 1480.0) / 400.0, atol=1e-9)
+    assert lines[:3] == [
+        "channel 3 stays out: SERVO3_FUNCTION 70 is no surface",
+        "channel 1 is the left elevon: SERVO1_FUNCTION 77, 1000 to 2000 us, neutral at 1500 us, reversed",
+        "channel 2 is the right elevon: SERVO2_FUNCTION 78, 1100 to 1900 us, neutral at 1480 us",
+    ]
+
+
+def test_a_v_tail_of_ardupilot_by_the_commands_before_the_mixer(tmp_path):
+    """Half of the elevator more by MIXING_OFFSET -50, the rudder added on the left, taken on the right."""
+    pytest.importorskip("pymavlink")
+    axes = {
+        "Ail": wave(-900.0, 1800.0, 0.9),
+        "Elev": wave(-450.0, 900.0, 1.3),
+        "Rudd": wave(-1800.0, 450.0, 0.4),
+    }
+    parameters = [
+        ("SERVO2_FUNCTION", 79), ("SERVO4_FUNCTION", 80), ("SERVO1_FUNCTION", 4),
+        ("MIXING_GAIN", 0.6), ("MIXING_OFFSET", -50),
+    ]  # fmt: skip
+    path = write_bin(tmp_path / "tail.bin", axes, parameters, "AETR")
+    vehicle, lines = proposed(path)
+    flown = deflections(path, vehicle)
+    elevator, rudder = 1.5 * axes["Elev"] / 4500.0, axes["Rudd"] / 4500.0
+    np.testing.assert_allclose(flown["aileron"], axes["Ail"] / 4500.0, atol=1e-9)
+    np.testing.assert_allclose(flown["left_vtail"], 0.6 * (elevator + rudder), atol=1e-9)
+    np.testing.assert_allclose(flown["right_vtail"], 0.6 * (elevator - rudder), atol=1e-9)
+    assert lines[1] == (
+        "channel 2 is the left V-tail, +0.9 AETR.Elev +0.6 AETR.Rudd: SERVO2_FUNCTION 79, MIXING_GAIN 0.6, "
+        "MIXING_OFFSET -50"
+    )
+
+
+def test_elevons_of_px4_by_their_servos(tmp_path):
+    pytest.importorskip("pyulog")
+    left, right = wave(-0.4, 0.9, 1.1), wave(-0.7, 0.2, 0.7)
+    outputs = (("PWM_MAIN_FUNC3", 201), ("PWM_MAIN_FUNC1", 202), ("PWM_MAIN_FUNC2", 101))
+    path = write_px4(
+        tmp_path / "wing.ulg",
+        PX4_ELEVONS + outputs,
+        {"actuator_servos": {"control[0]": left, "control[1]": right}},
+    )
+    vehicle, lines = proposed(path)
+    flown = deflections(path, vehicle)
+    np.testing.assert_array_equal(flown["left_elevon"], left)
+    np.testing.assert_array_equal(flown["right_elevon"], right)
+    assert lines[:2] == [
+        "surface 0 is the left elevon: CA_SV_CS0_TYPE 5, PWM_MAIN_FUNC3 201",
+        "surface 1 is the right elevon: CA_SV_CS1_TYPE 6, PWM_MAIN_FUNC1 202",
+    ]
+
+
+def test_elevons_of_px4_by_their_pulses(tmp_path):
+    """Output 3, of the third bit, is reversed."""
+    pytest.importorskip("pyulog")
+    left, right = wave(1100.0, 1900.0, 1.1), wave(1000.0, 1500.0, 0.7)
+    parameters = (
+        *PX4_ELEVONS, ("PWM_MAIN_FUNC3", 201), ("PWM_MAIN_FUNC1", 202), ("PWM_MAIN_REV", 4),
+        ("PWM_MAIN_MIN3", 1000), ("PWM_MAIN_MAX3", 2000), ("PWM_MAIN_MIN1", 1000), ("PWM_MAIN_MAX1", 1800),
+    )  # fmt: skip
+    path = write_px4(
+        tmp_path / "wing.ulg", parameters, {"actuator_outputs": {"output[0]": right, "output[2]": left}}
+    )
+    flown = deflections(path, proposed(path)[0])
+    np.testing.assert_allclose(flown["left_elevon"], -(left - 1500.0) / 500.0, atol=1e-9)
+    np.testing.assert_allclose(flown["right_elevon"], (right - 1400.0) / 400.0, atol=1e-9)
+
+
+def test_a_v_tail_of_px4_by_the_torques(tmp_path):
+    """The tail's torques are (0.5, 0.25) and (0.5, -0.25) in pitch and yaw: their inverse is 1 and 2."""
+    pytest.importorskip("pyulog")
+    parameters = (
+        ("CA_AIRFRAME", 1), ("CA_SV_CS_COUNT", 4),
+        ("CA_SV_CS0_TYPE", 7), ("CA_SV_CS0_TRQ_R", 0.0), ("CA_SV_CS0_TRQ_P", 0.5), ("CA_SV_CS0_TRQ_Y", 0.25),
+        ("CA_SV_CS1_TYPE", 8), ("CA_SV_CS1_TRQ_R", 0.0), ("CA_SV_CS1_TRQ_P", 0.5), ("CA_SV_CS1_TRQ_Y", -0.25),
+        ("CA_SV_CS2_TYPE", 15), ("CA_SV_CS2_TRQ_R", 0.8), ("CA_SV_CS2_TRQ_P", 0.0), ("CA_SV_CS2_TRQ_Y", 0.0),
+        ("CA_SV_CS3_TYPE", 9),
+    )  # fmt: skip
+    roll, pitch, yaw = (wave(-0.1 * k, 0.3, 0.5 * k) for k in (1, 2, 3))
+    torques = {f"xyz[{i}]": values for i, values in enumerate((roll, pitch, yaw))}
+    path = write_px4(tmp_path / "tail.ulg", parameters, {"vehicle_torque_setpoint": torques})
+    vehicle, lines = proposed(path)
+    flown = deflections(path, vehicle)
+    np.testing.assert_allclose(flown["left_vtail"], pitch + 2.0 * yaw, atol=1e-9)
+    np.testing.assert_allclose(flown["right_vtail"], pitch - 2.0 * yaw, atol=1e-9)
+    np.testing.assert_allclose(flown["aileron"], roll / 0.8, atol=1e-9)
+    assert lines[0] == "surface 3 stays out: CA_SV_CS3_TYPE 9 moves the aircraft about no axis"
+    hovering = with_value(parameters, CA_AIRFRAME=2)
+    says = proposed(write_px4(tmp_path / "vtol.ulg", hovering, {"vehicle_torque_setpoint": torques}))[1]
+    assert says[1] == (
+        "surface 0 is the left V-tail (CA_SV_CS0_TYPE 7), and stays out: its output is not in the log, and "
+        "CA_AIRFRAME is not 1 (fixed wing)"
+    )
+
+
+def ardupilot(parameters, *columns):
+    return mixing_of_log("ardupilot", {key: (float(value),) for key, value in parameters}, columns)
+
+
+def px4(parameters, *columns):
+    return mixing_of_log("ulog", {key: (float(value),) for key, value in parameters}, columns)
+
+
+def test_surfaces_that_move_together_follow_one_command():
+    """Two ailerons of one function, and two of opposite torques: no fit can tell the two apart."""
+    pulses = [(f"SERVO{n}_FUNCTION", 4) for n in (1, 5)] + [("SERVO2_FUNCTION", 19)]
+    found = ardupilot(pulses, "RCOU.C1", "RCOU.C2", "RCOU.C5")
+    assert found.surfaces == {
+        "aileron_1": {"RCOU.C1": 1.0}, "elevator": {"RCOU.C2": 1.0}, "aileron_5": {"RCOU.C1": 1.0},
+    }  # fmt: skip
+    assert [entry["column"] for entry in found.commands] == ["RCOU.C1", "RCOU.C2"]
+    assert found.lines[-1].endswith("; it moves with RCOU.C1")
+    torques = [
+        ("CA_SV_CS_COUNT", 2), ("CA_SV_CS0_TYPE", 1), ("CA_SV_CS0_TRQ_R", -0.5), ("CA_SV_CS1_TYPE", 2),
+        ("CA_SV_CS1_TRQ_R", 0.25), *((f"CA_SV_CS{i}_TRQ_{axis}", 0.0) for i in (0, 1) for axis in "PY"),
+    ]  # fmt: skip
+    found = px4(torques, "actuator_servos.control[0]", "actuator_servos.control[1]")
+    assert found.surfaces == {
+        "left_aileron": {"actuator_servos.control[0]": 1.0},
+        "right_aileron": {"actuator_servos.control[0]": -0.5},
+    }
+    vehicle = Vehicle.model_validate(RATES | {"commands": found.commands, "surfaces": found.surfaces})
+    assert group_surfaces_by_commands(vehicle) == [[0, 1]]
+
+
+def test_flaperons_follow_what_is_left_without_flaps():
+    """Flaps are added on one side and taken on the other: half the sum of the two is the aileron."""
+    found = ardupilot([("SERVO1_FUNCTION", 24), ("SERVO6_FUNCTION", 25)], "RCOU.C1", "RCOU.C6")
+    halves = {"RCOU.C1": 0.5, "RCOU.C6": 0.5}
+    assert found.surfaces == {"left_flaperon": halves, "right_flaperon": halves}
+
+
+ALL_OUT = "the parameters of the log give no mixing: it stays out"
+RANGE_OUT = (
+    "channel 1 is the left elevon: SERVO1_FUNCTION 77; range and sign stay out ({}), assumed: 1100 to 1900 us"
+)
+
+
+@pytest.mark.parametrize(("name", "value", "says"), [
+    ("SERVO1_FUNCTION", math.nan, "channel 1 stays out: SERVO1_FUNCTION is nan, allowed: -1 to 1000"),
+    ("SERVO1_FUNCTION", 4.5, "channel 1 stays out: SERVO1_FUNCTION is 4.5, allowed: a whole number"),
+    ("SERVO1_FUNCTION", 94, "channel 1 stays out: SERVO1_FUNCTION 94 is no surface"),
+    ("SERVO1_MAX", None, RANGE_OUT.format("SERVO1_MAX is not in the log, allowed: 800 to 2200 us")),
+    ("SERVO1_MAX", math.inf, RANGE_OUT.format("SERVO1_MAX is inf, allowed: 800 to 2200 us")),
+    ("SERVO1_MIN", 2100, RANGE_OUT.format(
+        "SERVO1_MIN, _TRIM, _MAX are 2100, 1500, 2000 us, allowed: ascending")),
+    ("SERVO1_TRIM", 65535, RANGE_OUT.format("SERVO1_TRIM is 65535, allowed: 800 to 2200 us")),
+    ("SERVO1_REVERSED", 7, RANGE_OUT.format("SERVO1_REVERSED is 7, allowed: 0 to 1")),
+    ("MIXING_GAIN", math.nan,
+     "the mixer of elevons and V-tail stays out: MIXING_GAIN is nan, allowed: 0.05 to 5"),
+])  # fmt: skip
+def test_a_bad_parameter_of_ardupilot_is_one_line(name, value, says):
+    healthy = ardupilot(ELEVONS, "RCOU.C1", "RCOU.C2")
+    found = ardupilot(with_value(ELEVONS, **{name: value}), "RCOU.C1", "RCOU.C2")
+    new_lines = [line for line in found.lines if line not in healthy.lines]
+    assert sum(says in line for line in new_lines) == 1
+    assert found.surfaces["right_elevon"] == {"RCOU.C2": 1.0}
+    if "range" in says:
+        assert found.commands[0] == {"column": "RCOU.C1", "scale": 0.0025, "offset": -3.75}
+    assert ("left_elevon" in found.surfaces) == ("channel 1 stays out" not in says)
+
+
+@pytest.mark.parametrize(("name", "value", "says"), [
+    ("CA_SV_CS_COUNT", None, "CA_SV_CS_COUNT is not in the log, allowed: 1 to 8"),
+    ("CA_SV_CS_COUNT", 1_000_000, "CA_SV_CS_COUNT is 1e+06, allowed: 1 to 8"),
+    ("CA_SV_CS0_TYPE", math.nan, "surface 0 stays out: CA_SV_CS0_TYPE is nan, allowed: 0 to 1000"),
+    ("CA_SV_CS0_TRQ_R", math.nan,
+     "the mix of torques stays out: CA_SV_CS0_TRQ_R is nan, allowed: -1000 to 1000"),
+])  # fmt: skip
+def test_a_bad_parameter_of_px4_is_one_line(name, value, says):
+    found = px4(with_value(PX4_ELEVONS, **{name: value}), *(f"actuator_servos.control[{i}]" for i in (0, 1)))
+    assert found.lines.count(says) == 1
+    if "COUNT" in name:
+        assert (found.surfaces, found.lines) == ({}, [says, ALL_OUT])
+    else:
+        assert found.surfaces["right_elevon"] == {"actuator_servos.control[1]": 1.0}
+
+
+def test_without_the_commands_of_the_surfaces_they_stay_out():
+    found = ardupilot(ELEVONS, "AETR.Elev")
+    assert found.surfaces == {}
+    assert found.lines[1] == (
+        "channel 1 is the left elevon (SERVO1_FUNCTION 77), and stays out: its output is not in the log, and "
+        "AETR.Ail is not either"
+    )
+    half = ardupilot(ELEVONS, "RCOU.C1", "AETR.Elev")
+    assert half.surfaces == {"left_elevon": {"RCOU.C1": 1.0}}
+    assert (
+        "channel 2 is the right elevon (SERVO2_FUNCTION 78), and stays out: RCOU.C2 is not in the log"
+        in half.lines
+    )
+    assert set(ardupilot(ELEVONS, "RCOU.C1", "AETR.Elev", "AETR.Ail").surfaces) == {
+        "left_elevon",
+        "right_elevon",
+    }
+    assert found.lines[-1] == ALL_OUT
+    assert ardupilot([]).lines == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
+    assert mixing_of_log("table", {"SERVO1_FUNCTION": (77.0,)}, ["RCOU.C1"]).lines == []
+
+
+def test_a_log_without_parameters_says_so_and_gets_a_guess(tmp_path):
+    pytest.importorskip("pymavlink")
+    path = write_bin(tmp_path / "bare.bin", {"C1": wave(1200.0, 1700.0, 0.8)}, ())
+    vehicle, lines = proposed(path)
+    assert lines[:2] == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
+    assert vehicle["surfaces"] == {"RCOU_C1": {"RCOU.C1": 1.0}}
+
+
+@pytest.mark.parametrize("suffix", ["bin", "log"])
+def test_parameters_of_a_dataflash_log(tmp_path, suffix):
+    pytest.importorskip("pymavlink")
+    parameters = (
+        ("SERVO1_FUNCTION", 77),
+        ("SERVO1_TRIM", 1500),
+        ("SERVO1_TRIM", 1500),
+        ("SERVO1_TRIM", 1520),
+    )
+    if suffix == "bin":
+        path = write_bin(tmp_path / "a.bin", {"C1": wave(1200.0, 1700.0, 0.8)}, parameters)
+    else:
+        path = synthetic.write_ardupilot(tmp_path / "a.log", GYRO, "IMU", parameters)
+    for wanted in (None, (), ["IMU.GyrX"]):
+        read = read_flight(path, columns=wanted)
+        assert read.parameters == {"SERVO1_FUNCTION": (77.0,), "SERVO1_TRIM": (1500.0, 1520.0)}
+        assert not any("PARM" in name for name in read.columns)
+
+
+def test_parameters_of_a_ulog_and_their_changes(tmp_path):
+    pytest.importorskip("pyulog")
+    path = write_px4(
+        tmp_path / "a.ulg",
+        (("CA_SV_CS_COUNT", 2), ("CA_SV_CS0_TRQ_R", 0.5), ("BAD", math.nan)),
+        {"actuator_servos": {"control[0]": wave(-0.1, 0.1, 0.8)}},
+        (("CA_SV_CS_COUNT", 3), ("BAD", math.nan)),
+    )
+    for wanted in (None, (), [f"{GYRO_TOPIC}.xyz[0]"]):
+        read = read_flight(path, columns=wanted).parameters
+        assert (read["CA_SV_CS_COUNT"], read["CA_SV_CS0_TRQ_R"]) == ((2.0, 3.0), (0.5,))
+        assert len(read["BAD"]) == 1
+    lines = mixing_of_log("ulog", read_flight(path).parameters, ()).lines
+    assert "CA_SV_CS_COUNT changes in the log: its last value, 3, is used" in lines
+
+
+def vehicle_file(path, **keys):
+    path.write_text(yaml.safe_dump(RATES | {"reader": "ulog"} | keys))
+    return path
+
+
+def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
+    pytest.importorskip("pyulog")
+    servos = {"control[0]": wave(-0.4, 0.9, 1.1), "control[1]": wave(-0.7, 0.2, 0.7)}
+    torques = {f"xyz[{i}]": wave(-0.3, 0.1 + 0.1 * i, 1.0 + i) for i in range(3)}
+    topics = {"actuator_servos": servos, "vehicle_torque_setpoint": torques}
+    log = write_px4(tmp_path / "a.ulg", PX4_ELEVONS, topics)
+    first, second = "actuator_servos.control[0]", "actuator_servos.control[1]"
+    vehicle, lines = load_vehicle_for_logs(vehicle_file(tmp_path / "bare.yaml"), [log])
+    assert vehicle.command_column_names == [first, second]
+    assert vehicle.surfaces == {"left_elevon": {first: 1.0}, "right_elevon": {second: 1.0}}
+    assert lines == [
+        f"{log}: surface {i} is the {side} elevon: CA_SV_CS{i}_TYPE {5 + i}"
+        for i, side in enumerate(("left", "right"))
+    ]
+    roll, pitch = ({"column": f"vehicle_torque_setpoint.xyz[{i}]", "scale": 2.0} for i in (0, 1))
+    vehicle, _ = load_vehicle_for_logs(vehicle_file(tmp_path / "axes.yaml", commands=[roll, pitch]), [log])
+    assert [command.scale for command in vehicle.commands] == [2.0, 2.0]
+    assert vehicle.surfaces == {
+        "left_elevon": {roll["column"]: -1.0, pitch["column"]: 1.0},
+        "right_elevon": {roll["column"]: 1.0, pitch["column"]: 1.0},
+    }
+    vehicle, _ = load_vehicle_for_logs(
+        vehicle_file(tmp_path / "own.yaml", surfaces={"mine": {first: 0.3, second: -0.2}}), [log]
+    )
+    assert (vehicle.command_column_names, vehicle.surfaces) == (
+        [first, second],
+        {"mine": {first: 0.3, second: -0.2}},
+    )
+    whole = vehicle_file(tmp_path / "whole.yaml", commands=[second], surfaces={"mine": {second: 1.0}})
+    assert load_vehicle_for_logs(whole, [log])[1] == []
+
+
+def test_logs_of_two_mixings_and_a_log_without_one_are_refused(tmp_path):
+    pytest.importorskip("pyulog")
+    servos = {"actuator_servos": {"control[0]": wave(-0.4, 0.9, 1.1), "control[1]": wave(-0.7, 0.2, 0.7)}}
+    one = write_px4(tmp_path / "one.ulg", PX4_ELEVONS, servos)
+    other = write_px4(tmp_path / "other.ulg", with_value(PX4_ELEVONS, CA_SV_CS0_TYPE=3), servos)
+    bare = write_px4(tmp_path / "bare.ulg", (), servos)
+    path = vehicle_file(tmp_path / "bare.yaml")
+    with pytest.raises(
+        BadInput, match=r"other.ulg: its parameters give another mixing than those of .*one.ulg"
+    ):
+        load_vehicle_for_logs(path, [one, other])
+    with pytest.raises(BadInput, match="CA_SV_CS_COUNT is not in the log") as refused:
+        load_vehicle_for_logs(path, [bare])
+    assert len(str(refused.value).splitlines()) == 1
+    table = vehicle_file(tmp_path / "table.yaml", reader="table")
+    with pytest.raises(BadInput, match="commands: required key is missing"):
+        load_vehicle_for_logs(table, [synthetic.write_csv(tmp_path / "a.csv", {"t_s": T_S})])
+
+
+def test_identify_fits_a_log_whose_mixing_is_in_its_parameters(tmp_path):
+    """The whole way: the wing of the tests, its two surfaces as the servos of PX4."""
+    pytest.importorskip("pyulog")
+    flown = synthetic.fly(240.0)
+    half_sum = 0.5 * (flown["roll_command"] + flown["pitch_command"])
+    half_difference = 0.5 * (flown["roll_command"] - flown["pitch_command"])
+    rates = {"t_s": flown["t_s"]} | {f"xyz[{i}]": flown[f"{axis}_rad_s"] for i, axis in enumerate("pqr")}
+    servos = {"t_s": flown["t_s"], "control[0]": half_difference, "control[1]": half_sum}
+    log = synthetic.write_ulog(
+        tmp_path / "wing.ulg", rates, GYRO_TOPIC, {"actuator_servos": servos}, PX4_ELEVONS
+    )
+    done = run("identify", log, "--vehicle", vehicle_file(tmp_path / "v.yaml"), "--out", tmp_path / "m.json")
+    assert done.exit_code == 0
+    assert "surface 0 is the left elevon: CA_SV_CS0_TYPE 5" in done.stdout
+    model = json.loads((tmp_path / "m.json").read_text())
+    assert set(model["vehicle"]["surfaces"]) == {"left_elevon", "right_elevon"}

@@ -42,9 +42,15 @@ class Blocks(History):
         blocks = values[: n * self.length].reshape(n, self.length, *values.shape[1:])
         return np.asarray(blocks.mean(axis=1))
 
-    def summed_frame_tests(self, block: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:
-        """Inequalities of all frames in this block, and in the one before; theta may differ by frame."""
+    def summed_frame_tests(
+        self, block: int, axes: tuple[int, ...], first_kept_frame: int
+    ) -> Iterator[list[Term]]:
+        """Inequalities of all frames in this block, and in the one before; theta may differ by frame. A block
+        is left out if it begins before the effects of a fault are kept: after the frame `first_kept_frame`.
+        """
         for end in (self.begin + n * self.length - 1 for n in (block, block + 1)):
+            if end - self.length < first_kept_frame:
+                continue
             yield from (
                 [Term(direction, ADDING_POLE_PER_S, end - self.length, end)]
                 for direction in axis_directions(axes)

@@ -354,8 +354,10 @@ def _type_statements(scenario: Scenario, tape: Tape, history: History, alarm: in
             )
         elif isinstance(history, Blocks) and not of.theta_is_constant:
             own = kinds.hypothesis_of_type(frames[0], s, kind)
-            found = _first_violated(history.summed_frame_tests(k, own.axes), own, frames[1], tape)
-            yield _statement(found, frames[1], kinds.EXCLUDED_BY_MANY_FRAMES, **about)
+            of_tape, of_log = frames
+            sums = history.summed_frame_tests(k, own.axes, of_tape.first)
+            found = _first_violated(sums, own, of_log, of_tape)
+            yield _statement(found, of_log, kinds.EXCLUDED_BY_MANY_FRAMES, **about)
         else:
             found = _first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history, tape)
             yield _statement(found, history, kinds.EXCLUDED_BY_MANY_FRAMES, **about)

@@ -126,12 +126,15 @@ def _effect_of_relation(
 def candidate_inequalities(
     hypothesis: Hypothesis, history: History, alarm_frame: int, last_frame: int
 ) -> Iterator[list[Term]]:
-    """Inequalities that may exclude a hypothesis by frames up to last_frame."""
+    """Inequalities that may exclude a hypothesis by frames up to last_frame. None takes a frame before the
+    hypothesis's first, of which no effect is known."""
     if not hypothesis.theta_is_constant:
-        for frame in (last_frame - 1, last_frame):
+        for frame in range(max(last_frame - 1, hypothesis.first_frame), last_frame + 1):
             yield from single_frame_tests(frame, hypothesis)
         return
-    frames = np.arange(alarm_frame, last_frame + 1)
+    frames = np.arange(max(alarm_frame, hypothesis.first_frame), last_frame + 1)
+    if not len(frames):
+        return
     frames = frames[is_unexplained_by_health(history, frames)]
     if hypothesis.slope.any():
         yield constant_theta_tests(hypothesis, history, frames)

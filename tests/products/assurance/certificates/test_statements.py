@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis import LOSS, scheme_number
-from beaver_ftc_assurance.certificates import blocks, certificate, chance, kinds
+from beaver_ftc_assurance.certificates import blocks, certificate, chance, inequality, kinds
 from beaver_ftc_assurance.certificates import tape as tape_module
 from beaver_ftc_assurance.certificates.blocks import by_blocks, in_blocks, log_rows_of
 from beaver_ftc_assurance.certificates.certificate import statements
@@ -283,7 +283,9 @@ def of_types(monkeypatch, excluded, frames_per_block=1, n_types=3, constant=True
     monkeypatch.setattr(
         kinds, "candidate_inequalities", lambda of, history, alarm, k: (history is log, alarm, k)
     )
-    monkeypatch.setattr(blocks.Blocks, "summed_frame_tests", lambda self, k, axes: ("sums", k, axes))
+    monkeypatch.setattr(
+        blocks.Blocks, "summed_frame_tests", lambda self, k, axes, first: ("sums", k, axes, first)
+    )
 
     def first(candidates, of, history, tape):
         asked.append((candidates, history is log, tape.name))
@@ -323,7 +325,8 @@ def test_a_type_is_excluded_by_its_course_or_by_its_frames(monkeypatch):
     ]  # fmt: skip
     found, asked = of_types(monkeypatch, excluded[1:2], frames_per_block=4, constant=False)
     assert found == [about(0, 1) | {"terms": "terms"}]
-    assert asked[2:] == [("of", "blocks", 0, 1), ("of", "rows", 0, 1), (("sums", 13, (1,)), True, "blocks")]
+    of_rows = (("sums", 13, (1,), 10), True, "rows")  # the tape whose frames these are, and its first one
+    assert asked[2:] == [("of", "blocks", 0, 1), ("of", "rows", 0, 1), of_rows]
     found, asked = of_types(monkeypatch, excluded, frames_per_block=4, n_types=0)  # no block is whole
     assert found == [about(s, kind) | BY_MANY for s, kind, _ in excluded]
     assert asked == [("rows", 12), "rows"]
@@ -372,13 +375,19 @@ def test_a_type_of_one_number_is_looked_for_in_frames_since_the_alarm_that_healt
     monkeypatch.setattr(kinds, "constant_theta_tests", lambda of, history, frames: ["two", *frames])
     monkeypatch.setattr(kinds, "single_frame_tests", lambda frame, of: [("one", frame)])
     monkeypatch.setattr(kinds, "is_unexplained_by_health", lambda history, frames: frames % 5 != 0)
-    of = SimpleNamespace(theta_is_constant=True, slope=np.array([0.0, 0.3 * moves]))
+    of = SimpleNamespace(theta_is_constant=True, slope=np.array([0.0, 0.3 * moves]), first_frame=11)
     found = [*kinds.candidate_inequalities(of, None, 14, 21)]
     assert found[: int(moves)] == [["two", 14, 16, 17, 18, 19, 21]] * moves
     frames = [plain(one)[0] for one in found[int(moves) :]]
     assert frames == [(d, inf, k - 1, k, 0.0) for k in (18, 19, 21) for d in along(range(3))]
-    varies = SimpleNamespace(theta_is_constant=False)
+    varies = SimpleNamespace(theta_is_constant=False, first_frame=11)
     assert [*kinds.candidate_inequalities(varies, None, 14, 21)] == [("one", 20), ("one", 21)]
+    of.first_frame = varies.first_frame = 21
+    found = [*kinds.candidate_inequalities(of, None, 14, 21)]
+    assert found[: int(moves)] == [["two", 21]] * moves
+    assert {plain(one)[0][3] for one in found[int(moves) :]} == {21}
+    assert [*kinds.candidate_inequalities(varies, None, 14, 21)] == [("one", 21)]
+    assert [*kinds.candidate_inequalities(of, None, 22, 21)] == []  # the alarm came after this frame
 
 
 def test_blocks_are_those_that_types_were_tested_with():
@@ -413,9 +422,10 @@ def test_blocks_are_those_that_types_were_tested_with():
         assert whole.eta_bar_rad_s2[n] == pytest.approx(abs(eta_bar[rows]).mean(axis=0))
         unstated = whole.unstated_bound(slice(n, n + 1))[0]
         assert unstated == pytest.approx(log.unstated_bound(slice(rows[0], rows[-1] + 1)).mean(axis=0))
-    tests = [plain(one)[0] for one in whole.summed_frame_tests(5, (0, 2))]
     pole = blocks.ADDING_POLE_PER_S
-    assert tests == [(d, pole, end - 4, end, 0.0) for end in (22, 26) for d in along((0, 2))]
+    for first, ends in ((17, (22, 26)), (18, (22, 26)), (19, (26,)), (22, (26,)), (23, ())):
+        tests = [plain(one)[0] for one in whole.summed_frame_tests(5, (0, 2), first)]
+        assert tests == [(d, pole, end - 4, end, 0.0) for end in ends for d in along((0, 2))]
     span = {"first": 4, "frame": 5}
     assert log_rows_of({"block": [4, 3, 39]}, span).tolist() == [*range(19, 27)]
     assert log_rows_of({}, span).tolist() == [4, 5]
@@ -424,6 +434,31 @@ def test_blocks_are_those_that_types_were_tested_with():
         assert in_blocks(flown, log, 21)[1].begin == first
     diagnosis.n_frames_in_block_so_far = 2
     assert in_blocks(flown, log, 0)[2] == 1  # block 0 has no rates from before it
+
+
+@pytest.mark.parametrize(("block", "expected"), [(0, []), (1, [8]), (3, [12, 16])])
+def test_a_block_of_which_the_tape_has_no_frames_proves_nothing(block, expected):
+    """Blocks of four rows from row 1 on, and a tape from row 4 on: a block counts if it begins after row 4.
+    The rates grow by the same amount in each row, and neither model nor fault explains it."""
+    rates = np.cumsum(np.full((21, 3), (0.011, 0.013, 0.017)), axis=0)
+    zeros, nothing = np.zeros((21, 3)), np.zeros(3)
+    declared = DeclaredErrors(nothing, nothing, 0.0, np.ones(3), nothing, nothing, nothing)
+    log = History(0.02, 1.0, rates, zeros, zeros, declared)
+    effect = np.zeros((17, 3))
+    of = Hypothesis(4, effect, effect, effect, -1.0, 1.0, axes=(1,))
+    whole = by_blocks(log, 4, 1)
+    tape = SimpleNamespace(first=4)
+    ends = []
+    for terms in whole.summed_frame_tests(block, of.axes, tape.first):
+        found = certificate._first_violated([terms], of, log, tape)
+        if found is not None:
+            ((term,), _) = found
+            assert (term.first_kept_frame, term.direction.tolist()) == (4, [0.0, 1.0, 0.0])
+            value, _ = inequality.sides([term], of, log)
+            decay = np.exp(-term.pole_per_s * 0.02)
+            assert value == pytest.approx(0.013 * (1 + decay + decay**2 + decay**3))  # of four rows
+            ends.append(term.last_frame)
+    assert ends == expected
 
 
 @pytest.mark.parametrize(("seen", "events", "changes", "expected"), [

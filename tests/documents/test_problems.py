@@ -274,6 +274,28 @@ def test_files_of_models(tmp_path):
         validation.text_of(tmp_path, 99, lambda: "there is none")
 
 
+class Matrix(Section):
+    """Rows of numbers."""
+
+    rows: list[list[Annotated[float, Field(le=9)]]] = []
+    names: dict[str, Annotated[list[Annotated[float, Field(le=7)]], Field(min_length=1)]] = {}
+
+
+def test_many_numbers_of_a_matrix_that_are_wrong_alike_share_a_line():
+    """From three on; those of another list or of another line have their own."""
+    text = "rows: [[99, 1, 98], [97]]\nnames: {a: [8, 9], b: [],\n  c: [11]}\n"
+    with pytest.raises(ScenarioError) as caught:
+        validate(Matrix, parse_document(text, "f"), "f")
+    assert caught.value.lines == (
+        "f:1: rows[0][0]: 99 is out of range, allowed: a number of at most 9 (and 2 more of this list)",
+        "f:2: names.a[0]: 8 is out of range, allowed: a number of at most 7",
+        "f:2: names.a[1]: 9 is out of range, allowed: a number of at most 7",
+        "f:2: names.b: this is empty, allowed: a list that is not empty",
+        "f:3: names.c[0]: 11 is out of range, allowed: a number of at most 7",
+    )
+    assert len(caught.value.problems) == 7
+
+
 class Shares(Section):
     """Values of one kind under names: each has a unit, none a description of its own."""
 

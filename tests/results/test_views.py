@@ -296,6 +296,17 @@ def test_of_more_than_eight_surfaces_those_of_a_kind_share_a_panel_and_none_is_l
     assert elevator.traces[0].label == "left inboard"
 
 
+@pytest.mark.parametrize("ratio", [0.0, -3.0])
+def test_a_ratio_that_is_never_positive_is_drawn_without_a_warning(ratio, recwarn):
+    """As of a flight whose sensor monitor alarms in the first frame."""
+    low = View("low", "Low", (Panel("low", (Trace("y", "low", "p"),), log_scale=True, line_at=1.0),))
+    figure = draw(low, {"t_s": T_S[:9], "y": np.full(9, ratio)}, [], "x")
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    assert [str(one.message) for one in recwarn] == []
+    assert (axes.get_yscale(), *axes.get_ylim()) == ("log", 0.1, 10.0)
+
+
 def test_what_a_figure_looks_like():
     """What only the eye would see otherwise: pixels, heights of titles, grid, size of numbers, marks."""
     low = View("low", "Low", (Panel("low", (Trace("y", "low", "p"),), log_scale=True),))

@@ -34,6 +34,7 @@ from beaver_ftc.documents.files import AbsentFileError, UnreadableError, read_te
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
+MIN_ALIKE_TO_COUNT = 3  # mistakes of one kind in one list, from which on they share a line
 
 
 class ScenarioError(BadInput):
@@ -49,7 +50,16 @@ class ScenarioError(BadInput):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        return tuple(self._line(problem) for problem in self.problems)
+        alike: dict[Any, list[Problem]] = {}
+        for problem in self.problems:
+            alike.setdefault(_list_and_allowed(problem), []).append(problem)
+        return tuple(line for problems in alike.values() for line in self._lines_of_alike(problems))
+
+    def _lines_of_alike(self, problems: list[Problem]) -> list[str]:
+        """A line each; one line for many of one list, as in a matrix of which no number is allowed."""
+        if len(problems) < MIN_ALIKE_TO_COUNT:
+            return [self._line(problem) for problem in problems]
+        return [f"{self._line(problems[0])} (and {len(problems) - 1} more of this list)"]
 
     def _line(self, problem: Problem) -> str:
         """file:line: key: what; of a file as a whole file: what."""
@@ -60,6 +70,16 @@ class ScenarioError(BadInput):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (self.source, self.problems))
+
+
+def _list_and_allowed(problem: Problem) -> tuple[Any, ...]:
+    """What entries of one list have in common that are wrong in the same way: one line is about all of them."""
+    location = problem.location
+    while location and isinstance(location[-1], int):
+        location = location[:-1]
+    if location == problem.location:
+        return (problem,)
+    return problem.line, location, problem.says.rpartition(", allowed: ")[2]
 
 
 def _in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
@@ -346,8 +366,10 @@ def _length(node: dict[str, Any], suffix: str, unit: str) -> str:
     low, high = node.get(f"min{suffix}"), node.get(f"max{suffix}")
     if low is not None and low == high:
         return f" of {low} {unit}"
-    if low is not None and low > 1 and high is not None:
+    if low and high is not None:
         return f" of {low} to {high} {unit}"
+    if low:
+        return " that is not empty" if low == 1 else f" of at least {low} {unit}"
     return f" of at most {high} {unit}" if high is not None else ""
 
 

@@ -224,11 +224,20 @@ def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks
     elif panel.clips_spikes:
         _limit_axis_to_quantiles(axes, panel, series)
     if panel.log_scale:
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=max(axes.get_ylim()[0], MIN_SHOWN_RATIO))
-        axes.minorticks_off()
+        _set_log_scale(axes)
     if panel.line_at is not None:
         axes.axhline(panel.line_at, color=GREY, linewidth=1.0, zorder=1)
+
+
+def _set_log_scale(axes: "Axes") -> None:
+    """A logarithmic scale from MIN_SHOWN_RATIO on. Matplotlib warns of data without a positive number, unless
+    the limits are set before: the residual of a flight that alarms in its first frame is 0 throughout."""
+    extent = axes.dataLim
+    if np.isfinite(extent.y1) and not np.isfinite(extent.minposy):
+        axes.set_ylim(MIN_SHOWN_RATIO, 10.0)
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=max(axes.get_ylim()[0], MIN_SHOWN_RATIO))
+    axes.minorticks_off()
 
 
 def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bool) -> None:

@@ -277,8 +277,8 @@ def test_files_of_models(tmp_path):
 class Matrix(Section):
     """Rows of numbers."""
 
-    rows: list[list[Annotated[float, Field(le=9)]]] = []
-    names: dict[str, Annotated[list[Annotated[float, Field(le=7)]], Field(min_length=1)]] = {}
+    rows: list[list[Annotated[float, Field(le=9)]]]
+    names: dict[str, Annotated[list[Annotated[float, Field(le=7)]], Field(min_length=1)]]
 
 
 def test_many_numbers_of_a_matrix_that_are_wrong_alike_share_a_line():

@@ -73,7 +73,7 @@ class ScenarioError(BadInput):
 
 
 def _list_and_allowed(problem: Problem) -> tuple[Any, ...]:
-    """What entries of one list have in common that are wrong in the same way: one line is about all of them."""
+    """What entries of one list that are wrong alike have in common: one line is about all of them."""
     location = problem.location
     while location and isinstance(location[-1], int):
         location = location[:-1]

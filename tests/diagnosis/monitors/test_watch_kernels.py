@@ -463,6 +463,22 @@ def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
     ]
 
 
+@pytest.mark.parametrize(
+    ("floor", "peak", "noise", "say"),
+    [
+        (0.05, 0.2, 0.0, GYRO_ERROR_UNDECIDED),  # there in every sample, and it varies
+        (0.05, 0.0549, 0.0, GYRO_ERROR_REFUTED),  # it is steady
+        (0.0, 0.2, 0.0, GYRO_ERROR_REFUTED),  # it was not there in one sample
+        (0.05, 0.2, 0.06 * H / 4.0, GYRO_ERROR_REFUTED),  # all may be the attitude's noise
+    ],
+)
+def test_an_error_that_varies_within_a_frame_has_no_jump_to_be_compared(floor, peak, noise, say):
+    """By chance it is small in the two samples that are compared, while the rates show a jump of 5 rad/s2."""
+    shown = {"previous_substep_gyro_error_floor": floor, "previous_substep_gyro_error_peak": peak}
+    small = {"error": (0.0016, 0, 0), "then": (-0.0012, 0, 0), "innovation": (9.0, 0, 0), "noise": noise}
+    assert asked(**small, **shown)[0] == say
+
+
 @pytest.mark.parametrize(("less", "say"), [(0.999, GYRO_ERROR_UNDECIDED), (1.001, GYRO_ERROR_REFUTED)])
 def test_how_much_an_own_error_may_explain(less, say):
     """Of a jump a tenth, of the error ten per second, twice four noises a frame, and the bound of it."""
@@ -731,11 +747,14 @@ def test_looks_of_a_frame_follow_one_another():
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
     assert monitor["memory"]["apparent_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
     assert monitor["memory"]["substep_gyro_error_peak"][0] == pytest.approx(1e-3 / H, rel=1e-3)
+    assert monitor["memory"]["substep_gyro_error_floor"][0] == pytest.approx(1e-3 / H, rel=1e-3)
     before = monitor["memory"]["substep_gyro_error_peak"].copy()
     looked(monitor, fdi, phi=2e-3)
     assert monitor["memory"]["apparent_gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
     assert monitor["memory"]["previous_substep_gyro_error_peak"] == pytest.approx(before)
     assert not monitor["memory"]["substep_gyro_error_peak"].any()
+    assert not monitor["memory"]["substep_gyro_error_floor"].any()
+    assert monitor["memory"]["previous_substep_gyro_error_floor"][0] == pytest.approx(1e-3 / H, rel=1e-3)
     assert monitor["memory"]["previous_apparent_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
     assert monitor["memory"]["gyro_error_estimate"][0] == pytest.approx(2 * 0.5 * DT)
 

@@ -185,9 +185,11 @@ MONITOR_MEMORY_RECORD = record(
     filtered_turn_beyond_angle=(3, 3, N_POLES), filtered_angle_residual_size=(3, N_POLES),
     max_turn_per_angle=(3, 3),
     # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
-    # largest size in the other samples of this frame, of the one before, of the one before that
+    # largest size in the other samples of this frame, of the one before, of the one before that; its smallest
+    # size there, of this frame and the one before
     apparent_gyro_error=3, previous_apparent_gyro_error=3,
     substep_gyro_error_peak=3, previous_substep_gyro_error_peak=3, earlier_substep_gyro_error_peak=3,
+    substep_gyro_error_floor=3, previous_substep_gyro_error_floor=3,
     # W of sensor_monitor.py, rad/s, by axis: the gyro's error if the dynamics are right; and its bound
     gyro_error_estimate=3, sound_gyro_estimate_bound=3, previous_sound_gyro_estimate_bound=3,
     previous_gyro_error_estimate=3,

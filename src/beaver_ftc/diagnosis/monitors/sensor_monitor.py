@@ -448,7 +448,8 @@ def check_sensors_and_replace_readings(
             memory.previous_substep_gyro_error_peak,
         )
         memory.previous_substep_gyro_error_peak[:] = memory.substep_gyro_error_peak
-        memory.substep_gyro_error_peak[:] = 0.0
+        memory.previous_substep_gyro_error_floor[:] = memory.substep_gyro_error_floor
+        memory.substep_gyro_error_peak[:], memory.substep_gyro_error_floor[:] = 0.0, 0.0
     for i in range(3):
         gyro_error_by_attitude = (
             -redundancy.test[FIRST_TURN_TEST + i].residual / redundancy.config.sample_time_s
@@ -458,6 +459,11 @@ def check_sensors_and_replace_readings(
         else:
             memory.substep_gyro_error_peak[i] = max(
                 memory.substep_gyro_error_peak[i], abs(gyro_error_by_attitude)
+            )
+            memory.substep_gyro_error_floor[i] = (
+                abs(gyro_error_by_attitude)
+                if memory.substep == 1
+                else min(memory.substep_gyro_error_floor[i], abs(gyro_error_by_attitude))
             )
     if pitch_is_too_steep(redundancy, readings):
         restart_comparison_of_gyros_and_attitude(memory)
@@ -655,7 +661,9 @@ def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
         yes     no; neither                                                               undecided
 
     A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
-    a gyro stays, and one that varies is not as small in every sample.
+    a gyro stays, and one that varies is not as small in every sample. If an error is there in every sample
+    and varies between them, as noise does, the innovation cannot be compared with its jump: the innovation
+    contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
     memory, innovation = monitor.memory, detection_filter_bank.output.innovation
     filter_bank_alarm_axis = bank_alarm_axis(detection_filter_bank)
@@ -694,17 +702,23 @@ def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
             abs(innovation[i] - jump_acceleration)
             <= innovation_bound + jump_acceleration_tolerance + attitude_rate_noise_bound / dt
         )
+        smallest_gyro_error = memory.previous_substep_gyro_error_floor[i]
+        gyro_error_varies = (
+            smallest_gyro_error > attitude_rate_noise_bound
+            and memory.previous_substep_gyro_error_peak[i]
+            > (1.0 + GYRO_JUMP_TOLERANCE_SHARE) * smallest_gyro_error
+        )
         gyro_error_estimate_allows_error = (
             MIN_GYRO_ERROR_SHARE_ESTIMATED * abs(gyro_error_by_attitude)
             <= memory.sound_gyro_estimate_bound[i]
             + abs(memory.gyro_error_estimate[i])
             + attitude_rate_noise_bound
         )
-        if not innovation_fits_gyro_jump or (
+        if not (innovation_fits_gyro_jump or gyro_error_varies) or (
             not error_shows_in_dynamics and (gyro_error_is_transient or not gyro_error_estimate_allows_error)
         ):
             memory.gyro_error_verdict_by_axis[i] = GYRO_ERROR_REFUTED
-        elif error_shows_in_dynamics:
+        elif error_shows_in_dynamics and innovation_fits_gyro_jump:
             memory.gyro_error_verdict_by_axis[i] = GYRO_ERROR_CONFIRMED
 
 

@@ -20,7 +20,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import DiagnosisRows
-from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names_text
+from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
 from beaver_ftc_logs.stepped import (
     ReplayedVerdicts,
@@ -223,7 +223,7 @@ def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft:
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
     for quantity_column in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
         if quantity_column.column not in recording.columns:
-            nearest_text = nearest_names_text(quantity_column.column, recording.columns)
+            nearest_text = recording.nearest_column_names_text(quantity_column.column)
             reason = f"no column {quantity_column.column}, allowed: a log that has it; it has {nearest_text}"
             raise BadInput(f"{recording.name}: {reason}")
 

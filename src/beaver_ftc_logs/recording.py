@@ -48,13 +48,22 @@ class LoggedFailure:
 @dataclass(frozen=True)
 class RecordedFlight:
     """One flight: its columns by name, what went wrong by the log's own word, remarks on the reading, and the
-    autopilot's parameters that the log carries."""
+    autopilot's parameters that the log carries.
+
+    unread_column_names: names of further columns of the log, for the message that a wanted column is missing.
+    A reader of wanted columns gives them where the log lacks one of these.
+    """
 
     name: str
     columns: Mapping[str, Column]
     logged_failures: tuple[LoggedFailure, ...] = ()
     notes: tuple[str, ...] = field(default=())
     parameters: Parameters = field(default_factory=dict)
+    unread_column_names: tuple[str, ...] = ()
+
+    def nearest_column_names_text(self, wanted_name: str) -> str:
+        """The names of the log's columns that are nearest to one that it has not, read or not."""
+        return nearest_names_text(wanted_name, {*self.columns, *self.unread_column_names})
 
 
 def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value: float) -> None:
@@ -140,12 +149,17 @@ def columns_without_numbers(
     """The columns of all topics by their names, each without a row: those of a log that has none that is
     wanted."""
     no_rows = Column(np.empty(0), np.empty(0))
-    return {
-        f"{topic}.{field_name}": no_rows
+    return dict.fromkeys(column_names_of_topics(fields_by_topic, stamp_field), no_rows)
+
+
+def column_names_of_topics(fields_by_topic: Mapping[str, Iterable[str]], stamp_field: str) -> tuple[str, ...]:
+    """The names of the columns of all topics, without their stamps."""
+    return tuple(
+        f"{topic}.{field_name}"
         for topic, field_names in fields_by_topic.items()
         for field_name in field_names
         if field_name != stamp_field
-    }
+    )
 
 
 def _as_float_array(values: Any) -> Floats:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_flight, read_parts, split_long_recording
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, nearest_names_text
+from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight
 from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -344,7 +344,7 @@ def _refuse_missing_or_implausible_columns(
     another unit."""
     missing_names = [name for name in used_column_names if name not in recording.columns]
     if missing_names:
-        nearest_text = nearest_names_text(missing_names[0], recording.columns)
+        nearest_text = recording.nearest_column_names_text(missing_names[0])
         reason = f"no column {missing_names[0]}, allowed: a log that has it; it has {nearest_text}"
         raise BadInput(f"{recording.name}: {reason}")
     max_abs_of_column = {}

@@ -21,6 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
     RecordedFlight,
     add_parameter,
+    column_names_of_topics,
     columns_and_time_origin,
     columns_without_numbers,
     package_errors_as_bad_input,
@@ -114,8 +115,14 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     if damaged_messages:  # which of their stamps is the first depends on all of them
         messages = _read_messages(path, wanted_columns, damaged_messages)
     first_stamps_us = [stamps.first for stamps in messages.stamps_by_message.values()]
+    column_names = column_names_of_topics(messages.fields_by_message, _TIME_FIELD)
     columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_stamps_us)
-    return RecordedFlight(path.stem, columns, parameters=messages.parameters)
+    return RecordedFlight(
+        path.stem,
+        columns,
+        parameters=messages.parameters,
+        unread_column_names=tuple(name for name in column_names if name not in columns),
+    )
 
 
 def _read_messages(

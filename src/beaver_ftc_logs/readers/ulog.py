@@ -13,6 +13,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
     Floats,
     RecordedFlight,
+    column_names_of_topics,
     columns_and_time_origin,
     columns_without_numbers,
     package_errors_as_bad_input,
@@ -26,20 +27,30 @@ _MAX_MESSAGE_BYTES = 65535
 def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted_columns: the columns that are kept in memory, all where None. Where the log has no topic of any of
-    them, all columns are returned, without numbers: their names are known then.
+    wanted_columns: the columns that are kept in memory, all where None. Where the log has none of them, all
+    columns are returned, without numbers. Where it lacks one, the log is read once more for the names of all.
     """
     parameters: dict[str, tuple[float, ...]] = {}
     fields_by_topic, kept_by_topic = _read_topics(path, wanted_columns, parameters)
+    column_names = column_names_of_topics(fields_by_topic, _TIME_FIELD)
+    lacks_wanted = wanted_columns is not None and not {*wanted_columns} <= {*column_names}
+    if lacks_wanted:
+        fields_by_topic, _ = _read_topics(path, (), {})
+        column_names = column_names_of_topics(fields_by_topic, _TIME_FIELD)
     if not fields_by_topic:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    if not any(kept_by_topic.values()):
+    if wanted_columns is not None and not {*wanted_columns} & {*column_names}:
         return RecordedFlight(
             path.stem, columns_without_numbers(fields_by_topic, _TIME_FIELD), parameters=parameters
         )
     columns, origin_s = columns_and_time_origin(kept_by_topic, _TIME_FIELD)
-    time_origin_notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
-    return RecordedFlight(path.stem, columns, notes=time_origin_notes, parameters=parameters)
+    return RecordedFlight(
+        path.stem,
+        columns,
+        notes=(f"time counts from {origin_s:.3f} s of the autopilot's clock",),
+        parameters=parameters,
+        unread_column_names=tuple(name for name in column_names if name not in columns),
+    )
 
 
 def _read_topics(

@@ -347,6 +347,63 @@ def test_a_log_without_any_wanted_column_says_which_it_has(tmp_path, suffix):
         load_flights_for_fit([path], load_vehicle(tmp_path / "wing.yaml"))
 
 
+@pytest.mark.parametrize("suffix", ["ulg", "bin"])
+@pytest.mark.parametrize(
+    ("wanted", "kept"),
+    [
+        (["RATE.P", "RATE.X"], ["RATE.P"]),  # one field is misspelt
+        (["RATE.P", "ACC.Z"], ["RATE.P"]),  # a whole topic is missing
+        (["RATE.X", "RATE.Y"], []),  # the topic is there, no field of it
+    ],
+)
+def test_a_log_that_lacks_a_wanted_column_gives_the_names_of_all(tmp_path, suffix, wanted, kept):
+    """Two topics, of which one may be not wanted."""
+    pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
+    path, topics = tmp_path / f"flight.{suffix}", {"RATE": ("P", "Q"), "BARO": ("Alt", "Temp")}
+    if suffix == "bin":
+        stamps = enumerate([1_000_000, 1_100_000, 1_200_000])
+        rows = [(topic, {"TimeUS": at, **dict.fromkeys(topics[topic], k + 0.5)})
+                for k, at in stamps for topic in topics]  # fmt: skip
+        synthetic.write_dataflash(path, rows)
+    else:
+        data = ULOG_HEAD
+        for topic, fields in topics.items():
+            layout = "".join(f"double {field};" for field in fields)
+            data += ulog_message("F", f"{topic}:uint64_t timestamp;{layout}".encode())
+        for number, topic in enumerate(topics):
+            data += ulog_message("A", struct.pack("<BH", 0, number) + topic.encode())
+        for k in range(3):
+            for number in range(len(topics)):
+                data += ulog_message(
+                    "D", struct.pack("<HQdd", number, 1_000_000 + 100_000 * k, k + 0.5, k + 0.5)
+                )
+        path.write_bytes(data)
+    found = read_flight(path, columns=wanted)
+    names = {f"{topic}.{field}" for topic, fields in topics.items() for field in fields}
+    assert {*found.columns, *found.unread_column_names} == names
+    assert [name for name, column in found.columns.items() if column.values.size] == kept
+    for name in kept:
+        assert found.columns[name].values.tolist() == [0.5, 1.5, 2.5]
+    wing = synthetic.vehicle("RATE", {"p_rad_s": "P"})
+    (tmp_path / "wing.yaml").write_text(wing)
+    it_has = r"no column RATE\.q_rad_s, .* it has (?=.*RATE\.Q)(?=.*BARO\.Alt)(?=.*RATE\.P)"
+    with pytest.raises(BadInput, match=it_has):
+        load_flights_for_fit([path], load_vehicle(tmp_path / "wing.yaml"))
+
+
+def test_a_ulog_without_a_message_of_the_wanted_topic_gives_the_names_of_others(tmp_path):
+    """The format of the wanted topic is in the log's head, as autopilots write it for every topic."""
+    pytest.importorskip("pyulog")
+    data = ULOG_HEAD
+    for topic in ("RATE", "BARO"):
+        data += ulog_message("F", f"{topic}:uint64_t timestamp;double P;".encode())
+    data += ulog_message("A", struct.pack("<BH", 0, 0) + b"BARO")
+    data += ulog_message("D", struct.pack("<HQd", 0, 1_000_000, 2.5))
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(data)
+    assert list(read_flight(path, columns=["RATE.P"]).columns) == ["BARO.P"]
+
+
 @pytest.mark.parametrize("block_bytes", [1, 100, 240])
 def test_a_ulog_in_blocks_is_the_ulog(tmp_path, monkeypatch, block_bytes):
     """Blocks of one message, of some, and one that ends before the log does; rows of 24 bytes."""

@@ -15,6 +15,7 @@ the engine's power, airspeed and dynamic pressure, so it has their errors.
 from collections.abc import Iterator
 from math import exp, hypot, sqrt
 from statistics import NormalDist
+from sys import float_info
 
 import numpy as np
 
@@ -186,21 +187,24 @@ def n_tests_per_frame(aircraft: Aircraft, *parity_directions: ParityDirection) -
     )
 
 
+def _quantile(probability: float) -> float:
+    """Of the normal distribution; of a probability that is too small for a number, that of the smallest."""
+    return NormalDist().inv_cdf(max(probability, float_info.min))
+
+
 def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
     """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame.
 
     By the union bound the rate is at most `false_alarms_per_h`.
     """
-    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
+    return -_quantile(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
 
 
 def derive_isolation_llr_margin(
     wrong_isolation_probability: float, rate_hz: float, aircraft: Aircraft
 ) -> float:
     """Difference of log-likelihood ratios that noise exceeds in a second with this probability at most."""
-    return (
-        0.5 * NormalDist().inv_cdf(wrong_isolation_probability / (rate_hz * n_tests_per_frame(aircraft))) ** 2
-    )
+    return 0.5 * _quantile(wrong_isolation_probability / (rate_hz * n_tests_per_frame(aircraft))) ** 2
 
 
 def configure_statistical_detector(

@@ -360,9 +360,8 @@ def configure_fault_types(
     )
     types_config["frame_shows_single_instant"] = scenario.substeps == 1 and frames_per_block == 1
     types_config["block_duration_s"] = frames_per_block * dt
-    types_config["slowest_half_cycle_frames"] = ceil(
-        pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
-    )
+    half_cycle_frames = pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
+    types_config["slowest_half_cycle_frames"] = ceil(min(half_cycle_frames, 1e9))  # longer than any flight
     types_config["n_substeps"], types_config["released_surface_returns_via_actuator"], types_config["dt"] = (
         scenario.substeps,
         prediction_actuators["real"],

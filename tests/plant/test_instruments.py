@@ -68,6 +68,12 @@ def test_slope_bias_and_resolution():
     assert readings[SIGNALS.index("qdyn")] == 900.0
 
 
+def test_a_resolution_finer_than_any_reading_is_rounded_changes_no_reading():
+    plain = samples(still(1))[0]
+    fine = {"qdyn": {"quantum_pa": 5e-324}, "V": {"quantum_mps": 1e-300}, "p": {"quantum_deg_s": 1e-17}}
+    assert (samples(still(1), **fine)[0] == plain).all()
+
+
 def test_a_ramp_comes_out_late_by_delay_and_lag():
     """Of a ramp, a lag of bandwidth w is late by exp(-w dt) dt / (1 - exp(-w dt)) in discrete time."""
     dt, w, slope = 0.01, 20.0, 3.0

@@ -33,6 +33,7 @@ from beaver_ftc.scenario.airframe import among, checked_aircraft
 
 # Noise is normal and cut off at so many standard deviations: a bound on it can be declared, and holds.
 NOISE_LIMIT_SIGMA = 4.0
+_FINEST_RESOLUTION = 1e-18  # SI; a reading divided by the smallest number that a file can have is infinite
 
 
 class _Sensor(Section):
@@ -70,9 +71,11 @@ class _Sensor(Section):
 
     @property
     def noise_bias_quantum(self) -> tuple[float, float, float]:
-        """Standard deviation, bias and resolution, SI."""
+        """Standard deviation, bias and resolution, SI. One finer than any reading is rounded is none."""
         noise, bias, quantum, unit = self.si
-        return getattr(self, noise) * unit, getattr(self, bias) * unit, getattr(self, quantum) * unit
+        resolution = getattr(self, quantum) * unit
+        sizes = getattr(self, noise) * unit, getattr(self, bias) * unit
+        return *sizes, resolution if resolution >= _FINEST_RESOLUTION else 0.0
 
     @property
     def random_error(self) -> float:

@@ -202,9 +202,15 @@ def test_noise_limits_the_loop_where_the_surface_is_weak():
     assert noise_speed(SERVO, weak, z, omega) * noise / 3.0 == pytest.approx(speed, rel=0.05)
 
 
+def test_a_surface_that_does_not_move_has_no_margin_to_lose():
+    assert margins(np.zeros(9, dtype=complex)) == (np.inf, np.inf, np.inf)
+
+
 def test_a_lead_never_overshoots():
     for approach in (0.05, 0.2, 0.9, 1.0):
         assert 1.0 <= lead_of(approach) <= 1.0 / approach
+    assert lead_of(0.0) == lead_of(0.25) == 4.0  # a bandwidth of 5e-324 rad/s approaches by 0
+    assert lead_of(0.2501) == pytest.approx(1.0 / 0.2501)
 
 
 @pytest.mark.parametrize("dt", [0.005, 0.02])

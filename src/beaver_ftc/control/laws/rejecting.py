@@ -100,7 +100,9 @@ class Gyro:
 
 def lead_of(approach: float) -> float:
     """By how much to lead an actuator that goes this share of the way in a frame; it never overshoots."""
-    return min(1.0 / approach, MOST_LEAD) if approach < 1.0 else LEAST_LEAD_RATIO
+    if approach <= 1.0 / MOST_LEAD:
+        return MOST_LEAD
+    return 1.0 / approach if approach < 1.0 else LEAST_LEAD_RATIO
 
 
 def frequencies(dt_s: float) -> np.ndarray:
@@ -147,8 +149,11 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
 
     Between two samples L is taken as straight in log magnitude and phase. At the last one, Nyquist perhaps,
     L is real: a crossing if negative. `control.stability_margins` of the sampled loop agrees to 0.1 %, and
-    takes 300 times as long for each of the candidates that a flight's gains are chosen from.
+    takes 300 times as long for each of the candidates that a flight's gains are chosen from. A surface that
+    does not move closes no loop.
     """
+    if not L.any():
+        return inf, inf, inf
     level, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
     upper, lower = inf, inf
     if L[-1].real < -abs(L[-1].imag) * 1e6:

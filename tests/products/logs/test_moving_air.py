@@ -506,3 +506,22 @@ def test_the_colour_of_gyro_noise_by_every_pair_of_residuals():
     by = np.linalg.solve(covariance[3:6, 3:6], covariance[3:6, :3])
     np.testing.assert_allclose(one, by, rtol=1e-9)
     np.testing.assert_allclose(rest, covariance[:3, :3] - covariance[:3, 3:6] @ by, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("odds", "low"), [(30.0, 0.05), (100.0, 0.95)])
+def test_bounds_by_healthy_flights_of_other_laws_keep_health_and_a_loss_of_which_little_is_known(odds, low):
+    """Health has odds of 30 against the level 0.1, which is half a step wide each way: the loss is within the
+    bounds, for 30 / 31 is less than the mass. With odds of 100, 100 / 101 is more, and health stands alone."""
+    plain = small.model(small.WING | {"other_laws": True, "moving_air": True})
+    quiet = fitting.flights_with_usable_rows([small.flight(plain, 300)])
+    settings = fitting.estimate_filter_settings(quiet, plain)
+    model = plain.model_copy(update={"settings": settings})
+    bank = build_hypothesis_bank(model)
+    levels, prior = diagnose._group_level_distribution(bank, bank.prior_probability[None, :-1], 0)
+    health, lost = prior[0, np.isclose(levels, 1.0)], prior[0, np.isclose(levels, 0.1)]
+    posterior = np.zeros((1, len(bank.hypothesis_kind)))
+    posterior[0, 0] = odds * health[0]
+    posterior[0, np.isclose(bank.effectiveness[:, 0], 0.1).argmax()] = lost[0]
+    posterior /= posterior.sum()
+    _, found, high = diagnose._group_effectiveness_and_bounds(bank, posterior[:, :-1], 0, model)
+    assert (found, high) == (pytest.approx([low]), pytest.approx([1.0]))

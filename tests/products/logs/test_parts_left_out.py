@@ -525,6 +525,7 @@ LAWS = {
     "name_evidence": 2.0,
     "rename_s": 1.0,
     "one_group": True,
+    "bounds": 0.97,
 }
 AIR = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 DAYS = {

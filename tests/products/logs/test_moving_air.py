@@ -510,8 +510,8 @@ def test_the_colour_of_gyro_noise_by_every_pair_of_residuals():
 
 @pytest.mark.parametrize(("odds", "low"), [(30.0, 0.05), (100.0, 0.95)])
 def test_bounds_by_healthy_flights_of_other_laws_keep_health_and_a_loss_of_which_little_is_known(odds, low):
-    """Health has odds of 30 against the level 0.1, which is half a step wide each way: the loss is within the
-    bounds, for 30 / 31 is less than the mass. With odds of 100, 100 / 101 is more, and health stands alone."""
+    """Health has odds of 30 against the level 0.1, which is half a step wide each way. The loss is within the
+    bounds, for 30 / 31 is less than the mass. With odds of 100, 100 / 101 is more: health stands alone."""
     plain = small.model(small.WING | {"other_laws": True, "moving_air": True})
     quiet = fitting.flights_with_usable_rows([small.flight(plain, 300)])
     settings = fitting.estimate_filter_settings(quiet, plain)

@@ -340,9 +340,13 @@ def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: floa
     is_known = ~has_missing_value
     joins_next_row = is_known[1:] & is_known[:-1] & ~is_uneven_step
     stretch_edges = np.flatnonzero(np.diff(np.concatenate([[False], joins_next_row, [False]]).astype(int)))
-    first_and_last_rows = zip(stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True)
+    first_rows_and_last_rows_inclusive = zip(
+        stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True
+    )
     return [
-        (first, last + 1) for first, last in first_and_last_rows if last + 1 - first >= _MIN_STRETCH_SAMPLES
+        (first, last + 1)
+        for first, last in first_rows_and_last_rows_inclusive
+        if last + 1 - first >= _MIN_STRETCH_SAMPLES
     ]
 
 

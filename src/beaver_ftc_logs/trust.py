@@ -410,11 +410,11 @@ def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
             and other_gain_bounds.sample_log_likelihood_by_part.mean()
             > gain_bounds.sample_log_likelihood_by_part.mean()
         ):
-            other_mistakes = _column_mistake_texts(samples, model, other_gain_bounds)
+            mistakes_by_likelier_noise = _column_mistake_texts(samples, model, other_gain_bounds)
             mistakes = {
                 mistake_key: mistake_text
                 for mistake_key, mistake_text in mistakes.items()
-                if mistake_key in other_mistakes
+                if mistake_key in mistakes_by_likelier_noise
             }
     mistake_text = next(iter(mistakes.values()), None) or _likelier_column_mistake_text(
         likeliest_whitened_flight, likeliest_model

@@ -90,5 +90,5 @@ def test_how_fast_a_flow_angle_may_drift_is_by_gyros_attitude_and_accelerometers
         (forces.SIDE_INDEX_AMONG_FORCES, side),
         (forces.NORMAL_INDEX_AMONG_FORCES, normal),
     ):
-        found = forces._flow_angle_drift_bound(errors, 9.7, 45.0, component)
+        found = forces._flow_angle_drift_rate_bound(errors, 9.7, 45.0, component)
         assert found == pytest.approx(EARTH_RATE_RAD_S + gyros + acceleration / 45.0)

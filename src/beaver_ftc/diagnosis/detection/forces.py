@@ -356,7 +356,7 @@ def _configure_force(
     force_record["deflection_error_effect_bound"] = (
         max_specific_force_over_chord_per_deflection_rad * declared.actuators.deflection_rad
     )
-    force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
+    force_record["flow_angle_drift_bound"] = _flow_angle_drift_rate_bound(
         sensor_errors, gust_config["gravity"], y[AIRSPEED], force_index
     )
     flow_angle_drift_intensity = (
@@ -409,7 +409,7 @@ def _slipstream_slope_and_noise_variance(
     )
 
 
-def _flow_angle_drift_bound(
+def _flow_angle_drift_rate_bound(
     sensor_errors: SensorErrors, gravity: float, airspeed_mps: float, force_index: int
 ) -> float:
     """Bound the drift of the flow angle from inertial motion, rad/s. Gravity acts along the path's slope only

@@ -121,7 +121,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         name=recording.name,
         t_s=t_s,
         rates=stacked_columns(rate_column_names),
-        commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_column_names), mixer_matrix(vehicle)),
+        commands=_mixed_commands(recording.name, stacked_columns(vehicle.command_column_names), vehicle),
         signals=stacked_columns(vehicle.signal_column_names),
         labels=_labelled_surface_effectiveness(recording, vehicle, t_s),
         stretch_number=stretch_number,
@@ -335,6 +335,19 @@ def mixer_matrix(vehicle: Vehicle) -> Floats:
         for shares_by_command in vehicle.surfaces.values()
     ]
     return np.array(mixer_rows, dtype=float)
+
+
+def _mixed_commands(flight_name: str, logged_commands: Floats, vehicle: Vehicle) -> Floats:
+    """Return the deflection that the commands (n, C) ask of each surface, (n, S). Raises BadInput where a
+    weight makes one larger than a logged number may be."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        commands: Floats = np.einsum("nc,sc->ns", logged_commands, mixer_matrix(vehicle))
+    is_too_large = (np.isinf(commands) | (np.abs(commands) > _MAX_LOGGED_MAGNITUDE)).any(axis=0)
+    if is_too_large.any():
+        surface = list(vehicle.surfaces)[int(is_too_large.argmax())]
+        allowed_text = f"allowed: weights in `surfaces` that give up to {_MAX_LOGGED_MAGNITUDE:g}"
+        raise BadInput(f"{flight_name}: the command of {surface} is too large, {allowed_text}")
+    return commands
 
 
 def _refuse_missing_or_implausible_columns(

@@ -208,6 +208,15 @@ def test_numbers_at_the_limit_are_taken():
     assert of.resample(recording(**columns), WING).commands.max() > 4e5
 
 
+@pytest.mark.parametrize("weight", [1e308, -1e308, 11.0])
+def test_weights_that_make_a_command_too_large_are_refused(weight):
+    """The column reaches 1e5: times 10 it would be at the limit."""
+    vehicle = small.vehicle(surfaces={"left": {"roll": 1.0}, "right": {"pitch": weight}})
+    log = recording(pitch=column(stamps(0.1), 0.1 * MILLION))
+    with pytest.raises(BadInput, match="log: the command of right is too large, allowed: weights in"):
+        of.resample(log, vehicle)
+
+
 def test_names_that_cannot_be_printed_are_shown_as_they_are_written():
     columns = recording().columns
     del columns["roll"]

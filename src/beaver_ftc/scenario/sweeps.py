@@ -315,6 +315,10 @@ class Sweep:
         with checked_against(self.aircraft, self.base.get("aircraft")):
             return Scenario.model_validate({**with_values(rest, places), **ready, **settings})
 
+    def data_with(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The data of the base with these values at these dotted keys."""
+        return with_values(self.base, {parse_key(key): value for key, value in values.items()})
+
     @cached_property
     def _base_read(self) -> Scenario | None:
         """The base, read once for the flights that do not vary all of it; None if it cannot fly."""

@@ -80,6 +80,13 @@ def test_values_that_contradict_each_other_are_a_row_too(short):
     assert row["reason"].startswith("faults[0].at_s: 2 is after the end")
 
 
+def test_a_drawn_value_out_of_range_is_named_by_its_key_though_the_base_lacks_it(short):
+    for key in ("fdi.detection_pole_per_s", "environment.gust.at_s", "control.noise_share"):
+        row = fly_one(short, Assignment(0, {key: 1e9}))
+        assert row["status"] == "bad_input"
+        assert row["reason"].startswith(f"{key}: 1e+09 is out of range, allowed: a number")
+
+
 @pytest.mark.parametrize(
     ("error", "reason"),
     [

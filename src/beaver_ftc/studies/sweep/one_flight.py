@@ -146,7 +146,8 @@ def scenario_of(sweep: Sweep, assignment: Assignment) -> Scenario:
     try:
         return sweep.scenario(assignment.values, name=flight_name(sweep, assignment.run), seed=seed)
     except ValidationError as error:
-        problem = next(iter(problems_of(error, source.Document(sweep.base), Scenario.model_json_schema())))
+        flown = source.Document(sweep.data_with(assignment.values))
+        problem = next(iter(problems_of(error, flown, Scenario.model_json_schema())))
         raise BadInput(f"{key_path(problem.location)}: {problem.says}") from None
 
 

@@ -192,7 +192,7 @@ MISMATCH = {
     "studies__mismatch__study__run_map": [4],
 }
 IDENTIFY = {
-    "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
+    "beaver_ftc_logs__mixing__load_vehicle_for_logs": ("vehicle", ["mixed"]),
     "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
     "beaver_ftc_logs__identification__scale_by_dynamic_pressure_if_better": (
         [SimpleNamespace(name="pressed", n_log_parts=2, notes=["long"])],
@@ -234,7 +234,7 @@ BY_AIRCRAFT = {
     "beaver_ftc_logs__by_aircraft__as_text": lambda each: each["flight"],
     "beaver_ftc_logs__readers__check_exists": None,
     "beaver_ftc_logs__samples__read_parts_for_vehicle": ["part 1", "part 2"],
-    "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
+    "beaver_ftc_logs__mixing__load_vehicle_for_logs": ("vehicle", ["mixed"]),
     "beaver_ftc_logs__scoring__score_diagnosis": 0.5,
     "beaver_ftc_logs__pages__write_diagnosis_with_aircraft_model": "folder",
 }  # fmt: skip

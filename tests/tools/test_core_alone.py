@@ -31,7 +31,8 @@ def test_the_core_is_found_there_and_no_product(tmp_path):
 
 def test_every_file_of_the_core_and_its_tests_is_there():
     found = {Path(name) for name in core_alone.files()}
-    assert {path.parts[1] for path in found if path.parts[0] == "src"} == {"beaver_ftc"}
+    in_sources = {path.parts[1] for path in found if path.parts[0] == "src"}
+    assert in_sources == {"beaver_ftc", "begin_beaver_ftc.py"}
     assert {Path("tests/conftest.py"), Path("tests/cli/test_main.py"), Path("pyproject.toml")} <= found
     assert not [path for path in found if "products" in path.parts]
 

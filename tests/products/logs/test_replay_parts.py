@@ -136,7 +136,8 @@ def scenario(**sensors):
 ])  # fmt: skip
 def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
     if beside is not None:
-        document = {"detection": {"time_s": beside[0]}, "isolation": {"time_s": beside[1]}}
+        found = {"detection": {"time_s": beside[0]}, "isolation": {"time_s": beside[1]}}
+        document = found | {"flight": {}, "tracking": {}}
         (tmp_path / "metrics.json").write_text(json.dumps(document))
     log = {"t_s": T_S, "detected": np.array([1, 1, 0, 1, 1, 1, 1])}
     assert of._replay_verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {

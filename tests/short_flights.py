@@ -26,8 +26,10 @@ def flown(document: dict[str, Any]) -> dict[str, Any]:
     loop = Loop(load(document))
     log = np.concatenate([rows.copy() for rows in loop.chunks()])
     record = of_record(loop.frames[0])
+    measured = metrics(loop.land())
+    del measured["versions"]  # of the packages, not of the flight: a release would change every kept one
     return {
-        "metrics": metrics(loop.land()),
+        "metrics": measured,
         "log": {name: in_short(column) for name, column in zip(loop.columns, log.T, strict=True)},
         "record": {path: value for path, value in record.items() if not path.endswith(OF_THE_MACHINE)},
     }

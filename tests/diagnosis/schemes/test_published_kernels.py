@@ -1,0 +1,128 @@
+"""The kernels of the published scheme, by other roads: its network, its alarm and its estimators."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.bounds import bound_dtype
+from beaver_ftc.diagnosis.detection.filters import FDAE_RECORD
+from beaver_ftc.diagnosis.isolation import isolation_dtype
+from beaver_ftc.diagnosis.schemes import published as published_scheme
+
+TRAVEL = np.array([[-0.52, -0.49, -0.44], [0.52, 0.49, 0.44]])
+MAIN = np.arange(3)
+POLE, DT = 10.0, 0.01
+
+
+def network(gain=60.0, limit=20.0):
+    new = np.zeros(1, published_scheme.STATE_NETWORK_RECORD).view(np.recarray)[0]
+    published_scheme.configure_state_network(new, gain, limit, TRAVEL)
+    return new
+
+
+def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
+    published_scheme.fill_state_network_basis_and_output(
+        new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u)
+    )
+    return new
+
+
+def gaussians(centres, value):
+    value = np.clip(value, centres[0], centres[-1])
+    found = np.exp(-0.5 * ((centres - value) / (centres[1] - centres[0])) ** 2)
+    return found / np.linalg.norm(found)
+
+
+@given(st.floats(-0.3, 0.8), st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.7, 0.7))
+def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, deflection):
+    new = at(network(), alpha, beta, (rate, -rate, rate), (deflection, -deflection, deflection, 0.0))
+    for i, (angle, sign) in enumerate(((beta, 1), (alpha, -1), (beta, 1))):
+        centres = np.linspace(-0.1, 0.5, 9) if i == 1 else np.linspace(-0.4, 0.4, 9)
+        shares = np.linspace(TRAVEL[0, i], TRAVEL[1, i], 3)
+        along = gaussians(np.linspace(-0.3, 0.3, 3), sign * rate), gaussians(shares, sign * deflection)
+        expected = np.einsum("a,b,c->abc", gaussians(centres, angle), *along).ravel()
+        np.testing.assert_allclose(new.memory.basis[i], expected, atol=1e-12)
+        assert np.linalg.norm(new.memory.basis[i]) == pytest.approx(1.0)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0.1, 3.0))
+def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
+    new = at(network(gain=50.0, limit=limit), alpha=0.2)
+    weights = np.linspace(-limit, limit, new.memory.weights.size).reshape(new.memory.weights.shape)
+    new.memory.weights[:] = weights
+    published_scheme.train_state_network(new, np.array(signal), 0.02)
+    expected = weights + 0.02 * 50.0 * new.memory.basis * np.array(signal)[:, None]
+    np.testing.assert_allclose(new.memory.weights, np.clip(expected, -limit, limit))
+    at(new, alpha=0.2)
+    np.testing.assert_allclose(new.output, (new.memory.weights * new.memory.basis).sum(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("dead_zone", "detected", "residual", "learns"),
+    [(1, 1, 0.02, True), (1, 1, 0.009, False), (1, 0, 0.02, False), (0, 0, 0.009, True)],
+)
+def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
+    dead_zone, detected, residual, learns
+):
+    published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
+    published.config.uses_dead_zone = dead_zone
+    published_scheme.configure_state_network(published.network, 60.0, 20.0, TRAVEL)
+    at(published.network)
+    fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
+    fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
+    published_scheme.train_fdae_network_if_due(published, fdae, detected, DT)
+    expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
+    np.testing.assert_allclose(
+        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES_PER_AXIS))
+    )
+
+
+@pytest.mark.parametrize(
+    ("residual", "axis"), [((0.02, 0.03, 0.0), 0), ((0.0, -0.03, 0.02), 1), ((0, 0, 0), None)]
+)
+def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
+    fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
+    fdae.output.residual[:], fdae.output.threshold[:] = residual, 0.01
+    assert published_scheme.fdae_alarm_axis(fdae) == (-1 if axis is None else axis)
+
+
+@given(
+    st.floats(-1.0, 0.0),
+    st.floats(0.0, 5000.0),
+    st.lists(st.floats(-3.0, 3.0), min_size=40, max_size=40),
+    st.booleans(),
+)
+def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
+    """However it adapts: the term Om ths' of the estimator sees to that."""
+    records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
+    records.config.filter_decay[:], records.config.adapts_by_gradient, records.config.gradient_gain = (
+        published_scheme.euler_decay(POLE, DT),
+        1,
+        gain,
+    )
+    fie = records.estimator[0]
+    fie.theta_min, fie.theta_max, fie.feasible_theta_min[:], fie.feasible_theta_max[:] = (
+        -1.0,
+        0.0,
+        -np.inf,
+        np.inf,
+    )
+    if projects:
+        fie.feasible_theta_min[:], fie.feasible_theta_max[:] = -1.0, 0.0
+    rate, bound = np.zeros(3), np.zeros(1, bound_dtype(4))[0]
+    for z in Z:
+        fie.residual[:] = rate - fie.xhat
+        assert fie.residual == pytest.approx(fie.filtered_regressor * (theta - fie.theta), abs=1e-9)
+        fie.frame_mean_effect.regressor[:] = z, -z, 0.5 * z
+        before = rate.copy()
+        rate = before + DT * theta * fie.frame_mean_effect.regressor
+        isolation.advance_estimator(records, fie, bound, before, np.zeros(3), DT)
+        if projects:
+            assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
+
+
+def test_a_pole_beyond_the_frame_rate_keeps_nothing():
+    assert published_scheme.euler_decay(10.0, 0.01) == pytest.approx(0.9)
+    assert published_scheme.euler_decay(200.0, 0.01) == 0.0

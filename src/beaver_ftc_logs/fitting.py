@@ -784,8 +784,8 @@ def _split_in_halves(
 def add_fitted_ranges_and_alarm_threshold(
     usable_flights: Sequence[FlightWithUsableRows], model: Model
 ) -> Model:
-    """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
-    and at which evidence of a fault they would alarm as often as declared."""
+    """The model with what it was fitted on, and how it did on parts that were left out: at which evidence of
+    a fault they would alarm as often as declared."""
     samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
@@ -807,7 +807,7 @@ def add_fitted_ranges_and_alarm_threshold(
     )
     peak_tail = extremes.fit_peak_tail(held_out.peaks_and_hours)
     fitted_ranges = trust.compute_fitted_ranges(
-        samples_and_is_usable_by_flight, model, gain_standard_errors, held_out.max_noise_variance_scale
+        samples_and_is_usable_by_flight, model, gain_standard_errors
     ).model_copy(
         update={
             "gain_standard_error_by_column": standard_error_by_rate_or_signal,
@@ -833,13 +833,11 @@ def add_fitted_ranges_and_alarm_threshold(
 class _HeldOutResults(NamedTuple):
     """How models of parts of the flights did on the parts that were left out.
 
-    max_noise_variance_scale: largest variance of the residual over that of the fit.
     max_column_mistake_log_likelihood_gain: largest gain, a sample, of reading the columns by mistake.
     peaks_and_hours: peaks of the evidence of a fault, and hours of health, of each part.
     squared_gain_deviations: of each part (G,), beyond what noise explains; empty under one law.
     """
 
-    max_noise_variance_scale: float
     max_column_mistake_log_likelihood_gain: float
     peaks_and_hours: list[extremes.PeaksAndHours]
     squared_gain_deviations: list[Floats]
@@ -851,7 +849,7 @@ def _test_on_held_out_flights(
     samples_and_is_usable_by_flight: Sequence[tuple[Samples, NDArray[np.bool_]]],
 ) -> _HeldOutResults:
     """Fit the model without each part of the flights in turn, and test it on that part."""
-    max_noise_variance_scale, max_mistake_gain = 1.0, 0.0
+    max_mistake_gain = 0.0
     peaks_and_hours = list[extremes.PeaksAndHours]()
     squared_gain_deviations = list[Floats]()
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
@@ -860,22 +858,16 @@ def _test_on_held_out_flights(
         trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
         for held_out in held_out_flights:
-            noise_variance_scale, its_peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
-                fold_model, held_out
-            )
-            max_noise_variance_scale = max(max_noise_variance_scale, noise_variance_scale)
             if len(peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
                 max_mistake_gain = max(
                     max_mistake_gain, _max_column_mistake_log_likelihood_gain(fold_model, held_out)
                 )
-            peaks_and_hours.append(its_peaks_and_hours)
+            peaks_and_hours.append(_healthy_alarm_peaks_and_hours(fold_model, held_out))
             if len(usable_flights) > 1 and model.vehicle.other_laws:
                 squared_gain_deviations.append(
                     _squared_group_gain_deviations_beyond_noise(fold_model, held_out)
                 )
-    return _HeldOutResults(
-        max_noise_variance_scale, max_mistake_gain, peaks_and_hours, squared_gain_deviations
-    )
+    return _HeldOutResults(max_mistake_gain, peaks_and_hours, squared_gain_deviations)
 
 
 def _alarm_rate_and_threshold(
@@ -1036,13 +1028,10 @@ def _cross_validate_alarm_threshold(
     }
 
 
-def _noise_scale_and_healthy_alarm_peaks(
-    model: Model, held_out: FlightWithUsableRows
-) -> tuple[float, extremes.PeaksAndHours]:
-    """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
-    and its healthy hours."""
+def _healthy_alarm_peaks_and_hours(model: Model, held_out: FlightWithUsableRows) -> extremes.PeaksAndHours:
+    """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
     bank = build_hypothesis_bank(model)
-    posterior, _, noise_variance_scales = hypothesis_state_and_noise_posterior(held_out.samples, model, bank)
+    posterior, _, _ = hypothesis_state_and_noise_posterior(held_out.samples, model, bank)
     evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
     is_usable_healthy_and_responding = (
         held_out.is_usable
@@ -1055,10 +1044,7 @@ def _noise_scale_and_healthy_alarm_peaks(
         for begin, end in _begins_and_ends_of_consecutive_rows(healthy_responding_rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in cusum_runs])
-    return float(noise_variance_scales[held_out.is_usable].max(initial=1.0)), (
-        peaks,
-        len(healthy_responding_rows) * held_out.samples.dt_s / 3600.0,
-    )
+    return peaks, len(healthy_responding_rows) * held_out.samples.dt_s / 3600.0
 
 
 def _fitted_and_held_out_by_split(

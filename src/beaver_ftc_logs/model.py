@@ -20,6 +20,7 @@ _MAX_FILE_BYTES = 20_000_000
 _MAX_COEFFICIENT = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
+_KEYS_WITHOUT_EFFECT = ("correlation", "scale", "minutes")  # of `fitted`, in files of release 1.0.0
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEFFICIENT, le=_MAX_COEFFICIENT)]
 CoefficientRow = list[Coefficient]
@@ -191,9 +192,6 @@ class FittedRanges(Section):
     rate_sd_rad_s: CoefficientRow = Field(
         default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    group_command_correlation: CoefficientMatrix = Field(
-        default=[], description="correlation of the groups' commands", alias="correlation"
-    )
     effect_share_explained_by_other_regressors: CoefficientRow = Field(
         default=[],
         description="share of each group's effect that past, signals and other groups make up",
@@ -210,13 +208,6 @@ class FittedRanges(Section):
     longest_unchanged_time_s_by_column: dict[str, Number] = Field(
         default={}, description="longest time each column stood still, s", alias="still_s"
     )
-    max_noise_variance_scale: Number = Field(
-        1.0,
-        gt=0,
-        le=_MAX_COEFFICIENT,
-        description="largest scale of the noise on parts not fitted",
-        alias="scale",
-    )
     max_column_mistake_log_likelihood_gain: Number = Field(
         0.0,
         ge=0,
@@ -230,10 +221,17 @@ class FittedRanges(Section):
         description="rate of the energy height as without power, m/s",
         alias="energy_climb",
     )
-    fitted_minutes: Number = Field(0.0, ge=0, le=1e9, description="what was fitted, min", alias="minutes")
     alarm_peak_tail: PeakTail | None = Field(
         default=None, description="highest alarm statistic on parts not fitted", alias="tail"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _drop_keys_without_effect(cls, data: object) -> object:
+        """Model files of release 1.0.0 have keys that nothing reads any more."""
+        if not isinstance(data, dict):
+            return data
+        return {key: value for key, value in data.items() if key not in _KEYS_WITHOUT_EFFECT}
 
 
 class NoiseModel(Section):
@@ -362,7 +360,6 @@ class Model(Section):
                 ("rates", fitted_ranges.rate_ranges_rad_s, (3, 2)),
                 ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
                 ("spread", fitted_ranges.rate_sd_rad_s, (3,)),
-                ("correlation", fitted_ranges.group_command_correlation, (n_groups, n_groups)),
                 ("tied", fitted_ranges.effect_share_explained_by_other_regressors, (n_groups,)),
                 ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
             ]  # fmt: skip

@@ -53,11 +53,9 @@ def compute_fitted_ranges(
     flights_with_used_rows: Sequence[tuple[Samples, Mask]],
     model: Model,
     held_out_gain_standard_errors: Floats,
-    held_out_max_noise_variance_scale: float,
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
-    used; held_out_gain_standard_errors (G,) and held_out_max_noise_variance_scale: of parts not fitted."""
-    surface_indices_by_group = regression.surface_indices_of_each_group(model)
+    used; held_out_gain_standard_errors (G,): of parts not fitted."""
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
     used_airspeeds = [
@@ -65,21 +63,15 @@ def compute_fitted_ranges(
         for samples, is_used in flights_with_used_rows
         if samples.airspeed is not None
     ]
-    group_commands = np.column_stack(
-        [commands[:, surface_indices].sum(axis=1) for surface_indices in surface_indices_by_group]
-    )
     return FittedRanges(
         commands=central_ranges(commands),
         rates=central_ranges(rates),
         airspeed=central_ranges(np.concatenate(used_airspeeds)[:, None])[0] if used_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        correlation=_correlation_matrix(group_commands).tolist(),
         tied=effect_share_explained_by_other_regressors(flights_with_used_rows, model).tolist(),
         gain_sd=held_out_gain_standard_errors.tolist(),
         still_s=_longest_unchanged_time_s_by_column(flights_with_used_rows),
-        scale=held_out_max_noise_variance_scale,
         energy_climb=_estimate_unpowered_energy_height_rate_mps(flights_with_used_rows),
-        minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights_with_used_rows) / 60.0,
     )
 
 
@@ -109,12 +101,6 @@ def central_ranges(values: Floats) -> list[list[float]]:
         return []
     values_with_unknown_columns_zero = np.where(np.isfinite(values).any(axis=0), values, 0.0)
     return np.nanquantile(values_with_unknown_columns_zero, _RANGE_QUANTILES, axis=0).T.tolist()
-
-
-def _correlation_matrix(values: Floats) -> Floats:
-    centred = np.nan_to_num(values - np.nanmean(values, axis=0))
-    column_norms = np.sqrt((centred**2).sum(axis=0))
-    return np.asarray(centred.T @ centred / np.maximum(np.outer(column_norms, column_norms), MIN_DIVISOR))
 
 
 def _longest_unchanged_time_s_by_column(
@@ -359,13 +345,12 @@ def refuse_commands_in_other_unit(
 
 class _GainBoundsOverFlight(NamedTuple):
     """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
-    command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
-    log likelihood of a sample of each part, (4,), but for what all colours have alike."""
+    command, (G,), and at most to each column, by its name, there is; and the log likelihood of a sample of
+    each part, (4,), but for what all colours have alike."""
 
     largest_group_gain_upper_bounds: list[float]
     smallest_group_gain_lower_bounds: list[float]
     largest_gain_upper_bound_by_column: dict[str, float]
-    min_noise_variance_scale: float
     sample_log_likelihood_by_part: Floats
 
 
@@ -675,7 +660,6 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         gain_upper_bounds.tolist(),
         gain_lower_bounds.tolist(),
         dict(zip(column_names, column_gain_upper_bounds.tolist(), strict=True)),
-        min(noise_variance_scales),
         -log_unfiltered_noise_sd_product - 1.5 * np.log(noise_variance_scales),
     )
 

@@ -431,14 +431,14 @@ def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch)
 
 
 def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
-    """The noisiest of all parts, and of the first four the one that is read wrongly most easily."""
-    noise, misread = {1: 0.7, 2: 2.5, 3: 1.4, 4: 1.1, 5: 0.9}, {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
+    """Of the first four parts the one that is read wrongly most easily."""
+    misread = {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
     left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
     monkeypatch.setattr(fitting, "_fold_models_and_held_out_flights", lambda *of: left_out)
     monkeypatch.setattr(
         fitting,
-        "_noise_scale_and_healthy_alarm_peaks",
-        lambda tested, one: (noise[one], (np.array([1.0]), one / 60)),
+        "_healthy_alarm_peaks_and_hours",
+        lambda tested, one: (np.array([1.0]), one / 60),
     )
     monkeypatch.setattr(fitting, "_max_column_mistake_log_likelihood_gain", lambda tested, one: misread[one])
     monkeypatch.setattr(
@@ -457,8 +457,8 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     def copied(known):
         return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))
 
-    def fitted_ranges(used, model, sd, scale):
-        return copied({"of": (sd.tolist(), scale)})
+    def fitted_ranges(used, model, sd):
+        return copied({"of": sd.tolist()})
 
     monkeypatch.setattr(fitting.trust, "compute_fitted_ranges", fitted_ranges)
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: None)
@@ -478,7 +478,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     expected = {
         "alarm_peak_tail": None,
         "max_column_mistake_log_likelihood_gain": 0.6,
-        "of": ([0.25], 2.5),
+        "of": [0.25],
         "gain_standard_error_by_column": {"p": 0.0},
     }
     assert found["fitted_ranges"].known == expected

@@ -22,7 +22,7 @@ MODEL = {
     "colours": [{"average": [1.0, 0.5], "noise": [[2.5, 0.1, 0.2], [0.1, 3.5, 0.3], [0.2, 0.3, 4.5]]}],
     "fitted": {
         "commands": [[-0.5, 0.4], [-0.3, 0.6]], "rates": [[-1, 2], [-2, 3], [-3, 4]], "spread": [0.1, 0.2, 0.3],  # noqa: E501
-        "correlation": [[1, 0.3], [0.3, 1]], "tied": [0.1, 0.2], "gain_sd": [0.3, 0.4],
+        "tied": [0.1, 0.2], "gain_sd": [0.3, 0.4],
     },
 }  # fmt: skip
 
@@ -43,6 +43,13 @@ def test_the_model_itself_is_one(tmp_path):
     assert load_model(written(tmp_path)).n_command_lags == LAGS
 
 
+def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):
+    former = [
+        (("fitted", key), value) for key, value in (("correlation", [[1.0]]), ("scale", 2), ("minutes", 9))
+    ]
+    assert load_model(written(tmp_path, *former)) == load_model(written(tmp_path))
+
+
 SINGULAR = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 WRONG = [
     (("groups",), [["left"], []], "groups[1]"), (("groups",), [["left"], ["left"]], "groups[1][0]"),
@@ -56,7 +63,7 @@ WRONG = [
     (("colours", 0, "average"), [2.0], "colours[0].average"),
     (("colours", 0, "before"), [[1.0, 0, 0]], "colours[0].before"),
     (("fitted", "rates"), [[-1, 2]], "fitted.rates"), (("fitted", "airspeed"), [1.0], "fitted.airspeed"),
-    (("fitted", "correlation"), [[1.0]], "fitted.correlation"), (("fitted", "tied"), [0.1], "fitted.tied"),
+    (("fitted", "tied"), [0.1], "fitted.tied"),
     (("fitted", "gain_sd"), [0.1, -0.4], "fitted"), (("fitted", "commands"), [[1.0]], "fitted.commands"),
     (("settings",), {"level_step": 1e-9}, "settings.level_step"),
     (("settings",), {"levels": {"tail": [0.5]}}, "settings.levels.tail"),

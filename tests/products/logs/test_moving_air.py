@@ -230,7 +230,6 @@ def test_columns_are_compared_in_white(moving, colour):
         zip(found, moving.noise_models, strict=True),
         key=lambda pair: pair[0].sample_log_likelihood_by_part.mean(),
     )
-    assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
     assert all(1.0 < gain < 1.6 for gain in likeliest[0].largest_group_gain_upper_bounds)
     plain = trust._bound_gains_over_flight_parts(flight, moving.model_copy(update={"noise_models": []}))
     assert (
@@ -464,7 +463,6 @@ def test_what_answers_in_every_part_of_a_flight_is_by_least_squares_of_each(monk
         name: pytest.approx(top, rel=1e-6) for name, top in zip(names, tops, strict=True)
     }
     scales = [np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366 for part in bare]
-    assert found.min_noise_variance_scale == pytest.approx(min(scales))
     noise = 0.5 * np.linalg.slogdet(colours[0].residual_covariance)[1]
     np.testing.assert_allclose(found.sample_log_likelihood_by_part, -noise - 1.5 * np.log(scales))
     likely, count = trust._part_log_likelihoods_and_sample_count(flight, model)

@@ -447,25 +447,17 @@ def test_peaks_and_hours_are_of_rows_in_health_that_answer(monkeypatch):
     use = ~np.isin(np.arange(n), [0, 7])
     posterior = np.tile([0.6, 0.1, 0.3], (n, 1))
     posterior[9] = 0.3, 0.2, 0.5
-    scales = np.array([9.0, 1.1, 1.2, 1.3, 1.0, 1.0, 1.4, 8.0, 1.0, 2.5, 1.0, 1.0])
     bank = SimpleNamespace(no_response_hypothesis_index=2)
     monkeypatch.setattr(fitting, "build_hypothesis_bank", lambda model: bank)
-    monkeypatch.setattr(
-        fitting, "hypothesis_state_and_noise_posterior", lambda *of: (posterior, None, scales)
-    )
+    monkeypatch.setattr(fitting, "hypothesis_state_and_noise_posterior", lambda *of: (posterior, None, None))
     monkeypatch.setattr(fitting, "any_fault_log_odds_gains", lambda of, by: gained)
     samples = SimpleNamespace(labels=labels, dt_s=1.5)
-    scale, (peaks, hours) = fitting._noise_scale_and_healthy_alarm_peaks(
+    peaks, hours = fitting._healthy_alarm_peaks_and_hours(
         MODEL, SimpleNamespace(samples=samples, is_usable=use)
     )
     # rows 1; 3, 4, 5, 6; 8; 10, 11
     assert peaks.tolist() == [2.0, 8.0, 48.0, 128.0, 1536.0]
     assert hours == pytest.approx(8 * 1.5 / 3600.0)
-    assert scale == 2.5
-    scales[:] = 0.8
-    assert fitting._noise_scale_and_healthy_alarm_peaks(
-        MODEL, SimpleNamespace(samples=samples, is_usable=use)
-    )[0] == 1.0  # fmt: skip
 
 
 def test_what_is_computed_once_is_of_these_flights_and_this_question():
@@ -587,9 +579,7 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     folds, given = [("one", [1, 2]), ("other", [3])], {}
     stubs = {
         "_fold_models_and_held_out_flights": lambda of, model, tied: given.update(tied=tied) or folds,
-        "_noise_scale_and_healthy_alarm_peaks": lambda model, one: (
-            0.5 * one, (np.array([7.0 * one]), one / 60.0),
-        ),
+        "_healthy_alarm_peaks_and_hours": lambda model, one: (np.array([7.0 * one]), one / 60.0),
         "_max_column_mistake_log_likelihood_gain": lambda model, one: 0.1 * one,
         "_squared_group_gain_deviations_beyond_noise": lambda model, one: one * np.array([0.01, 0.02]),
         "_max_gain_bias_under_one_law": lambda of, model: np.array([0.1, 0.2]),
@@ -608,7 +598,7 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     monkeypatch.setattr(
         trust,
         "compute_fitted_ranges",
-        lambda of, model, errors, scale: given.update(of=of, errors=errors, scale=scale) or bare,
+        lambda of, model, errors: given.update(of=of, errors=errors) or bare,
     )
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: given.update(parts=parts) or tail)
     model = small.model(small.WING | {"other_laws": laws, "false_alarms_per_hour": asked})
@@ -617,9 +607,8 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     found = fitting.add_fitted_ranges_and_alarm_threshold(used, model)
     expected = np.minimum(np.sqrt(np.array([0.0025, 0.09]) + wide), 0.33)
     np.testing.assert_allclose(given["errors"], expected)
-    assert (given["of"], given["scale"], given["tied"]) == (
-        [(one.samples, one.is_usable) for one in used], 1.5, [0.3, 0.4],
-    )  # fmt: skip
+    assert given["of"] == [(one.samples, one.is_usable) for one in used]
+    assert given["tied"] == [0.3, 0.4]
     assert [(peaks.tolist(), hours) for peaks, hours in given["parts"]] == [
         ([7.0 * one], one / 60.0) for one in (1, 2, 3)
     ]

@@ -2,12 +2,15 @@
 
 import json
 import re
+from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tools.docs.tables.chosen import (
     BETTER_DRAWS,
     CONSTANT_HEAD,
+    ORIGINS,
     RATIO_DRAWS,
     TUNED_DRAWS,
     _said,
@@ -15,6 +18,8 @@ from tools.docs.tables.chosen import (
     chosen_constants,
     chosen_flights,
     draws_of,
+    not_chosen,
+    not_chosen_constants,
 )
 
 from beaver_ftc.diagnosis.rivals import TUNED_FILE
@@ -24,7 +29,7 @@ from beaver_ftc.studies.reproduce.reproduction import SETTINGS
 from tools import gains
 
 ROOT = Path(__file__).parents[2]
-CHOICES = choices()
+CHOICES, NOT_CHOSEN = choices(), not_chosen_constants()
 
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["constant"])
@@ -40,6 +45,46 @@ def test_what_was_chosen_is_where_the_table_says(choice):
     text = file.read_text()
     for name in re.findall(r"`([A-Za-z_]+)`", choice["constant"]):
         assert name in text, name
+
+
+@pytest.mark.parametrize("file", NOT_CHOSEN)
+def test_each_number_of_the_diagnosis_of_logs_was_chosen_or_has_an_origin(file):
+    module, assigned = (
+        import_module(f"beaver_ftc_logs.{Path(file).stem}"),
+        r"^(_?[A-Z][A-Z\d_, ]+?)(?:: .*)? = (?!range)",
+    )
+    names = {
+        name
+        for line in re.findall(assigned, (ROOT / file).read_text(), re.MULTILINE)
+        for name in line.split(", ")
+    }
+    numbers = {name for name in names if np.asarray(getattr(module, name)).dtype.kind in "if"}
+    chosen = {
+        name
+        for choice in CHOICES
+        if choice["where"] == file
+        for name in re.findall(r"`(\w+)`", choice["constant"])
+    }
+    assert len(numbers) > 4
+    assert numbers - chosen == set(NOT_CHOSEN[file])
+    assert all(origin.partition(":")[0] in ORIGINS for origin in NOT_CHOSEN[file].values())
+
+
+def test_a_constant_that_was_not_chosen_has_its_value_of_the_code_and_its_origin():
+    rows = not_chosen().splitlines()
+    assert (
+        "| `_RANGE_QUANTILES` | 0.001, 0.999 | judged | one sample in 500 is an outlier | trust.py |" in rows
+    )
+    assert len(rows) == 2 + sum(map(len, NOT_CHOSEN.values()))
+
+
+def test_no_page_prints_logs_that_a_constant_was_chosen_on():
+    chosen = {seed for choice in CHOICES for by, seed in draws_of(choice["flights"]) if by == "own_logs"}
+    command = r"printed: python -m benchmarks\.(?:own_logs|wrong_columns) .*?--seed (\d+)"
+    pages = [path.read_text() for path in (ROOT / "docs").rglob("*.md")]
+    printed = {int(seed) for page in pages for seed in re.findall(command, page)}
+    assert printed
+    assert not printed & chosen
 
 
 def test_the_sets_of_the_benchmark_are_read_and_apart():

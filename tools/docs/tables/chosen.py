@@ -22,6 +22,8 @@ from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
+NOT_CHOSEN_FILE = FILE.with_name("not_chosen.yaml")
+ORIGINS = ("derived", "stated", "search", "limit", "judged")
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 TUNED_DRAWS = range(61)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
@@ -38,6 +40,32 @@ def chosen_constants() -> str:
         CONSTANT_HEAD,
         lambda choice: (choice["constant"], choice["value"], choice["sets"], *_where(choice)),
     )
+
+
+def not_chosen() -> str:
+    """The other constants of the diagnosis of logs, each with its value in the code and its origin."""
+    rows = [
+        (f"`{name}`", _value_text(file, name), *_origin_and_reason(origin), Path(file).name)
+        for file, origins in not_chosen_constants().items()
+        for name, origin in origins.items()
+    ]
+    return markdown_table(("constant", "value", "origin", "reason", "file"), rows)
+
+
+def _value_text(file: str, name: str) -> str:
+    value = getattr(import_module(f"beaver_ftc_logs.{Path(file).stem}"), name)
+    return ", ".join(f"{number:g}" for number in np.atleast_1d(value))
+
+
+def _origin_and_reason(text: str) -> tuple[str, str]:
+    origin, _, reason = text.partition(": ")
+    return origin, reason
+
+
+def not_chosen_constants() -> dict[str, dict[str, str]]:
+    """By file: the name of each constant that no recorded choice has, and the origin of its value."""
+    found: dict[str, dict[str, str]] = parse(NOT_CHOSEN_FILE.read_text(encoding="utf-8")).data
+    return found
 
 
 def chosen_flights() -> str:

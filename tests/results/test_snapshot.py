@@ -62,6 +62,9 @@ def test_before_the_first_step_nothing_is_flown():
     assert kept.resume().frames == kept.frames == 0
     with pytest.raises(BadInput, match="kept no log"):
         _ = kept.resume().log
+    looked_at = bf.Simulation(KINDS["published"])
+    assert len(looked_at.rows) == 1
+    assert looked_at.clone().frames == looked_at.frames == 1
 
 
 class Quiet:

@@ -105,6 +105,7 @@ def test_how_far_it_looks_and_at_what():
 NO_FORMULA = [
         "", "a", "a + 1", "abs(a)", "a <=", "(a <= 1", "a <= 1)", "a <= 1 b", "a == 1", "always a <= 1",
         "always[0:5]", "always[5:0](a <= 1)", "always[-1:2](a <= 1)", "always[0](a <= 1)", "not a", "a and b",
+        "a and (b <= 1)", "a + (b <= 1) <= 1",
         "(a <= 1) + 2 <= 3", "abs(a <= 1) >= 0", "__import__('os')", "a <= 1; b <= 1", "and <= 1",
         "a <= 1e9999999:", "a <= 1e999", "a <= " + "9" * 400,
         "always[0:1e9](a <= 1)", "(" * (MOST_DEPTH + 1) + "a <= 1", "a <= " + "1" * MOST_CHARACTERS,

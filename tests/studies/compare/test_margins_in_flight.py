@@ -75,3 +75,5 @@ def test_margins_of_a_loop_that_is_known():
     z = np.exp(1j * omega * dt)
     assert found == pytest.approx(margins(gain * dt / (z - 1.0)), rel=0.02)
     assert found[0] == pytest.approx(20 * np.log10(2.0 / (gain * dt)), abs=0.05)  # at Nyquist
+    for moved in (np.zeros(n - 1), np.zeros(n), np.cumsum(pulse)):  # departed, at a stop, not decayed
+        assert margins_in_flight._margins(np.zeros(n), moved, omega, dt) == (0.0, 0.0, 0.0)

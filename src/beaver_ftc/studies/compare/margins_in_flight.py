@@ -26,6 +26,7 @@ PULSE_DEG, PULSE_AT_S, DURATION_S = 0.1, 0.5, 4.0
 N_AIRSPEEDS = 2  # the slowest and the fastest of the envelope
 DECAYED = 0.2  # of the pulse: more than that at the end, and the loop is unstable
 LAG_KEYS = ("delay_s", "bandwidth_rad_s")
+NO_MARGIN = 0.0, 0.0, 0.0
 
 
 def margins_of(scenario: Scenario) -> list[Margin]:
@@ -81,13 +82,12 @@ def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
 def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float) -> tuple[float, ...]:
     """Gain margins up and down, dB, and phase margin, deg; zero of a loop that is unstable."""
     if len(still) != len(moved):
-        return 0.0, 0.0, 0.0  # one of the flights has ended in a departure
+        return NO_MARGIN  # one of the flights has ended in a departure
     v, pulse = moved - still, np.zeros(len(still))
     pulse[round(PULSE_AT_S / dt)] = np.radians(PULSE_DEG)
-    if not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
-        return 0.0, 0.0, 0.0
-    if not v.any():
-        return 0.0, 0.0, 0.0  # the surface is at a stop: there is no loop
+    at_a_stop = not v.any()  # there is no loop
+    if at_a_stop or not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
+        return NO_MARGIN
     v_jw, d_jw = (_transform(np.diff(each), omega * dt) for each in (v, pulse))
     return tuple(map(float, margins(-(v_jw - d_jw) / v_jw)))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +52,7 @@ class DeclaredErrors:
     bandwidth_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
     rate_limit_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
 
-    @property
+    @cached_property
     def errors(self) -> bool:
         """Whether any error is declared."""
         shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s, self.coefficients

@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.rivals.effectiveness import (
     EffectivenessFilter,
 )
 from beaver_ftc.diagnosis.rivals.imm import (
-    HEALTHY_AND_LOSS_MODES,
+    N_MODES,
     InteractingMultipleModels,
     transition_matrix,
 )
@@ -291,7 +291,7 @@ def test_a_step_of_the_multiple_models_is_each_filter_by_itself_between_mixing_a
     """Moments of the mixture, one prediction and one update a mode, in loops; two steps in gusts."""
     models = InteractingMultipleModels()
     models.reset(context(GUSTY, noise=2.0, unknown_noise=40.0, stay=0.97, measurement_rad_s=0.004))
-    rates, n = GUSTY.rate_variance(0.004), len(HEALTHY_AND_LOSS_MODES) + 1
+    rates, n = GUSTY.rate_variance(0.004), N_MODES
     first = models.step(seen((0.1, -0.2, 0.3)), np.zeros(4))
     assert (first.statistic, first.detected) == (0.0, False)
     x, probability = np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (n, 1)), np.full(n, 1e-12)

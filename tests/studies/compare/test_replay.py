@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.studies.compare.replay import Trace, aware_of_the_air, record, replay, replay_together, trace
+from beaver_ftc.studies.compare.replay import (
+    Recorder,
+    Trace,
+    aware_of_the_air,
+    record,
+    replay,
+    replay_together,
+    trace,
+)
 from flying import scenario
 
 FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 6}
@@ -26,6 +34,15 @@ def test_the_alarm_of_a_replay_is_that_of_a_flight(recorded, scheme):
     assert seen.healthy_s == pytest.approx(6.0)
     assert recorded.known.all()  # the error of the Beaver's model, wherever it flies
     assert recorded.error.shape == (900, 3)
+
+
+def test_what_is_recorded_is_what_a_detector_is_shown_in_flight(recorded):
+    detector = Recorder()
+    fly(scenario(duration_s=9, faults=[FAULT], control={"law": "nominal"}), detector=detector)
+    shown, kept = (
+        [np.hstack([np.ravel(each) for each in (*m, u)]) for m, u in of.seen] for of in (detector, recorded)
+    )
+    assert np.array_equal(shown, kept)
 
 
 @pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])

@@ -205,11 +205,9 @@ class AugmentedUkf(EffectivenessFilter):
         dt, f = self.context.dt_s, self.context.model.f
         propagated_points = state_points.copy()
         f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
+        contribution = measured.contribution[:, self.leading_surface_indices]
         acceleration_changes_from_loss = np.array(
-            [
-                measured.contribution[:, self.leading_surface_indices] @ point[3:N_STATES_WITHOUT_GUSTS]
-                for point in state_points
-            ]
+            [contribution @ point[3:N_STATES_WITHOUT_GUSTS] for point in state_points]
         )
         propagated_points[:, :3] += dt * (
             measured.acceleration + f_change_from_measured + acceleration_changes_from_loss

@@ -21,12 +21,10 @@ from beaver_ftc.diagnosis.rivals.kalman import (
 )
 
 LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
-# (leader of roll, pitch or yaw, theta); the last one is noise
-HEALTHY_AND_LOSS_MODES = (
-    (None, 0.0),
-    *((leading_axis, theta) for leading_axis in range(3) for theta in LOSS_THETA_LEVELS),
-)
-N_MODES = len(HEALTHY_AND_LOSS_MODES) + 1
+# (leader of roll, pitch or yaw, theta); the first mode is healthy, and the last one is noise
+LOSS_MODES = tuple((leading_axis, theta) for leading_axis in range(3) for theta in LOSS_THETA_LEVELS)
+_LOSS_THETAS = np.array([[theta] for _, theta in LOSS_MODES])
+N_MODES = 1 + len(LOSS_MODES) + 1
 _MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 
 
@@ -124,9 +122,8 @@ class InteractingMultipleModels:
     def accelerations(self, measured: Measured) -> np.ndarray:
         """Compute each hypothesis' acceleration in the elapsed frame, (M, 3) rad/s2."""
         mode_accelerations = np.tile(measured.acceleration, (N_MODES, 1))
-        for m, (leading_axis, theta) in enumerate(HEALTHY_AND_LOSS_MODES):
-            if leading_axis is not None:
-                mode_accelerations[m] += theta * measured.contribution[:, self.context.leading[leading_axis]]
+        lost_surfaces = [self.context.leading[leading_axis] for leading_axis, _ in LOSS_MODES]
+        mode_accelerations[1:-1] += _LOSS_THETAS * measured.contribution.T[lost_surfaces]
         return mode_accelerations
 
     def latch_alarm_and_decide_verdict(self) -> Verdict:

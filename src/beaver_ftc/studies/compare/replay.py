@@ -16,8 +16,8 @@ import numpy as np
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Detector, Measured, Verdict, informed_test
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.noting import Notes
 from beaver_ftc.loop.readout import FrameReadout, switch_statistical_tests
-from beaver_ftc.loop.stepping import built_in_detection_threshold_ratio
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
@@ -103,33 +103,23 @@ class Recording:
 def record(scenario: Scenario) -> Recording:
     """Fly a scenario under the nominal law and keep what a detector would see."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
-    recorder, built_in = Recorder(), list[float]()
-    air, known, error = list[np.ndarray](), list[bool](), list[np.ndarray]()
+    recorder = Recorder()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
-    fly_frame = loop.plugin_frame
-    switch_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
-    assert fly_frame is not None
-
-    def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        air.append(FrameReadout(frames[0]).diagnosis.gust.gust_acceleration_rad_s2)
-        status = fly_frame(frames, references, log)
-        built_in.append(built_in_detection_threshold_ratio(frames))
-        mapped = FrameReadout(frames[0]).diagnosis.mapped_error
-        known.append(mapped.is_inside_map)
-        error.append(mapped.error_bound_rad_s2)
-        return status
-
-    loop.fly_frame = fly_and_note
-    for _ in loop.chunks():
-        pass
-    by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
-    recording = Recording(recorder.context, recorder.seen, *by_frame)
-    diagnosis = FrameReadout(loop.frames[0]).diagnosis
-    if scenario.fdi.statistical is not None and diagnosis.gust.subtracts_measured_gust:
-        recording.air, recording.air_noise = (
-            np.array(air),
-            np.sqrt(diagnosis.acceleration_variance_from_input_noise),
-        )
+    try:
+        statistical = scenario.fdi.statistical is not None
+        switch_statistical_tests(loop.frames[0], statistical)
+        notes = Notes(loop)
+        for _ in loop.chunks():
+            pass
+        notes.read()
+        onset = Truth.of(scenario).onset
+        recording = Recording(recorder.context, notes.seen, notes.statistic, onset, notes.inside, notes.error)
+        diagnosis = FrameReadout(loop.frames[0]).diagnosis
+        if statistical and diagnosis.gust.subtracts_measured_gust:
+            recording.air = notes.gust
+            recording.air_noise = np.sqrt(diagnosis.acceleration_variance_from_input_noise)
+    finally:
+        loop.release()
     return recording
 
 

@@ -1,0 +1,83 @@
+"""A flight of which every frame's measurements are noted as a plug-in detector would be shown them.
+
+Compiled, since a detector in Python that notes the same costs seven times the frame. The columns of the notes
+are those of `columns_of`.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import direct, kernel, row_of
+from beaver_ftc.diagnosis import Measured
+from beaver_ftc.loop import frame as whole
+from beaver_ftc.loop.assembly import y_places
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.stepping import built_in_detection_threshold_ratio
+from beaver_ftc.plant.sensing import NOT_FINITE
+
+
+@kernel
+def fly_and_note(frames, references, log, notes):
+    """One frame, as `PluginFrame` flies it with a detector that raises no alarm.
+
+    notes (frames, columns): row frame.k is filled. The rest, and what is returned: see `stepping.fly_frame`.
+    """
+    frame = frames[0]
+    row = row_of(notes, frame.k)
+    at = put(row, 0, frame.fdi.statistical.gust.output.angular_acceleration_by_gust)  # of the elapsed frame
+    status = whole.begin(frame)
+    if status == NOT_FINITE:
+        return status
+    row[at] = frame.t
+    at = put(row, at + 1, frame.measured.x)
+    for i in range(4 + frame.truth.declared):
+        row[at + i] = frame.measured.y[i]
+    means = frame.prediction.frame_means
+    at = put(row, at + 4 + frame.truth.declared, means.predicted_acceleration)
+    for axis in range(3):
+        at = put(row, at, means.Gu[axis])
+    at = put(row, put(row, at, frame.fdi.bound.eta_bar), frame.prediction.u)
+    whole.diagnose(frame)
+    whole.decide(frame)
+    whole.command(frame)
+    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+    error_map = frame.fdi.bound.error_map
+    at = put(row, at, error_map.error_bound_now)
+    row[at] = not error_map.is_outside_all_boxes
+    row[at + 1] = built_in_detection_threshold_ratio(frames)
+    return status
+
+
+@kernel
+def put(row, at, values):
+    """Put values (n,) into a row from column `at` on; returns the column after them."""
+    for i in range(values.size):
+        row[at + i] = values[i]
+    return at + values.size
+
+
+class Notes:
+    """The notes of a flight as arrays, a row a frame flown; units as in `Measured`.
+
+    gust (frames, 3) rad/s2: what the vanes' view of the air explains of each elapsed frame. inside (frames,):
+    whether the flight is inside the aircraft's map of the model's error; error (frames, 3) rad/s2: the bound
+    that the map gives there. statistic (frames,): of the built-in detection.
+    """
+
+    def __init__(self, loop: Loop) -> None:
+        self._n, self._signals = len(loop.aircraft.surfaces), len(y_places(loop.frames[0]))
+        widths = (3, 1, 3, self._signals, 3, 3 * self._n, 3, self._n, 3, 1, 1)
+        self._ends = np.cumsum(widths)[:-1]
+        self._rows, self._frames = np.zeros((loop.n_frames, sum(widths))), loop.frames
+        compiled = direct(fly_and_note, loop.frames, loop.references, loop.log, self._rows)
+        loop.fly_frame = lambda frames, references, log: compiled(frames, references, log, self._rows)
+
+    def read(self) -> None:
+        """Read the rows of the frames flown."""
+        rows = self._rows[: int(self._frames["k"][0])]
+        self.gust, t, x, y, model, Gu, eta_bar, u, self.error, inside, statistic = np.split(
+            rows, self._ends, axis=1
+        )
+        self.inside, self.statistic = inside[:, 0] > 0.0, statistic[:, 0]
+        Gu = Gu.reshape(-1, 3, self._n)
+        shown = zip(t[:, 0].tolist(), x, y, model, Gu, eta_bar, strict=True)
+        self.seen = list(zip(map(Measured._make, shown), u, strict=True))

@@ -266,6 +266,52 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("fields", "force"),
+    [
+        ({"uses_accelerometers": 1, "has_only_coarse_estimate": 1}, (1.0, -2.0, -9.0)),
+        ({"has_only_coarse_estimate": 1, "is_gust_measured": 0}, (0.0, 0.0, -GRAVITY / 0.8)),
+        ({"has_only_coarse_estimate": 1, "is_gust_measured": 0, "steep": 0.3}, (0.0, 0.0, -GRAVITY / 0.5)),
+    ],
+)
+def test_the_force_is_as_measured_or_the_lift_of_this_bank_and_a_coarse_gust_is_counted_apart(fields, force):
+    design = design_record().view(np.recarray)
+    record = new_air(**{name: value for name, value in fields.items() if name != "steep"})
+    gusts.store_accelerometer_reading(record, np.array([1.0, -2.0, -9.0]))
+    record["memory"]["level_to_body"][2, 2] = fields.get("steep", 0.8)
+    record["memory"]["air_rotation_in_level_axes"] = 9.0, 0.02, -0.03
+    record["output"]["gust_axes_in_body"] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
+    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
+    assert record["memory"]["specific_force"] == pytest.approx(force)
+    rotation = np.array([[0.2, 0.3], [0.5, 0.6], [0.8, 0.9]]) @ [0.02, -0.03]
+    effect, none = -record["output"]["rate_damping"] @ rotation, np.zeros(3)
+    found = [record["output"][f"angular_acceleration_by_{name}"] for name in ("gust", "coarse_gust")]
+    is_measured = fields.get("is_gust_measured", 1)
+    assert np.array(found) == pytest.approx(np.array([effect, none] if is_measured else [none, effect]))
+
+
+@pytest.mark.parametrize(("measured", "model", "unknown"), [(1, 0, True), (1, 1, False), (0, 0, False)])
+def test_without_accelerometers_and_a_model_of_the_forces_all_of_the_gust_is_unknown(
+    measured, model, unknown
+):
+    """Its variance is V sigma2 / 2 times the lag's length; the rolling gust was unknown before."""
+    rng, intensity = np.random.default_rng(3), np.array([1e-3, 2e-3, 3e-3])
+    record = new_air(uses_accelerometers=1, is_gust_measured=measured, has_force_model=model)
+    output, memory = record["output"], record["memory"]
+    output["rate_damping"], output["gust_axes_in_body"] = rng.normal(size=(2, 3, 3))
+    memory["gust_rotation_intensity_per_airspeed"] = intensity
+    memory["unmeasured_intensity_share"] = share = np.array([0.1, 0.2, 0.3])
+    before = memory["acceleration_variance_by_axes_turn_now"][:] = rng.normal(size=(3, 3))
+    gusts.stop_using_accelerometers(record)
+    lengths_m = np.array([0.0, 4.0 * SPAN / np.pi, 3.0 * SPAN / np.pi])
+    effect = output["rate_damping"] @ output["gust_axes_in_body"]
+    added = effect @ np.diag(0.5 * lengths_m * intensity) @ effect.T
+    assert memory["acceleration_variance_by_axes_turn_now"] == pytest.approx(before + unknown * added)
+    assert memory["n_frames_left_with_axes_turn_variance"] == 3 * unknown
+    assert memory["unmeasured_intensity_share"] == pytest.approx(np.ones(3) if unknown else share)
+    assert (output["uses_accelerometers"], output["is_gust_measured"]) == (0, measured and not unknown)
+
+
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(
         (

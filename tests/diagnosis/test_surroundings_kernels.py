@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import DT, fill, new_fdi, on
+from kernels import DT, estimator, fill, new_fdi, on
 from scipy.spatial.transform import Rotation
 from statistics_of import Statistical, put
 
@@ -21,6 +21,7 @@ from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.state import (
     LOSS,
     NOT_ISOLATED,
+    POSITION_HYPOTHESIS,
     STATISTICAL_DETECTOR,
     WORST_CASE_DETECTOR,
     plugin_verdict_dtype,
@@ -248,6 +249,70 @@ def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     assert (
         bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
     )  # at rest at an end it uses none
+
+
+SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [2.0, 3.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("where", "before", "instants", "share"),
+    [
+        ((-0.1, 0.1), 0.9, 1, 0.5), ((-0.05, 0.1), 0.9, 1, 0.25), ((0.1, 0.2), 0.0, 1, 0.5),
+        ((-9.0, 0.0), 0.0, 1, 1.0), ((-0.1, 0.1), 0.5, 2, 1.0), ((-0.02, 0.02), 0.5, 11, 0.5),
+        ((0.0, 0.1), 0.0, 11, 0.275), ((-0.1, 0.1), 0.0, 3, 0.75),
+    ],
+)  # fmt: skip
+def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
+    """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
+    error_map = new_fdi()["bound"]["error_map"]
+    error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
+    assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+    error_map["travel_low"][1], error_map["travel_high"][1] = 0.0, 0.0  # a travel that ends at neutral
+    beyond = float(where[0] < 0.0 or where[1] > 0.0)
+    assert bounds.max_travel_share_used(error_map, 1, where, 0.0, 1) == beyond
+
+
+def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
+    fdi = new_fdi()
+    fie, bound = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.5, high=0.5), fdi["bound"]
+    (
+        bound["error_map"]["one_surface_may_be_anywhere"],
+        bound["error_map"]["n_travel_levels"],
+        bound["error_map"]["travel_share_by_level"][:3],
+    ) = (
+        1,
+        3,
+        SHARE,
+    )
+    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = (
+        -0.5,
+        0.5,
+    )
+    (
+        bound["additional_error_bound_by_travel_level"][:3],
+        bound["frame_innovation_bound"],
+        fdi["bank"]["output"]["innovation"],
+    ) = (
+        ERROR,
+        0.1,
+        (0.0, 1.0, 0.0),
+    )
+    fie["frame_mean_effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
+    # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
+    on(isolation.bound_deflection_and_widen_error, fdi, fie)
+    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(ERROR[0])
+    assert fie["max_travel_share_in_last_frame"] == pytest.approx(1.13 / 20 / 0.5)
+
+
+def test_a_surface_further_out_adds_what_the_map_has_there_beyond_the_error_of_now():
+    error_map = new_map(is_outside_all_boxes=0, time_row_index=1, box_index=1)
+    error_map["error_bound_now"] = error_map["error_bound"][1, 1, 1]
+    added = [bounds.additional_error_bound_at_travel_level(error_map, 2, i) for i in range(3)]
+    assert added == pytest.approx(error_map["error_bound"][1, 1, 2] - error_map["error_bound"][1, 1, 1])
+    assert min(added) > 0.0
+    assert bounds.additional_error_bound_at_travel_level(error_map, 0, 1) == 0.0
+    error_map["is_outside_all_boxes"] = 1
+    assert bounds.additional_error_bound_at_travel_level(error_map, 2, 1) == 0.0
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])

@@ -40,6 +40,27 @@ def through(block, accelerations):
     return np.array(shown)
 
 
+@pytest.mark.parametrize("is_estimated", [0, 1])
+def test_a_coarse_gust_is_whitened_as_the_innovation_is_and_summed_with_the_same_weights(is_estimated):
+    rng, keep, gust = np.random.default_rng(5), 0.9, np.array([0.3, -0.2, 0.5])
+    block = with_hypotheses(steady_block(), LOSS, STEP_FAULT)
+    block["axes"][:2], block["has_coarse_gust_estimate"] = (2, 0), is_estimated
+    before = onset_tests_of(block, "correlation_from_coarse_gust")
+    before[: 2 * N_ONSET_SLOTS] = rng.normal(size=2 * N_ONSET_SLOTS)
+    block["onset_tests"]["correlation_from_coarse_gust"] = before.reshape(-1, N_ONSET_TESTS_PER_GROUP)
+    block["hypothesis"]["signature"][:2, :2] = rng.normal(size=(2, 2))
+    likelihood.set_coarse_gust_effect_of_block(block, gust)
+    settled = block.copy()
+    likelihood.advance_covariance(settled, DT)
+    white = through(settled, [gust[[2, 0]]])[0]
+    likelihood.update_block(block, np.zeros(3), False, DT, keep)
+    weights = onset_tests_of(block, "correlation_weight")
+    expected = np.where(np.arange(before.size) < 2 * N_ONSET_SLOTS, keep * before + white @ weights, before)
+    found = onset_tests_of(block, "correlation_from_coarse_gust")
+    assert found == pytest.approx(expected if is_estimated else before)
+    assert np.abs(white @ weights).max() > 0.0
+
+
 def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
     expected = [min((k & -k).bit_length() - 1, N_ONSET_SLOTS - 1) for k in range(1, 2**11)]
     assert [likelihood.onset_slot_restarting_at_frame(k) for k in range(1, 2**11)] == expected

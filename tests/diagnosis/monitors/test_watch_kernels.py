@@ -1,11 +1,18 @@
 """The monitor over the instruments a decision at a time: who is suspected, who named, what stands in."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.model import DPT, measured_slipstream
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
+from beaver_ftc.diagnosis.monitors import (
+    ENGINE_MONITOR_RECORD,
+    detect_engine_failure,
+    disable_if_differential_thrust,
+)
 from beaver_ftc.diagnosis.monitors import redundancy as relations
 from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -866,6 +873,104 @@ def test_of_a_kind_the_first_filter_says_how_large_it_is():
         assert watching.exceeds_bound_beyond_cross_coupling(small, c, c), (
             "of small residuals the largest is involved"
         )
+
+
+@pytest.mark.parametrize(
+    ("excess", "thrust", "levers", "engines", "failed"),
+    [
+        (0.0129, 0.4, (0, 0, 9.0), 2, 0), (0.0131, 0.4, (0, 0, 9.0), 2, 1), (-0.0131, 0.4, (0, 0, 0), 2, 1),
+        (0.0129, -0.4, (0, 0, 0), 2, 0), (0.0131, -0.4, (0, 0, 0), 2, 1), (0.0131, 0.4, (0, 0.1, 0), 2, 0),
+        (0.0131, 0.4, (-0.1, 0, 0), 2, 0), (0.0131, 0.4, (0, 0, 0), 0, 0),
+    ],
+)  # fmt: skip
+def test_engines_under_one_lever_that_yaw_beyond_the_bound_have_failed_and_stay_so(
+    excess, thrust, levers, engines, failed
+):
+    """|Cn + 0.1 CT| > 0.005 + 0.02 |CT|, which is 0.013 here."""
+    monitor = fill(
+        np.zeros(1, ENGINE_MONITOR_RECORD).view(np.recarray)[0],
+        n_engines=engines, thrust_index=3, yawing_moment_index=1,
+        healthy_yawing_moment_per_thrust=-0.1, yawing_moment_tolerance_per_thrust=0.02,
+    )  # fmt: skip
+    disable_if_differential_thrust(monitor, np.array(levers))
+    y = np.array([7.0, -0.1 * thrust + excess, 7.0, thrust])
+    assert detect_engine_failure(monitor, 0.005, y) == failed
+    assert detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
+
+
+@pytest.fixture
+def duplicates(monkeypatch):
+    """Two instruments that should equal another, in the places of the engine's: a heading, an altitude."""
+    places = {
+        "DUPLICATE_SENSOR_INDEX": np.array([ENGINE_SPEED, MANIFOLD]),
+        "DUPLICATED_READING_INDEX": np.array([PSI, ALTITUDE]),
+        "DUPLICATED_READING_TEST_INDEX": np.array([FIRST_TURN_TEST, CLIMB_TEST]),
+        "DUPLICATE_TOLERANCE": np.array([0.01, 2.0]), "N_TESTS_WITH_EQUATION": RPM_TEST,
+        "N_IN_EQUATIONS": ENGINE_SPEED,
+    }  # fmt: skip
+    for module, name in product((relations, watching), places):
+        monkeypatch.setattr(module, name, places[name], raising=False)
+    monitor = new_watch()
+    monitor["redundancy"]["memory"]["reading_error_bound"] = np.arange(N_SENSORS) / 1000.0
+    readings = np.zeros(N_SENSORS)
+    readings[[ENGINE_SPEED, PSI, MANIFOLD, ALTITUDE]] = 3.1, -3.1, 905.0, 900.0
+    return monitor, readings
+
+
+def as_python(compiled):
+    """A kernel whose globals are looked up as it runs."""
+    return getattr(compiled, "py_func", compiled)
+
+
+def test_what_should_equal_another_reading_differs_by_the_errors_of_both_and_the_tolerance(duplicates):
+    """The heading by 6.2 rad, a turn less 0.083; the altitude by 5 m; neither where it is not fresh."""
+    monitor, readings = duplicates
+    compare = as_python(relations.compare_duplicate_sensors)
+    tests = monitor["redundancy"]["test"][RPM_TEST:][:2]
+    compare(monitor["redundancy"], readings, np.array([1, 1]))
+    bounds = 1e-6 + np.array([0.01 + (ENGINE_SPEED + PSI) / 1e3, 2.0 + (MANIFOLD + ALTITUDE) / 1e3])
+    assert tests["residual"] == pytest.approx([6.2 - 2.0 * np.pi, 5.0])
+    assert tests["filtered_bound"][:, 0] == pytest.approx(bounds)
+    assert tests["residual_bound_ratio"] == pytest.approx(np.abs(tests["residual"]) / bounds)
+    watch = as_python(watching.latch_duplicates_agreeing_before_alarm)
+    tests["residual_bound_ratio"] = 1.0, 1.1
+    watch(monitor, np.array([0, 1]))
+    assert not monitor["memory"]["has_duplicate_agreed"].any()
+    monitor["output"]["alarmed"] = 1
+    watch(monitor, np.array([1, 1]))
+    assert not monitor["memory"]["has_duplicate_agreed"].any()
+    monitor["output"]["alarmed"] = 0
+    watch(monitor, np.array([1, 0]))
+    assert monitor["memory"]["has_duplicate_agreed"][0] == 1
+    compare(monitor["redundancy"], readings + 1.0, np.array([1, 0]))
+    assert tests["residual_bound_ratio"][1] == 0.0
+    assert tests["residual"][1] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("own_test", "residual", "bound", "frozen", "agreed", "suspected"),
+    [
+        (0, 5.0, 1.4, 0, 1, {"duplicate"}), (1, 5.0, 1.4, 0, 1, {"reading"}),
+        (0, -5.0, 1.6, 0, 1, {"duplicate", "reading"}), (0, 5.0, 1.5, 0, 1, {"duplicate", "reading"}),
+        (0, 5.0, 1.4, 3, 1, {"duplicate", "reading"}), (0, 5.0, 1.4, 2, 1, {"duplicate"}),
+        (0, 5.0, 1.4, 0, 0, {"duplicate", "reading"}), (0, -5.0, 1.4, 0, 1, {"duplicate"}),
+    ],
+)  # fmt: skip
+def test_of_two_that_differ_the_reading_is_suspected_unless_its_own_test_would_show_it(
+    duplicates, own_test, residual, bound, frozen, agreed, suspected
+):
+    """An error of 5 less 2 beyond the bound of both: hidden up to twice that of the reading's own test."""
+    monitor, _ = duplicates
+    test = monitor["redundancy"]["test"]
+    test["residual"][RPM_TEST], test["filtered_bound"][RPM_TEST, 0] = residual, 2.0
+    test["filtered_bound"][FIRST_TURN_TEST, 0] = bound
+    monitor["memory"]["tests_exceeded_since_alarm"][FIRST_TURN_TEST] = own_test
+    monitor["memory"]["n_identical_samples"][PSI] = frozen
+    monitor["memory"]["has_duplicate_agreed"][0] = agreed
+    as_python(watching.suspect_disagreeing_sensors)(monitor, 0)
+    places = {"duplicate": ENGINE_SPEED, "reading": PSI}
+    expected = sorted(places[name] for name in suspected)
+    assert np.flatnonzero(monitor["output"]["is_suspect"]).tolist() == expected
 
 
 def test_angles_are_held_against_angles_and_rates_against_rates():

@@ -4,12 +4,9 @@ who may be anywhere is excluded by what he may do there alone."""
 import numpy as np
 import pytest
 from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
-from kernels import estimator, new_fdi, on
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.diagnosis import bounds, isolation
-from beaver_ftc.diagnosis.state import POSITION_HYPOTHESIS
 
 AILERON, ELEVATOR, RUDDER = range(3)
 SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [2.0, 3.0, 1.0]])
@@ -93,50 +90,3 @@ def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
         changes = {"uncertainty": "hide", "several_surfaces_may_be_anywhere": whole}
         hidden = [flown("bias", seed=seed, **changes) for seed in range(4)]
         assert all(np.isfinite(plant.detected_at_s) == found for plant in hidden)
-
-
-@pytest.mark.parametrize(
-    ("where", "before", "instants", "share"),
-    [
-        ((-0.1, 0.1), 0.9, 1, 0.5), ((-0.05, 0.1), 0.9, 1, 0.25), ((0.1, 0.2), 0.0, 1, 0.5),
-        ((-9.0, 0.0), 0.0, 1, 1.0), ((-0.1, 0.1), 0.5, 2, 1.0), ((-0.02, 0.02), 0.5, 11, 0.5),
-        ((0.0, 0.1), 0.0, 11, 0.275),
-    ],
-)  # fmt: skip
-def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
-    """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
-    error_map = new_fdi()["bound"]["error_map"]
-    error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
-    assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
-
-
-def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
-    fdi = new_fdi()
-    fie, bound = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.5, high=0.5), fdi["bound"]
-    (
-        bound["error_map"]["one_surface_may_be_anywhere"],
-        bound["error_map"]["n_travel_levels"],
-        bound["error_map"]["travel_share_by_level"][:3],
-    ) = (
-        1,
-        3,
-        SHARE,
-    )
-    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = (
-        -0.5,
-        0.5,
-    )
-    (
-        bound["additional_error_bound_by_travel_level"][:3],
-        bound["frame_innovation_bound"],
-        fdi["bank"]["output"]["innovation"],
-    ) = (
-        ERROR,
-        0.1,
-        (0.0, 1.0, 0.0),
-    )
-    fie["frame_mean_effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
-    # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(isolation.bound_deflection_and_widen_error, fdi, fie)
-    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(ERROR[0])
-    assert fie["max_travel_share_in_last_frame"] == pytest.approx(1.13 / 20 / 0.5)

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import DiagnosisRows, reversed_command_error
 from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
 from beaver_ftc_logs.stepped import (
@@ -148,43 +148,79 @@ def diagnose_aircraft_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples = aircraft_inputs.samples
+    samples, aircraft = aircraft_inputs.samples, diagnosed_aircraft.aircraft
+    replayed_flight_verdicts = _replay_flight(aircraft_inputs, aircraft)
+    rows = _rows_of_replayed_flight(aircraft_inputs, aircraft, replayed_flight_verdicts)
+    if rows.has_credible_alarm():
+        _refuse_reversed_command_without_alarm(aircraft_inputs, aircraft, replayed_flight_verdicts, rows)
+    return rows, _verdict_document(
+        samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
+    )
+
+
+def _replay_flight(aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft) -> ReplayedVerdicts:
+    """The verdicts of all samples. Raises BadInput if a command has the other sign in every part."""
     diagnosis = aircraft_inputs.diagnosis
-    rates_signals_commands_attitude = aircraft_inputs.rates_signals_commands_attitude
-    gap_free_stretches = aircraft_inputs.gap_free_stretches
     replayed_verdicts_by_stretch = []
-    for begin, end in gap_free_stretches:
+    for begin, end in aircraft_inputs.gap_free_stretches:
         diagnosis.reset()
         replayed_verdicts_by_stretch.append(
             replay_samples(
                 diagnosis,
-                [array[begin:end] for array in rates_signals_commands_attitude],
+                [array[begin:end] for array in aircraft_inputs.rates_signals_commands_attitude],
                 aircraft_inputs.rate_hz,
             )
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, replayed_verdicts_by_stretch)
-    replayed_flight_verdicts = _join_stretch_verdicts(
-        len(samples.t_s),
-        len(diagnosed_aircraft.aircraft.surfaces),
-        gap_free_stretches,
+        _check_command_signs(aircraft_inputs.samples.name, aircraft, replayed_verdicts_by_stretch)
+    return _join_stretch_verdicts(
+        len(aircraft_inputs.samples.t_s),
+        len(aircraft.surfaces),
+        aircraft_inputs.gap_free_stretches,
         replayed_verdicts_by_stretch,
     )
+
+
+def _rows_of_replayed_flight(
+    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, replayed_flight_verdicts: ReplayedVerdicts
+) -> DiagnosisRows:
+    """The rows, without a verdict where the log is not credible."""
+    t_s, gap_free_stretches = aircraft_inputs.samples.t_s, aircraft_inputs.gap_free_stretches
     rows = diagnosis_rows_from_replay(
-        samples.t_s, replayed_flight_verdicts, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
+        t_s, replayed_flight_verdicts, aircraft.surfaces, aircraft_inputs.diagnosis.config
     )
     rows_by_reason = _undiagnosable_rows_by_reason(
-        rates_signals_commands_attitude[1],
-        diagnosed_aircraft.aircraft,
+        aircraft_inputs.rates_signals_commands_attitude[1],
+        aircraft,
         aircraft_inputs.has_missing_value,
         gap_free_stretches,
-    ) | _rows_by_reason_after_unanticipated_start(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
-    rows = rows.without_verdict(
+    ) | _rows_by_reason_after_unanticipated_start(t_s, gap_free_stretches, replayed_flight_verdicts)
+    return rows.without_verdict(
         _drop_empty_add_doubtful_alarm_reason(gap_free_stretches, rows, rows_by_reason)
     )
-    return rows, _verdict_document(
-        samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
-    )
+
+
+def _refuse_reversed_command_without_alarm(
+    aircraft_inputs: AircraftDiagnosisInputs,
+    aircraft: Aircraft,
+    replayed_flight_verdicts: ReplayedVerdicts,
+    rows: DiagnosisRows,
+) -> None:
+    """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
+    sign leaves a larger innovation, since no surface has a negative effectiveness."""
+    for surface_index in np.flatnonzero(replayed_flight_verdicts.relative_command_gains < 0.0):
+        rates, signals, commands, attitude = aircraft_inputs.rates_signals_commands_attitude
+        signs = np.where(np.arange(len(aircraft.surfaces)) == surface_index, -1.0, 1.0)
+        corrected_inputs = replace(
+            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, commands * signs, attitude]
+        )
+        corrected_rows = _rows_of_replayed_flight(
+            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
+        )
+        if corrected_rows.are_healthy_where_credible_in(rows):
+            raise reversed_command_error(
+                aircraft_inputs.samples.name, aircraft.surfaces[surface_index], f"of {aircraft.name}"
+            )
 
 
 def _check_command_signs(
@@ -361,8 +397,9 @@ def _join_stretch_verdicts(
     verdicts = [Verdict()] * n_samples
     effectiveness_low = np.zeros((n_samples, n_surfaces))
     effectiveness_high = np.ones((n_samples, n_surfaces))
-    relative_command_gain_upper_bounds = np.min(
-        [replayed.relative_command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
+    least_gains, least_gain_upper_bounds = (
+        np.min([getattr(replayed, name) for replayed in replayed_verdicts_by_stretch], axis=0)
+        for name in ("relative_command_gains", "relative_command_gain_upper_bounds")
     )
     for (begin, end), replayed in zip(gap_free_stretches, replayed_verdicts_by_stretch, strict=True):
         verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
@@ -371,7 +408,7 @@ def _join_stretch_verdicts(
             replayed.single_fault_effectiveness_high,
         )
     return ReplayedVerdicts(
-        verdicts, effectiveness_low, effectiveness_high, relative_command_gain_upper_bounds
+        verdicts, effectiveness_low, effectiveness_high, least_gains, least_gain_upper_bounds
     )
 
 

@@ -64,6 +64,15 @@ class DiagnosisRows:
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
+    def has_credible_alarm(self) -> bool:
+        """Whether an alarm is raised in a credible row."""
+        return bool(((self.faulty == 1) & (self.credible == 1)).any())
+
+    def are_healthy_where_credible_in(self, other: "DiagnosisRows") -> bool:
+        """Whether there is no alarm in these rows, and each credible row of `other`, of the same log with
+        other columns, is credible here too."""
+        return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
+
     def with_uninformative_estimate(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where is_removed (n,) or (n, S) is true."""
         is_removed_by_surface = is_removed if is_removed.ndim == 2 else is_removed[:, None]
@@ -94,8 +103,29 @@ class DiagnosisRows:
 
 
 def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
-    """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
+    """The diagnosis of each sample. Raises BadInput where the log's rate, columns or units are not the
+    model's."""
     check_log_fits_model(samples, model)
+    rows = _diagnose_checked_log(samples, model)
+    if rows.has_credible_alarm():
+        for group in trust.groups_with_negative_gain(samples, model):
+            signs = [-1.0 if surface in group else 1.0 for surface in model.vehicle.surfaces]
+            corrected_rows = _diagnose_checked_log(replace(samples, commands=samples.commands * signs), model)
+            if corrected_rows.are_healthy_where_credible_in(rows):
+                raise reversed_command_error(samples.name, "+".join(group), "in the flights of the model")
+    return rows
+
+
+def reversed_command_error(flight_name: str, surface_name: str, allowed_signs: str) -> BadInput:
+    """The error for a log that raises an alarm, and none if the command of surface_name has the other
+    sign."""
+    return BadInput(
+        f"{flight_name}: if the command of {surface_name} has the other sign, there is no alarm, allowed: "
+        f"signs as {allowed_signs}; does `scale: -1` fit?"
+    )
+
+
+def _diagnose_checked_log(samples: Samples, model: Model) -> DiagnosisRows:
     bank = build_hypothesis_bank(model)
     samples_with_bad_rates_unknown = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
     posterior, _, _ = hypothesis_state_and_noise_posterior(samples_with_bad_rates_unknown, model, bank)

@@ -33,13 +33,14 @@ class ReplayedVerdicts:
     """The verdicts of a stretch, one for each sample.
 
     single_fault_effectiveness_low and single_fault_effectiveness_high (n, S): bounds on the effectiveness of
-    each surface if it alone is at fault. relative_command_gain_upper_bounds (S,): upper bound of the
-    measured effect of each command over the expected one, the largest of all parts of the stretch; 1 if it is
-    too short."""
+    each surface if it alone is at fault. relative_command_gains (S,): measured effect of each command over
+    the expected one, in all of the stretch. relative_command_gain_upper_bounds (S,): its upper bound, the
+    largest of all parts of the stretch. Both are 1 if the stretch is too short."""
 
     verdicts: list[Verdict]
     single_fault_effectiveness_low: Floats
     single_fault_effectiveness_high: Floats
+    relative_command_gains: Floats
     relative_command_gain_upper_bounds: Floats
 
 
@@ -80,23 +81,23 @@ def replay_samples(
     effectiveness_low = 1.0 + _sliding_maximum(theta_bounds[0], window_samples)
     effectiveness_high = 1.0 - _sliding_maximum(-theta_bounds[1], window_samples)
     is_unexplained = effectiveness_low > effectiveness_high
-    relative_command_gain_upper_bounds = _relative_command_gain_upper_bounds(
-        innovation, healthy_surface_effect
-    )
     return ReplayedVerdicts(
         verdicts,
         np.where(is_unexplained, 0.0, effectiveness_low),
         np.where(is_unexplained, 1.0, effectiveness_high),
-        relative_command_gain_upper_bounds,
+        *_relative_command_gains_and_upper_bounds(innovation, healthy_surface_effect),
     )
 
 
-def _relative_command_gain_upper_bounds(innovation: Floats, healthy_surface_effect: Floats) -> Floats:
-    """The upper bounds (S,) of `ReplayedVerdicts`, from the innovation of the rates (n, 3) and the expected
-    effect of each surface (n, 3, S)."""
+def _relative_command_gains_and_upper_bounds(
+    innovation: Floats, healthy_surface_effect: Floats
+) -> tuple[Floats, Floats]:
+    """The gains and their upper bounds (S,) of `ReplayedVerdicts`, from the innovation of the rates (n, 3)
+    and the expected effect of each surface (n, 3, S)."""
+    n_surfaces = healthy_surface_effect.shape[2]
     finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
     if (rows_by_part := split_into_parts_for_bounds(finite_rows)) is None:
-        return np.ones(healthy_surface_effect.shape[2])
+        return np.ones(n_surfaces), np.ones(n_surfaces)
     innovation_sd = np.maximum(innovation[finite_rows].std(axis=0), MIN_DIVISOR)
     regressors = np.concatenate(
         [
@@ -106,7 +107,12 @@ def _relative_command_gain_upper_bounds(innovation: Floats, healthy_surface_effe
         axis=2,
     )
     scaled_innovation = innovation / innovation_sd
-    gain_upper_bounds = np.full(healthy_surface_effect.shape[2], -np.inf)
+    coefficients, *_ = np.linalg.lstsq(
+        regressors[finite_rows].reshape(3 * len(finite_rows), -1),
+        scaled_innovation[finite_rows].ravel(),
+        rcond=None,
+    )
+    gain_upper_bounds = np.full(n_surfaces, -np.inf)
     for part_rows in rows_by_part:
         part_coefficient_upper_bounds, _ = coefficient_upper_bounds_and_squared_residuals(
             regressors[part_rows].reshape(3 * len(part_rows), -1),
@@ -114,7 +120,7 @@ def _relative_command_gain_upper_bounds(innovation: Floats, healthy_surface_effe
             _EFFECTIVE_SAMPLE_SHARE,
         )
         gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + part_coefficient_upper_bounds[3:])
-    return gain_upper_bounds
+    return 1.0 + coefficients[3:], gain_upper_bounds
 
 
 def _bounds_of_explaining_losses(

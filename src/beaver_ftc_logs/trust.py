@@ -364,24 +364,9 @@ def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
     knows the effect of no surface says nothing of any flight, and refuses none."""
     if not any(is_group_effect_known(model)):
         return
-    whitened_flights_and_models = [
-        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
-        for noise_model in model.noise_models
-    ]
-    flights_and_log_likelihoods = [
-        (whitened_flight_and_model, log_likelihoods_and_sample_count)
-        for whitened_flight_and_model in whitened_flights_and_models or [(samples, model)]
-        if (
-            log_likelihoods_and_sample_count := _part_log_likelihoods_and_sample_count(
-                *whitened_flight_and_model
-            )
-        )
-    ]
-    if not flights_and_log_likelihoods:
+    if (whitened_flight_and_model := _whiten_by_likeliest_noise(samples, model)) is None:
         return
-    likeliest_whitened_flight, likeliest_model = max(
-        flights_and_log_likelihoods, key=lambda one: one[1][0].mean()
-    )[0]
+    likeliest_whitened_flight, likeliest_model = whitened_flight_and_model
     gain_bounds = _bound_gains_over_flight_parts(likeliest_whitened_flight, likeliest_model)
     if gain_bounds is None:
         return
@@ -407,6 +392,51 @@ def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
     if mistake_text is not None:
         allowed_columns_text = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {mistake_text}, {allowed_columns_text}")
+
+
+def _whiten_by_likeliest_noise(samples: Samples, model: Model) -> tuple[Samples, Model] | None:
+    """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
+    noise alone; None where a part of the flight is too short."""
+    whitened_flights_and_models = [
+        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
+        for noise_model in model.noise_models
+    ]
+    flights_and_log_likelihoods = [
+        (whitened_flight_and_model, log_likelihoods_and_sample_count)
+        for whitened_flight_and_model in whitened_flights_and_models or [(samples, model)]
+        if (
+            log_likelihoods_and_sample_count := _part_log_likelihoods_and_sample_count(
+                *whitened_flight_and_model
+            )
+        )
+    ]
+    if not flights_and_log_likelihoods:
+        return None
+    return max(flights_and_log_likelihoods, key=lambda one: one[1][0].mean())[0]
+
+
+def groups_with_negative_gain(samples: Samples, model: Model) -> list[list[str]]:
+    """The groups of known effect to whose command the rates answer the other way round, by least squares
+    over all of a flight, however uncertain that is."""
+    if (whitened_flight_and_model := _whiten_by_likeliest_noise(samples, model)) is None:
+        return []
+    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
+        *whitened_flight_and_model
+    )
+    regressors, targets = _trim_and_gain_regression_data(
+        np.flatnonzero(is_predictable),
+        rates_unexplained_by_past,
+        group_responses,
+        _whitening_sample_share_and_log_noise(*whitened_flight_and_model)[0],
+    )
+    group_gains = np.linalg.lstsq(regressors, targets, rcond=None)[0][3:]
+    return [
+        group
+        for group, gain, has_known_effect in zip(
+            model.groups, group_gains, is_group_effect_known(model), strict=True
+        )
+        if has_known_effect and gain < 0.0
+    ]
 
 
 def _column_mistake_texts(

@@ -152,10 +152,12 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     planted = np.repeat(theta, 1000, axis=0)
     innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
     innovation[0], innovation[7, 1] = 1e6, np.nan  # the first ends no frame
-    found = stepped._relative_command_gain_upper_bounds(innovation, expected)
-    assert np.all(found > gain)
-    assert found == pytest.approx(gain, abs=0.1)
-    assert (stepped._relative_command_gain_upper_bounds(innovation[:200], expected[:200]) == 1.0).all()
+    gains, most = stepped._relative_command_gains_and_upper_bounds(innovation, expected)
+    assert np.all(most > gain)
+    assert most == pytest.approx(gain, abs=0.1)
+    assert gains == pytest.approx(1.0 + np.mean(theta, axis=0), abs=0.05)
+    short = stepped._relative_command_gains_and_upper_bounds(innovation[:200], expected[:200])
+    assert np.all(np.array(short) == 1.0)
 
 
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
@@ -171,6 +173,30 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
     moving = load_aircraft_and_declared_errors("beaver", str(tmp_path / "moving.yaml"))
     assert diagnose_with_aircraft_model(turned, vehicle, moving)[2]["faulty"] in (False, True)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.9])
+def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_sign_has_no_alarm(
+    tmp_path, loss
+):
+    """Gyro noise hides the sign in each second. The turned log of a lost surface has an alarm too."""
+    noise = {axis: {"noise_std_deg_s": 0.05} for axis in "pqr"}
+    sine = [{"sine": {"amplitude_deg_s": 2.0, "frequency_hz": 0.4}}]
+    lost = {"actuator": "aileron", "type": "loss_of_effectiveness", "at_s": 0.0, "magnitude": loss}
+    scenario = bf.load({
+        "name": "noisy", "duration_s": 4.0, "reference": dict.fromkeys("pqr", sine), "sensors": noise,
+        "fdi": {"bounds": {"sensors": noise}}, "faults": [lost] if loss else [],
+    })  # fmt: skip
+    bf.fly(scenario).save(tmp_path, report=False)
+    path, vehicle = exported(tmp_path / "noisy", "table", tmp_path)
+    declared = load_aircraft_and_declared_errors("beaver", str(tmp_path / "noisy" / "scenario.yaml"))
+    recording = read_columns_of_vehicle(path, vehicle)
+    assert diagnose_with_aircraft_model(recording, vehicle, declared)[2]["isolated"] == (
+        "aileron" if loss else None
+    )
+    if not loss:
+        with pytest.raises(BadInput, match=r"command of aileron has the other sign, there is no alarm"):
+            diagnose_with_aircraft_model(changed(recording, aileron_command=np.negative), vehicle, declared)
 
 
 def without(vehicle, **keys):
@@ -456,8 +482,12 @@ def test_a_column_without_a_number_is_no_warning_of_numpy():
 
 
 def test_stretches_make_one_flight():
-    one = stepped.ReplayedVerdicts([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
-    other = stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
+    gains = np.array([[0.5, 0.9], [0.6, 0.4]])
+    said = ([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), gains[0] - 1.0, gains[0])
+    one, other = (
+        stepped.ReplayedVerdicts(*said),
+        stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), gains[1] - 1.0, gains[1]),
+    )
     found = by_aircraft._join_stretch_verdicts(5, 2, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
     assert (
@@ -467,6 +497,7 @@ def test_stretches_make_one_flight():
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
+    assert found.relative_command_gains.tolist() == pytest.approx([-0.5, -0.6])
     assert found.relative_command_gain_upper_bounds.tolist() == [0.5, 0.4]
 
 

@@ -52,7 +52,7 @@ BOUNDS = {  # low and high of each row
 def columns_of(is_ours=True, pairs=False):
     fdi = SimpleNamespace(is_ours=is_ours, pairs=pairs)
     rows = stepped.diagnosis_rows_from_replay(
-        0.5 * ROW, stepped.ReplayedVerdicts(SAYS, *ALONE, np.ones(4)), SURFACES, fdi
+        0.5 * ROW, stepped.ReplayedVerdicts(SAYS, *ALONE, np.ones(4), np.ones(4)), SURFACES, fdi
     )
     return {name: list(values) for name, values in of.diagnosis_columns(rows, SURFACES).items()}
 

@@ -120,12 +120,14 @@ def page(text: str) -> list[str]:
 
 
 def picture(figure: Any) -> dict[str, Any]:
-    """What a figure of Matplotlib shows, in words and numbers: axes, lines, marks, areas, texts."""
+    """What a figure of Matplotlib shows, in words and numbers: axes, lines, marks, areas, texts, looks."""
     figure.canvas.draw()
     return {
         "title": figure.get_suptitle(),
         "legends": _legends(figure),
         "axes": list(map(_axes, figure.axes)),
+        "inches": figure.get_size_inches().tolist(),
+        "looks": _looks(figure),
     }
 
 
@@ -184,23 +186,28 @@ def _area(patch: Any) -> list[Any]:
     return [patch.get_label(), in_short(corners), in_short(patch.get_facecolor()), patch.get_hatch()]
 
 
-def looks(figure: Any) -> list[Any]:
-    """What the eye sees of a figure beside what `picture` says of it: sizes, widths, dashes, transparency."""
-    return [figure.get_size_inches().tolist(), [_looks(axes) for axes in figure.axes]]
+# Names of getters, or of attributes where Matplotlib has no getter.
+_LOOKS = (
+    "fontsize", "rotation", "horizontalalignment", "verticalalignment", "linewidth", "markersize", "sizes",
+    "alpha", "zorder", "frame_on", "width_ratios", "height_ratios", "_loc", "_ncols",
+    "_unscaled_dash_pattern", "linestyle",
+)  # fmt: skip
 
 
-def _looks(axes: Any) -> list[Any]:
-    grid = [line for of in (axes.xaxis, axes.yaxis) for line in of.get_gridlines()[:1] if line.get_visible()]
-    marked = [marks for marks in axes.collections if hasattr(marks, "get_sizes")]
-    return [
-        *(
-            [_colour(line), line.get_alpha(), line.get_linewidth(), _dashes(line)]
-            for line in axes.lines + grid
-        ),
-        *([*map(float, marks.get_sizes()), marks.get_alpha()] for marks in marked),
-    ]
+def _looks(figure: Any) -> list[str]:
+    """How the visible parts of a figure look, each look once: sizes, widths, dashes, transparency."""
+    grids = {axes.get_gridspec() for axes in figure.axes} - {None}
+    return sorted({*map(_look, grids), *map(_look, figure.findobj(_is_visible))})
 
 
-def _dashes(line: Any) -> list[float]:
-    _, dashes = line._unscaled_dash_pattern  # Matplotlib has no public name for it
-    return list(dashes or [])
+def _is_visible(artist: Any) -> bool:
+    is_tick = hasattr(artist, "tick1line")  # its label and line are there by themselves
+    return bool(artist.get_visible() and not is_tick and getattr(artist, "get_text", lambda: "some")())
+
+
+def _look(of: Any) -> str:
+    found = (
+        (name, getattr(of, f"get_{name}", lambda name=name: getattr(of, name, None))()) for name in _LOOKS
+    )
+    told = (f"{name} {_plain(value)}" for name, value in found if value is not None)
+    return " ".join([type(of).__name__, *told])

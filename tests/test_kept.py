@@ -86,14 +86,22 @@ def test_a_record_is_told_field_by_field_and_zeros_are_left_out():
 def test_a_picture_is_told_by_what_it_shows():
     from matplotlib.figure import Figure
 
-    def drawn(label="rate, deg/s", height=2.0, colour="C1", named="flown"):
+    def drawn(label="rate, deg/s", height=2.0, colour="C1", named="flown", **look):
         axes = Figure().subplots()
-        axes.plot([0, 1], [1.0, height], color=colour, label=named)
+        axes.plot([0, 1], [1.0, height], color=colour, label=named, **look)
         axes.set_xlabel("time, s")
         axes.set_ylabel(label)
         axes.legend()
         return kept.picture(axes.figure)
 
     assert drawn() == drawn()
-    for other in ({"label": "rate"}, {"height": 2.1}, {"colour": "C2"}, {"named": "model"}):
+    others = {
+        "label": "rate",
+        "height": 2.1,
+        "colour": "C2",
+        "named": "model",
+        "linewidth": 1.4,
+        "alpha": 0.9,
+    }
+    for other in ({name: value} for name, value in others.items()):
         assert drawn(**other) != drawn()

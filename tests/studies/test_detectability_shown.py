@@ -85,7 +85,6 @@ def test_the_survey_as_it_is_shown(changed, tmp_path):
     assert not changed(text(rows).splitlines(), "text")
     figure = draw("made", rows)
     assert not changed(picture(figure), "figure")
-    assert figure.get_size_inches().tolist() == [8.0, 9.0]
     pairs = pairs_made()
     parts = {"points": rows[:8], "pairs": pairs[:6]}, {"points": rows[8:], "pairs": pairs[6:]}
     document = document_of("made", parts)

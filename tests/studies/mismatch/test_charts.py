@@ -12,7 +12,7 @@ from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import COLUMNS, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
 from flying import scenario
-from kept import looks, picture
+from kept import picture
 
 PEAKS = {
     "p": {"sinusoids": 0.02, "fault": 0.5, "inertia": 0.005, "engine": 2e-5, "sensors": 0.0199e-3},
@@ -63,12 +63,8 @@ def analysis():
     )
 
 
-def all_of(figure):
-    return {**picture(figure), "looks": looks(figure)}
-
-
 def test_the_sources_over_the_bound(found, frames, changed):
-    assert not changed(all_of(charts.sources_figure(frames, found, marks(FLOWN))))
+    assert not changed(picture(charts.sources_figure(frames, found, marks(FLOWN))))
 
 
 def test_only_sources_that_an_eye_can_tell_from_zero_are_drawn(found):
@@ -85,14 +81,14 @@ def test_how_sources_and_models_are_drawn(changed):
 
 
 def test_the_share_of_the_bound_of_each_source(found, changed):
-    assert not changed(all_of(charts.bound_figure(found)))
+    assert not changed(picture(charts.bound_figure(found)))
     for of in found["axes"].values():
         for figures in of.values():
             figures["bound_share"] = 0.0
     found["axes"]["p"]["engine"]["bound_share"] = 0.5
-    assert not changed(all_of(charts.bound_figure(found)), part="one source")
+    assert not changed(picture(charts.bound_figure(found)), part="one source")
     found["axes"]["p"]["engine"]["bound_share"] = 0.0
-    assert not changed(all_of(charts.bound_figure(found)), part="nothing")
+    assert not changed(picture(charts.bound_figure(found)), part="nothing")
 
 
 def test_flights_side_by_side(changed):
@@ -104,17 +100,17 @@ def test_flights_side_by_side(changed):
         entry("calm", (0.3, 0.0, 0.9), "sinusoids"),
         entry("wrong", (1.5, None, 1.0), "inertia_coupling"),
     ]
-    assert not changed(all_of(charts.comparison_figure(flights)))
+    assert not changed(picture(charts.comparison_figure(flights)))
     assert not changed(
-        all_of(charts.comparison_figure([entry("alone", (0.3, 0.4, 0.9), "engine")])), part="one"
+        picture(charts.comparison_figure([entry("alone", (0.3, 0.4, 0.9), "engine")])), part="one"
     )
     many = [entry(f"flight {i}", (0.5, 0.6, 20.0), "engine") for i in range(4)]
-    assert not changed(all_of(charts.comparison_figure(many)), part="four")
+    assert not changed(picture(charts.comparison_figure(many)), part="four")
 
 
 @pytest.mark.parametrize("draw", [charts.linear_figure, charts.zeros_figure, charts.response_figure])
 def test_the_linear_models_side_by_side(analysis, draw, changed):
-    assert not changed(all_of(draw(analysis, "case")))
+    assert not changed(picture(draw(analysis, "case")))
 
 
 def test_the_linear_models_in_numbers(analysis, changed):
@@ -129,7 +125,7 @@ def test_the_map(changed):
 
     ratios = [0.1 * (i + 1) ** 1.3 for i in range(18)]
     ratios[3:6], ratios[12] = [None] * 3, 0.0
-    assert not changed(all_of(charts.map_figure(entries(*ratios), "case")))
+    assert not changed(picture(charts.map_figure(entries(*ratios), "case")))
     assert not changed(picture(charts.map_figure(entries(*[None] * 18), "case")), part="no trim anywhere")
     assert not changed(picture(charts.map_figure(entries(*[0.5] * 18), "case")), part="all within")
     assert not changed(picture(charts.map_figure(entries(*[2.0] * 18), "case")), part="all beyond")

@@ -306,7 +306,6 @@ def test_the_document_says_what_failed(document):
 def test_how_far_each_statement_is_from_its_limit(document, changed):
     figure = margins_figure(document)
     assert not changed(picture(figure))
-    assert figure.get_size_inches().tolist() == [12.0, pytest.approx(0.6 + 0.25 * len(MEASURED))]
 
 
 def test_each_figure_has_its_panels(changed):

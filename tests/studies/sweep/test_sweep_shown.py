@@ -50,9 +50,9 @@ def test_every_figure(shown, changed):
 
 
 def whole(figure):
-    """A picture, how large it is, and the places that annotations are of."""
+    """A picture, and the places that annotations are of."""
     places = [list(getattr(text, "xy", ())) for axes in figure.axes for text in axes.texts]
-    return picture(figure) | {"size": figure.get_size_inches(), "places": places}
+    return picture(figure) | {"places": places}
 
 
 SMALL = ("initial.altitude_m", "initial.flap_deg", *(

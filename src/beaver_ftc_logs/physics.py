@@ -7,7 +7,7 @@ and the mean of the specific force is 1 g.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,9 @@ _MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_RATIO_TO_UNIT_FACTOR = 20, 0.
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
 _MAX_EXCHANGED_CORRELATION, _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
+_MIN_RMS_ANGLE_RATE_RAD_S = 1e-3
+"""Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
+A change of an angle that is not far above them says nothing of a rate."""
 _GRAVITY_MPS2 = KIND_AND_SI_FACTOR_OF_UNIT["g"][1]
 _PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
 _MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
@@ -161,12 +164,15 @@ def _fit_angle_to_rate(
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
     is_known = np.isfinite(angle_changes) & np.isfinite(rate_integrals).all(axis=1)
     angle_changes, rate_integrals = angle_changes[is_known], rate_integrals[is_known]
+    min_square_sum = len(angle_changes) * (_MIN_RMS_ANGLE_RATE_RAD_S * _INTEGRATION_WINDOW_S) ** 2
+    if len(angle_changes) < _MIN_WINDOWS or angle_changes @ angle_changes < min_square_sum:
+        return None
     coefficients = np.linalg.lstsq(rate_integrals, angle_changes, rcond=None)[0]
     angle_changes = angle_changes - rate_integrals[:, 1:] @ coefficients[1:]
     rate_integrals = rate_integrals[:, 0]
     rate_integral_square_sum = float(rate_integrals @ rate_integrals)
     angle_change_square_sum = float(angle_changes @ angle_changes)
-    if len(rate_integrals) < _MIN_WINDOWS or not rate_integral_square_sum * angle_change_square_sum > 0.0:
+    if not rate_integral_square_sum * angle_change_square_sum > 0.0:
         return None
     cross_product_sum = float(rate_integrals @ angle_changes)
     return AngleRateFit(
@@ -199,6 +205,7 @@ def _full_circle(angle: Floats) -> float:
 
 NamedColumn = tuple[str, Column]
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
+_RATE_UNIT_RATIOS = (180.0 / np.pi, 1000.0)
 
 
 def find_attitude_mistake(
@@ -236,8 +243,40 @@ def find_attitude_mistake(
                     (candidate_column_name, candidate_fit),
                     _RATE_TITLES[axis],
                 )
-        if remark := angle_rate_factor_remark(fit, rate_column_name, named_angle[0]):
+        if remark := angle_rate_factor_remark(
+            fit, rate_column_name, named_angle[0]
+        ) or _agreeing_rate_factor_remark(fit, rate_columns, named_angles, axis, rate_column_name):
             return remark
+    return None
+
+
+def _agreeing_rate_factor_remark(
+    named_rate_fit: AngleRateFit,
+    rate_columns: list[Column],
+    named_angles: Sequence[NamedColumn | None],
+    axis: int,
+    rate_column_name: str,
+) -> str | None:
+    """Describe the sign or unit by which a rate explains its angle exactly, where it does not as it is; None
+    where none does. In a banked flight a yaw rate in another unit does not even correlate with the yaw angle,
+    since q turns it as well."""
+    if abs(named_rate_fit.correlation) >= _MIN_AGREEING_CORRELATION:
+        return None
+    for factor in (-1.0, *_RATE_UNIT_RATIOS, *(1.0 / unit_ratio for unit_ratio in _RATE_UNIT_RATIOS)):
+        scaled_column = replace(rate_columns[axis], values=factor * rate_columns[axis].values)
+        scaled_fit = _fit_angle_of_axis(
+            [*rate_columns[:axis], scaled_column, *rate_columns[axis + 1 :]], named_angles, axis
+        )
+        if (
+            scaled_fit is not None
+            and scaled_fit.correlation > _EXACT_CORRELATION
+            and 1.0 / _MAX_RATIO_TO_UNIT_FACTOR < scaled_fit.slope < _MAX_RATIO_TO_UNIT_FACTOR
+        ):
+            return (
+                f"the {_RATE_TITLES[axis]} {rate_column_name} does not make the change of its angle "
+                f"(correlation {named_rate_fit.correlation:.2f}): a factor of {factor:.4g} on "
+                f"{rate_column_name} fits"
+            )
     return None
 
 

@@ -127,9 +127,15 @@ def test_of_a_short_log_more_is_needed(seconds, rate, says):
     assert (found is not None and physics.angle_rate_factor_remark(found, "p", "roll") is not None) is says
 
 
-def test_nothing_is_said_of_a_roll_that_does_not_move():
+@pytest.mark.parametrize("drift_rad_s", [0.0, 7e-6])
+def test_nothing_is_said_of_an_angle_that_does_not_move(drift_rad_s):
+    """In steady flight at 45 m/s the level turns by 45 / 6.37e6 rad/s, and no gyro does: alpha is no rate."""
     still = Column(T_S, np.zeros(len(T_S)))
-    assert physics.fit_roll_angle_to_rates([still] * 3, still, None) is None
+    assert physics.fit_roll_angle_to_rates([still] * 3, Column(T_S, drift_rad_s * T_S), None) is None
+    angles = [("roll", still), ("pitch", Column(T_S, 0.14 + drift_rad_s * T_S)), None]
+    rates = {name: Column(T_S, 1e-8 * np.sin(T_S)) for name in ("gx", "gy", "gz")}
+    alpha = {"alpha": Column(T_S, 0.14 + 0.0 * T_S)}
+    assert physics.find_attitude_mistake(rates, angles, alpha) is None
 
 
 @pytest.mark.parametrize(("mean", "says"), [
@@ -194,6 +200,27 @@ def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
         ("roll", Column(T_S, phi)),
         ("pitch", Column(T_S, theta)),
         ("yaw", Column(T_S, angle * yawed())),
+    ]
+    said = physics.find_attitude_mistake(rates, angles, {})
+    assert (said is None) if says is None else (says in said)
+
+
+@pytest.mark.parametrize(("factor", "says"), [
+    (np.pi / 180, "a factor of 57.3 on gz fits"), (180 / np.pi, "gz"), (-1.0, "a factor of -1 on gz fits"),
+    (1.0, None),
+])  # fmt: skip
+def test_a_wrong_yaw_rate_is_found_in_a_flight_that_banks_and_pitches_more_than_it_yaws(factor, says):
+    """psi = 0.02 sin(0.7 t), theta = 0.3 sin(0.5 t), phi = 0.4 sin(0.9 t), and their rates."""
+    phi, theta = 0.4 * np.sin(0.9 * T_S), 0.3 * np.sin(0.5 * T_S)
+    dphi, dtheta, dpsi = 0.36 * np.cos(0.9 * T_S), 0.15 * np.cos(0.5 * T_S), 0.014 * np.cos(0.7 * T_S)
+    p = dphi - np.sin(theta) * dpsi
+    q = np.cos(phi) * dtheta + np.sin(phi) * np.cos(theta) * dpsi
+    r = np.cos(phi) * np.cos(theta) * dpsi - np.sin(phi) * dtheta
+    rates = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, factor * r)}
+    angles = [
+        ("roll", Column(T_S, phi)),
+        ("pitch", Column(T_S, theta)),
+        ("yaw", Column(T_S, 0.02 * np.sin(0.7 * T_S))),
     ]
     said = physics.find_attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)

@@ -670,9 +670,13 @@ class _Context(CPUContext):
             self._internal_codegen = Codegen(NAME)
 
     def load_additional_registries(self) -> None:
-        rtsys.initialize(cpu_target.target_context)  # what all targets share, as if ours were not there
-        super().load_additional_registries()
-        _shorten_messages()
+        """Numba's own implementations, imported once: Numba calls this for whatever it does not find."""
+        for registry in self._registries:
+            self.install_registry(registry)
+        if not self._registries:
+            rtsys.initialize(cpu_target.target_context)  # what all targets share, as if ours were not there
+            super().load_additional_registries()
+            _shorten_messages()
 
     def mangler(self, name: str, types: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
         """The name of a compiled function: after what its types contain.
@@ -682,12 +686,6 @@ class _Context(CPUContext):
         that loads both would run the one for the other.
         """
         return super().mangler(name, (_digest_of(tuple(types)),), abi_tags=abi_tags, uid=uid)
-
-    def get_function(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
-        """The implementation of a function for a signature."""
-        if isinstance(fn, types.Function):
-            self.typing_context.take_implementation(fn, sig)
-        return super().get_function(fn, sig, _firstcall)
 
     def get_executable(self, library: Any, fndesc: Any, env: Any) -> Any:
         """What Python calls; of an inner function what stands for it."""
@@ -701,33 +699,49 @@ def _digest_of(types: tuple[Any, ...]) -> str:
     return hashlib.sha256(repr(types).encode()).hexdigest()[:16]
 
 
+class _Function(types.Function):
+    """The type of an operator or of a function of NumPy; it keeps its signature for each set of arguments.
+
+    Numba's own tries all definitions for each call in a kernel, once to type the call and again to translate
+    it. It is also shared by all targets, and names the implementation of the target that asked last.
+    """
+
+    def __init__(self, template: Any) -> None:
+        super().__init__(template)
+        self._signatures: dict[Any, Any] = {}
+
+    def augment(self, other: Any) -> Any:
+        """The function with the definitions of both; None if they are different functions."""
+        return type(self)(self.templates + other.templates) if other.typing_key == self.typing_key else None
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """The signature for arguments of these types."""
+        if kws:
+            return super().get_call_type(context, args, kws)
+        key = tuple(args)
+        if key not in self._signatures:
+            self._signatures[key] = super().get_call_type(context, args, kws)
+        return self._signatures[key]
+
+
+register_model(_Function)(models.OpaqueModel)
+
+
 class _TypingContext(typing.Context):
     """How functions are typed: as by Numba, each operator and function of NumPy once for the same types."""
 
-    def init(self) -> None:
-        super().init()
-        self._resolved: dict[Any, Any] = {}
-        self._implementations: dict[Any, Any] = {}
+    _loaded = False
 
-    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        """The signature of a function for these types. Numba tries all its definitions at each call."""
-        of_types = not kws and all(isinstance(each, types.Type) for each in args)
-        if not of_types or (isinstance(func, types.Type) and not isinstance(func, types.Function)):
-            return super().resolve_function_type(func, args, kws)
-        key = func, tuple(args)
-        if key not in self._resolved:
-            found = super().resolve_function_type(func, args, kws)
-            self._resolved[key] = found
-            if found is not None and isinstance(func, types.Function):
-                self._implementations[func, found.args] = func._impl_keys.get(found.args)
-        return self._resolved[key]
+    def load_additional_registries(self) -> None:
+        """Numba's own declarations, once: it calls this again for each function that it compiles."""
+        if not self._loaded:
+            super().load_additional_registries()
+            self._loaded = True
 
-    def take_implementation(self, func: Any, signature: Any) -> None:
-        """Let a function name the implementation that was compiled for our target: it names one for all
-        targets, that of the last target that asked."""
-        found = self._implementations.get((func, signature.args))
-        if found is not None:
-            func._impl_keys[signature.args] = found
+    def insert_global(self, value: Any, kind: Any) -> None:
+        """Give a function, or another value, its type in kernels."""
+        ours = _Function(kind.templates) if type(kind) is types.Function else kind
+        super().insert_global(value, ours)
 
 
 class _TargetOfKernels(CPUTarget):

@@ -190,7 +190,7 @@ def _area(patch: Any) -> list[Any]:
 _LOOKS = (
     "fontsize", "rotation", "horizontalalignment", "verticalalignment", "linewidth", "markersize", "sizes",
     "alpha", "zorder", "frame_on", "width_ratios", "height_ratios", "_loc", "_ncols",
-    "_unscaled_dash_pattern", "linestyle",
+    "_unscaled_dash_pattern", "linestyle", "drawstyle", "clip_on",
 )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from beaver_ftc.studies.decay.survey import (
     run_decay,
     scenario_of,
 )
+from kept import picture
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 1.5}
 SHORT = {
@@ -400,7 +401,7 @@ def test_a_document_has_a_row_an_error_and_factor(made):
     }  # fmt: skip
 
 
-def test_the_table_the_files_and_the_figure_have_every_row(made, tmp_path):
+def test_the_table_the_files_and_the_figure_have_every_row(made, tmp_path, changed):
     _, document = made
     row = document["rows"][6]
     assert cells(row) == (
@@ -418,6 +419,7 @@ def test_the_table_the_files_and_the_figure_have_every_row(made, tmp_path):
         of["tracking_deg_s"] |= {"low": 0.1 + at, "value": 0.5 + at, "high": 1.2 + at}
     document["rows"][1]["tracking_deg_s"]["value"] = None  # of an aircraft that is lost
     figure = FILES["decay.png"](document)
+    assert not changed(picture(figure))
     assert [axes.get_title() for axes in figure.axes] == [
         "false alarms, %", "named rightly, %", "tracking RMS, deg/s"
     ]  # fmt: skip

@@ -37,6 +37,7 @@ from beaver_ftc.studies.mechanisms.survey import (
     without_mechanism,
 )
 from beaver_ftc.studies.mechanisms.systems import DEFAULT, LAW, MECHANISMS, PAPER
+from kept import picture
 
 ELEVATOR = Flight("loss 80 %", "high", 0.0, "exact sensors", 1)
 EVERY = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.key)
@@ -383,7 +384,7 @@ def test_a_level_of_a_factor_has_two_columns():
     assert [row[0] for row in shown.level_rows(MADE, "error", "names", "diagnosis")] == [NAMES[1]]
 
 
-def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path):
+def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, changed):
     """Of what is worst-case alone; what is beyond chance on either side."""
     said = [*sentences(MADE)]
     assert said == [
@@ -405,6 +406,7 @@ def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path):
     assert "delay_s_with" not in first
     assert json.loads(shown.FILES["mechanisms.json"](MADE)) == MADE
     figure = shown.figure_of(MADE)
+    assert not changed(picture(figure))
     assert [axes.get_title() for axes in figure.axes] == [*shown.CRITERIA.values()]
     for axes, name in zip(figure.axes, shown.CRITERIA, strict=True):
         for place, (bar, row) in enumerate(zip(axes.containers, MADE["mechanisms"], strict=True)):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
-from beaver_ftc.studies.present.figures import curve_look, label_edges, marker, panels
+from beaver_ftc.studies.present.figures import GRID, curve_look, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, as_html, versions_line
 from beaver_ftc.studies.present.tables import aligned, as_csv, number
 
@@ -110,7 +110,7 @@ def figure_of(document: Document) -> "Figure":
         panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
         panel.minorticks_off()
         panel.set_title(label, fontsize=9)
-        panel.grid(color="#dddddd", linewidth=0.6)
+        panel.grid(color=GRID, linewidth=0.6)
     label_edges(grid, "size of the error / declared size or unit")
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)

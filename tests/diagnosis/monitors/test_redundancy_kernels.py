@@ -595,3 +595,18 @@ def test_a_monitor_that_is_off_has_found_nothing_and_holds_no_more():
     assert {path: value.item() for path, value in not_zero(monitor)} == {
         "output.alarmed_at_s": -1.0, "output.isolated_sensor": -1, "output.isolated_at_s": -1.0,
     }  # fmt: skip
+
+
+def test_an_error_changes_a_logarithm_by_its_share_of_both_readings_of_no_less_than_one():
+    step = new_step()
+    step["config"]["constant_error_bound"][QDYN] = 0.2
+    for now, before, change in (
+        (8.0, 5.0, 0.2 * 0.075 / (1 - 0.04)),
+        (0.4, 4.0, 0.15 / 0.8),
+        (4.0, 0.4, 0.15 / 0.8),
+    ):
+        step["memory"]["previous_reading"][QDYN] = before
+        readings = np.full(N_SENSORS, now)
+        assert redundancy.log_change_error_bound(step.view(np.recarray), readings, QDYN) == pytest.approx(
+            change
+        )

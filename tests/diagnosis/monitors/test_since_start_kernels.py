@@ -13,8 +13,10 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     AIRSPEED_HYPOTHESIS,
     ALPHA,
+    ALPHA_FLOW_TEST,
     ALPHA_HYPOTHESIS,
     BETA,
+    BETA_FLOW_TEST,
     BETA_HYPOTHESIS,
     CLIMB_TEST,
     DENSITY_TEST,
@@ -138,6 +140,80 @@ def looks(signal, h):
         initial_errors.latch_refuted_hypotheses(monitor["redundancy"], monitor["initial_errors"], fired)
         yield k, monitor, fired
         redundancy.store_sample_as_previous(monitor["redundancy"], signal[k], signal[k, AX:])
+
+
+def test_small_errors_move_each_prediction_by_its_derivative():
+    """Of the kinematics, by differences. What is largest is so over all values of the angle itself."""
+    h, V, (p, q, r), step = 0.05, 41.0, (0.3, -0.2, 0.5), 1e-5
+    at = np.array([0.3, -0.4, 0.6, 0.5])  # alpha, beta, phi, theta
+    a = np.array([3.0, 0.0, -7.0])  # in the plane of symmetry, where the angle of attack turns all of it
+    monitor = new_watch(h)
+    memory, errors = monitor["redundancy"]["memory"], monitor["initial_errors"]
+    memory["previous_reading"][:3], memory["previous_reading"][AIRSPEED] = (p, q, r), V
+    memory["previous_reading"][[ALPHA, BETA, PHI, THETA]] = at
+    memory["previous_reading"][ALTITUDE], memory["predicted_reading"][ALTITUDE] = 900.0, 898.5
+    memory["body_acceleration"], errors["error_bound"] = a, 1e-8
+    readings = memory["previous_reading"].copy()
+    readings[AIRSPEED] = 42.0
+    initial_errors.fill_effects_per_unit_error(monitor["redundancy"], errors, readings)
+    signed = {
+        name.removesuffix("_INDEX"): errors["signed_effect_per_unit_error"][getattr(initial_errors, name)] / h
+        for name in dir(initial_errors)
+        if name.endswith("_INDEX") and ("EFFECT" in name) and isinstance(getattr(initial_errors, name), int)
+    }  # fmt: skip
+
+    def parts(alpha, beta, phi, theta):
+        turn, ahead = p * np.cos(alpha) + r * np.sin(alpha), a[0] * np.cos(alpha) + a[2] * np.sin(alpha)
+        up, level = np.sin(theta), np.cos(theta)
+        tilt = np.sin(beta) * np.sin(phi) + np.sin(alpha) * np.cos(beta) * np.cos(phi)
+        return {
+            "turn": turn, "rolled": np.tan(beta) * turn, "pushed": -ahead * np.sin(beta) / V,
+            "lifted": (a[2] * np.cos(alpha) - a[0] * np.sin(alpha)) / (V * np.cos(beta)),
+            "down": GRAVITY * level * np.cos(phi), "side": GRAVITY * level * np.sin(phi),
+            "ahead": GRAVITY * up,
+            "climb": V * (np.cos(alpha) * np.cos(beta) * up - tilt * level),
+        }  # fmt: skip
+
+    def slope(part, i, of=at):
+        low, high = np.array(of, float), np.array(of, float)
+        low[i], high[i] = low[i] - step, high[i] + step
+        return (parts(*high)[part] - parts(*low)[part]) / (2.0 * step)
+
+    def largest(part, i):
+        angles = np.linspace(-np.pi, np.pi, 20_001)
+        return abs(
+            slope(part, i, [angles if i == j else np.full(angles.size, at[j]) for j in range(4)])
+        ).max()
+
+    here = parts(*at)
+    assert signed == pytest.approx(
+        {
+            "PHI_ERROR_EFFECT_BY_PITCH_RATE": q, "PHI_ERROR_EFFECT_BY_YAW_RATE": r,
+            "THETA_ERROR_EFFECT_BY_HEADING_RATE": q * np.sin(at[2]) + r * np.cos(at[2]),
+            "PHI_ERROR_EFFECT_BY_GRAVITY_DOWN": slope("side", 2),
+            "PHI_ERROR_EFFECT_BY_GRAVITY_SIDE": -slope("down", 2),
+            "THETA_ERROR_EFFECT_BY_GRAVITY": slope("ahead", 3),
+            "ALPHA_ERROR_EFFECT_ON_CLIMB": abs(slope("climb", 0)),
+            "VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE": here["turn"],
+            "VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE": -slope("turn", 0),
+            "ALPHA_EFFECT_UNCERTAINTY_BY_FORCE": largest("pushed", 0),
+            "BETA_EFFECT_UNCERTAINTY_BY_FORCE": abs(slope("lifted", 1)),
+            "AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW": here["lifted"],
+            "AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW": here["pushed"],
+            "AIRSPEED_ERROR_EFFECT_ON_DENSITY": 2.0 * np.log(42.0 / 41.0) / h,
+        }, rel=1e-6,
+    )  # fmt: skip
+    turned = 1.0 + h * (np.linalg.norm(a) / V + abs(p) + abs(q) + abs(r))
+    expected = {
+        (ALPHA_HYPOTHESIS, CLIMB_TEST): largest("climb", 0),
+        (BETA_HYPOTHESIS, CLIMB_TEST): largest("climb", 1),
+        (PHI_HYPOTHESIS, CLIMB_TEST): largest("climb", 2), (AIRSPEED_HYPOTHESIS, CLIMB_TEST): 1.5 / h,
+        (ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST): turned * (largest("lifted", 0) + largest("rolled", 0)),
+        (ALPHA_HYPOTHESIS, BETA_FLOW_TEST): turned * (largest("turn", 0) + largest("pushed", 0)),
+        (AIRSPEED_HYPOTHESIS, DENSITY_TEST): 2.0 * np.log(42.0 / 41.0) / h,
+    }  # fmt: skip
+    found = {place: errors["max_effect_per_unit_error"][place] / h for place in expected}
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])

@@ -38,7 +38,8 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
 )
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, YAW
 from beaver_ftc.loop import frame
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
@@ -205,6 +206,10 @@ def test_an_angle_that_has_turned_an_axis_before_is_still_suspected():
     monitor["memory"]["filtered_turn_beyond_angle"][2, 0] = 1.9
     for size, explains in ((3.9, False), (4.1, True)):  # 1.5 and a tenth of the size
         monitor["memory"]["filtered_angle_residual_size"][2] = size
+        assert watching.angle_error_explains_turn_tests(monitor, 2) == explains
+    monitor["memory"]["filtered_turn_beyond_angle"][2, 2] = 1e3
+    for turn, explains in ((11.9, True), (-12.1, False)):  # 1.1 times the 10 of the angle, and the bound 1
+        monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST + 2] = turn
         assert watching.angle_error_explains_turn_tests(monitor, 2) == explains
 
 
@@ -896,6 +901,14 @@ def test_engines_under_one_lever_that_yaw_beyond_the_bound_have_failed_and_stay_
     y = np.array([7.0, -0.1 * thrust + excess, 7.0, thrust])
     assert detect_engine_failure(monitor, 0.005, y) == failed
     assert detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
+    fdi = new_fdi()
+    fdi["engine_monitor"], fdi["bound"]["error_map"]["engine_asymmetry_bound_now"] = monitor, 0.005
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    axis = adaptive_estimators.record_engine_failure_or_find_alarm_axis(fdi, y, 7.5)
+    verdict = fdi["verdict"]["isolated_estimator"], fdi["verdict"]["isolated_at_s"]
+    assert (axis, *verdict) == ((YAW, UNANTICIPATED, 7.5) if failed else (-1, NOT_ISOLATED, 0.0))
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = 1, NOT_ISOLATED
+    assert adaptive_estimators.record_engine_failure_or_find_alarm_axis(fdi, y, 7.5) == -1
 
 
 @pytest.fixture

@@ -400,6 +400,8 @@ def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     fdi = new_case(**NOBODY_ELSE)
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
     assert on(verdict.find_presumed_faulty_surface, fdi, fdi["verdict"]["isolated_estimator"]) == RUDDER
+    alone = _open(new_case(elevator=None, rudder=None, flap=None))
+    assert on(verdict.find_presumed_faulty_surface, alone, NOT_ISOLATED) == AILERON
     assert on(verdict.find_presumed_faulty_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
     assert on(verdict.find_presumed_faulty_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
     assert (

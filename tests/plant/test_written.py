@@ -76,6 +76,18 @@ def test_a_hold_changes_what_it_is_given_and_stands_still():
     assert seen(plant) == pytest.approx(seen(other), rel=1e-6, abs=1e-6)
 
 
+def test_a_hold_ends_once_the_aircraft_is_still():
+    """At the second run, which changes nothing here: the rates of the flow change no moment of the Beaver."""
+    plant, other, runs = Plant(rate_hz=50), Plant(rate_hz=50), []
+    for each in (plant, other):
+        each.start(FlightState(45.0, 1000.0, engine_rpm=1900.0, manifold_pressure_inhg=22.0))
+    plant.run = lambda: runs.append(plant.fdm.run())
+    plant.hold(banked(), still_rad_s2=1e-6)
+    other.hold(banked())
+    assert len(runs) == 2
+    assert plant.read_all(SEEN[8:11]) == pytest.approx(other.read_all(SEEN[8:11]), rel=0.0, abs=1e-7)
+
+
 def test_settling_leaves_the_turbulence_as_it_was():
     plant = Plant(rate_hz=50)
     plant.start(banked())

@@ -434,7 +434,7 @@ IMPORTED = {
 }
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
-_FORMAT = 9  # of what is derived: files of another are derived again
+_FORMAT = 10  # of what is derived: files of another are derived again
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 

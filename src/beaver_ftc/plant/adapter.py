@@ -10,13 +10,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from itertools import count, takewhile
 from math import cos, sin
+from operator import sub
 from pathlib import Path
 from typing import Any, Self
 
 import jsbsim
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft import load as load_aircraft
 from beaver_ftc.aircraft.aircraft import M_PER_FT, N_PER_LBF, kept_folder
 from beaver_ftc.documents.errors import SimulationFailed
@@ -125,6 +126,7 @@ _AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing
 # above rounding.
 _RUNS_TO_SETTLE = 5
+_ANGULAR_ACCELERATIONS = tuple(f"accelerations/{axis}dot-rad_sec2" for axis in AXES)
 
 # What places an aircraft. Body velocity after the attitude: JSBSim keeps what was set last when an earlier
 # quantity changes.
@@ -372,15 +374,15 @@ class Plant:
         if not initialised:
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
-    def hold(self, state: FlightState) -> None:
+    def hold(self, state: FlightState, still_rad_s2: float | None = None) -> None:
         """Put the aircraft into a state with time standing still; the engines go on as they were.
 
-        `start` comes first. The quick way to look at many states.
+        `start` comes first. The quick way to look at many states; still_rad_s2: as of `settle`.
         """
         self._command_surfaces(state)
         self._place(state)
         self._initialise()
-        self.settle()
+        self.settle(still_rad_s2)
 
     def pass_over(self, state: FlightState) -> None:
         """Take from `hold` what later states depend on: the last bits of a place are what the places before
@@ -425,17 +427,24 @@ class Plant:
         self._initialise()
         self._run_up_for = wanted
 
-    def settle(self) -> None:
+    def settle(self, still_rad_s2: float | None = None) -> None:
         """Run, time standing still, until accelerations belong to the state and the surfaces as commanded.
 
         In still air: the filters of the turbulence divide by the time step, which is zero here.
+        still_rad_s2: the runs end sooner if one has changed no angular acceleration by more than this.
         """
         turbulence = self.read("atmosphere/turb-type")
         if turbulence:
             self.write("atmosphere/turb-type", 0.0)
         self.fdm.suspend_integration()
+        before: list[float] = []
         for _ in range(_RUNS_TO_SETTLE):
             self.run()
+            if still_rad_s2 is not None:
+                now = self.read_all(_ANGULAR_ACCELERATIONS)
+                if before and max(map(abs, map(sub, now, before))) <= still_rad_s2:
+                    break
+                before = now
         self.fdm.resume_integration()
         if turbulence:
             self.write("atmosphere/turb-type", turbulence)

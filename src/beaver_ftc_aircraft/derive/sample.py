@@ -7,14 +7,14 @@ from trim, its surfaces moved a little by sines: engines turn, the air lags, fue
 model is worst are looked for, from the worst of random ones on.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, FLOW_SIGNALS, M_PER_FT, Aircraft
-from beaver_ftc.plant import PA_PER_PSF, FlightState, Plant
+from beaver_ftc.plant import PA_PER_PSF, FlightState, Plant, translated
 from beaver_ftc.studies.engine import Forks
 
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
@@ -26,6 +26,10 @@ RATES_RAD_S = (0.60, 0.35, 0.35)  # half widths
 EVERY_AGE = (0, 0, 1, 0, 0, 2)
 AGES_OF_WORST = (0, 1, 0, 2)
 STARTS, STARTS_OF_WORST = 48, 96
+# Of the angular accelerations, from one look at a state to the next: since each changes them by less than a
+# tenth of what the one before did, what is left is less than the error of their rounding in the file.
+STILL_RAD_S2 = 1e-6
+BLOCK = 1
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 ALTITUDE_M = 1500.0  # half width of what is derived, about the trim's
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
@@ -204,56 +208,69 @@ class Draw:
 
 
 @dataclass(frozen=True)
-class _Drawn:
-    """Where to look with the engines as they are: places, each with the share of the travel that it is of;
-    and, of each share, the ends between which the worst is looked for, and the places to begin from."""
+class Start:
+    """One start of the engines: box and age of the flight, by their index; for how long fuel has burnt, s;
+    the levers of engines that are effectors; where the aircraft starts. Then the places at which time
+    stands still, each with the share of the travel that it is of; and, of each share, the ends between
+    which the largest error is searched for, and the places from which the search begins."""
 
+    box: int
+    age: int
+    burnt_s: float
+    levers: Mapping[str, float]
+    state: FlightState
     places: Sequence[tuple[Place, int]]
     searches: Sequence[tuple[Mapping[str, Ends], Sequence[Place]]]
+
+
+def drawn_start(draw: Draw, k: int, n: int, ages: Sequence[int], moves: Moves, search: bool) -> Start:
+    """The k-th start, with so many places; search: whether the largest error is searched for."""
+    box, of_box = k % len(REACHES), k // len(REACHES)
+    turn, of = divmod(of_box, len(ages))
+    age, reach = ages[of], REACHES[box]
+    oldest_s = _BEFORE_S + AGES_S[age]
+    burnt_s = draw.between(oldest_s if turn % 2 else AGES_S[age - 1] if age else 0.0, oldest_s)
+    state = draw.start(reach, of_box)
+    levers = {lever: draw.around(0.0, reach * moves.apart) for lever in _levers(draw.aircraft)}
+    ends = [draw.ends(reach, share) for share in moves.shares]
+    levels = [i % len(ends) for i in range(n)]
+    places = [(draw.place(ends[level]), level) for level in levels]
+    first = [[draw.place(of) for _ in range(_CLIMB_FROM)] for of in ends] if search else []
+    return Start(box, age, burnt_s, levers, state, places, list(zip(ends, first, strict=False)))
 
 
 class _Standing:
     """An aircraft for which time stands still, put from place to place; what it is there is kept as rows."""
 
-    def __init__(self, plant: Plant, draw: Draw, reader: "Reader") -> None:
-        self.plant, self.draw, self.reader = plant, draw, reader
-        self.tanks, self.rows = Tanks(plant, draw.trim), list[Row]()
+    def __init__(self, plant: Plant, draw: Draw, reader: "Reader", tanks: "Tanks") -> None:
+        self.plant, self.draw, self.reader, self.tanks = plant, draw, reader, tanks
+        self.rows: list[Row] = []
 
-    def start(self, box: int, age: int, youngest_s: float, apart: float, turn: int) -> None:
-        """Let the engines come to run somewhere in a box, in a flight of some age; turn: as `Draw.start`."""
-        draw, plant = self.draw, self.plant
-        self.tanks.fill(draw.between(youngest_s, _BEFORE_S + AGES_S[age]))
-        self.started, self.box, self.age, self.rows = draw.start(REACHES[box], turn), box, age, []
-        for lever in _levers(plant.aircraft):
-            plant.write(lever, draw.around(0.0, REACHES[box] * apart))
-        plant.start(self.started)
+    def begin(self, start: Start) -> None:
+        """Start the engines there."""
+        self.tanks.fill(self.plant, start.burnt_s)
+        for lever, difference in start.levers.items():
+            self.plant.write(lever, difference)
+        self.plant.start(start.state)
+        self.start, self.rows = start, []
 
-    def drawn(self, shares: Sequence[float], n: int, search: bool) -> _Drawn:
-        """So many places in the box, and where to begin if the worst is looked for."""
-        ends = [self.draw.ends(REACHES[self.box], share) for share in shares]
-        levels = [i % len(ends) for i in range(n)]
-        places = [(self.draw.place(ends[level]), level) for level in levels]
-        first = [[self.draw.place(of) for _ in range(_CLIMB_FROM)] for of in ends] if search else []
-        return _Drawn(places, list(zip(ends, first, strict=False)))
-
-    def look(self, drawn: _Drawn, errors: Errors | None) -> list[Row]:
-        """What is seen where it was drawn, and where errors are large."""
-        for place, level in drawn.places:
+    def look(self, errors: Errors | None) -> np.ndarray:
+        """The rows of the drawn places, and of those where errors are large."""
+        for place, level in self.start.places:
             self.put(place, level)
         if errors is not None:
-            for level, (ends, first) in enumerate(drawn.searches):
-                _climb(self, ends, first, level, errors)
-        return self.rows
+            _search(self, errors)
+        return np.array(self.rows)
 
-    def pass_over(self, drawn: _Drawn) -> None:
+    def pass_over(self) -> None:
         """Go on as if the places had been looked at."""
-        for place, _ in drawn.places:
-            self.plant.pass_over(self.draw.state(self.started, place))
+        for place, _ in self.start.places:
+            self.plant.pass_over(self.draw.state(self.start.state, place))
 
     def put(self, place: Place, level: int) -> None:
         """Look at one place, with the surfaces within a share of their travel."""
-        self.plant.hold(self.draw.state(self.started, place))
-        self.rows.append(self.reader.row(self.box, level, self.age))
+        self.plant.hold(self.draw.state(self.start.state, place), STILL_RAD_S2)
+        self.rows.append(self.reader.row(self.start.box, level, self.start.age))
 
 
 def sample(
@@ -265,59 +282,115 @@ def sample(
     often the engines are started again; errors: of samples, (m, 3) rad/s2: if given, states where these are
     large are looked for as well.
 
-    Engines go on from start to start. From each of them, another process looks at the states of a region:
-    who samples by regions wrote the model, and nothing in it but the initial conditions goes on from state to
-    state. The flight control of other models may, and a search goes where the states before it lead.
+    Several processes look at the states. The samples depend neither on their number nor on their order:
+
+    - Each start is of a newly loaded model, as that of a flight. JSBSim keeps something from state to state,
+      such as the flow's rates and the states of the flight control; and an engine that has stopped at one
+      start would not run at the next.
+    - Of a region, all starts are of one model, and another process looks at the states of a start: who
+      samples by regions wrote the model, and nothing in it but the initial conditions goes on from state to
+      state.
     """
-    draw = Draw(seed, plant.aircraft, envelope, trim, moves)
+    draw, tanks = Draw(seed, plant.aircraft, envelope, trim, moves), Tanks(plant, trim)
+    search, of_each = errors is not None, max(1, n // starts)
+    drawn = [drawn_start(draw, k, of_each, ages, moves, search) for k in range(starts)]
     reader = Reader(plant, properties)
-    standing = _Standing(plant, draw, reader)
-    with Forks(envelope.of_region and errors is None) as forks:
-        for k in range(starts):
-            box, of_box = k % len(REACHES), k // len(REACHES)
-            turn, of = divmod(of_box, len(ages))
-            age = ages[of]
-            youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
-            standing.start(box, age, youngest_s, moves.apart, of_box)
-            drawn = standing.drawn(moves.shares, max(1, n // starts), errors is not None)
-            forks.give(partial(standing.look, drawn, errors), partial(standing.pass_over, drawn))
-        rows = [row for of_start in forks.results() for row in of_start]
-    standing.tanks.fill(0.0)
+    with Forks() as forks:
+        if envelope.of_region and not search:
+            standing = _Standing(plant, draw, reader, tanks)
+            for start in drawn:
+                standing.begin(start)
+                forks.give(partial(standing.look, None), standing.pass_over)
+        else:
+            look = partial(_look_at_block, plant, draw, properties, tanks, errors)
+            for k in range(0, starts, BLOCK):
+                forks.give(partial(look, drawn[k : k + BLOCK]))
+        rows = np.concatenate(forks.results())
+    tanks.fill(plant, 0.0)
     _together(plant)
     plant.start(trim)
     return finite(reader.samples(rows))
 
 
-def _climb(
-    standing: _Standing, ends: Mapping[str, Ends], drawn: Sequence[Place], level: int, errors: Errors
-) -> None:
-    """From the worst of some states on each axis, go where the error is larger.
+def _look_at_block(
+    plant: Plant, draw: Draw, properties: Mapping[str, str], tanks: "Tanks", errors: Errors | None,
+    starts: Sequence[Start],
+) -> np.ndarray:  # fmt: skip
+    """The rows of some starts, each of a newly loaded plant like this one."""
+    rows = []
+    with translated(plant.aircraft.jsbsim):  # here, because JSBSim's errors do not pass between processes
+        for start in starts:
+            own = Plant(plant.rate_hz, plant.substeps, plant.aircraft)
+            standing = _Standing(own, draw, Reader(own, properties), tanks)
+            standing.begin(start)
+            rows.append(standing.look(errors))
+    return np.concatenate(rows)
+
+
+Asked = Sequence[tuple[Place, int]]  # places to look at, each with its share of the travel
+
+
+def _search(standing: _Standing, errors: Errors) -> None:
+    """From the worst of some places, of each share and on each axis, go where the error is larger.
+
+    All go at once, since errors of many states take hardly longer than those of few. No place is looked at
+    twice: searches come to the same corners, and many of the places that one tries are where it is.
+    """
+    seen: dict[tuple[float, ...], np.ndarray] = {}
+
+    def look(asked: Asked) -> np.ndarray:
+        keys = [(level, *place.values()) for place, level in asked]
+        fresh = {key: of for key, of in zip(keys, asked, strict=True) if key not in seen}
+        for place, level in fresh.values():
+            standing.put(place, level)
+        if fresh:
+            found = np.nan_to_num(errors(standing.reader.samples(standing.rows[-len(fresh) :])))
+            seen.update(zip(fresh, found, strict=True))
+        return np.array([seen[key] for key in keys])
+
+    climbs = [
+        _climb(ends, first, level, axis)
+        for level, (ends, first) in enumerate(standing.start.searches)
+        for axis in range(len(AXES))
+    ]
+    waiting = [(climb, next(climb)) for climb in climbs]
+    while waiting:
+        found = look([of for _, asked in waiting for of in asked])
+        parts = np.split(found, np.cumsum([len(asked) for _, asked in waiting])[:-1])
+        further = [(climb, _answered(climb, part)) for (climb, _), part in zip(waiting, parts, strict=True)]
+        waiting = [(climb, asked) for climb, asked in further if asked]
+
+
+Climb = Generator[Asked, np.ndarray, None]
+
+
+def _answered(climb: Climb, found: np.ndarray) -> Asked:
+    """Where a search looks next; nowhere at its end."""
+    try:
+        return climb.send(found)
+    except StopIteration:
+        return ()
+
+
+def _climb(ends: Mapping[str, Ends], drawn: Sequence[Place], level: int, axis: int) -> Climb:
+    """Ask for the errors of places, (m, 3), each time where they may be larger on an axis.
 
     Each quantity is put to its ends and its middle, the others as they are; then all together are put where
     each alone was worst. Corners of so many quantities are too many for random states to be near all of them.
     """
-
-    def look(places: Sequence[Place]) -> np.ndarray:
-        for place in places:
-            standing.put(place, level)
-        return np.nan_to_num(errors(standing.reader.samples(standing.rows[-len(places) :])))
-
+    found = (yield [(place, level) for place in drawn])[:, axis]
+    place, error = drawn[int(found.argmax())], found.max()
     moved = [name for name in ends if name not in _ATTITUDE]
-    found = look(drawn)
-    for axis, first in enumerate(found.argmax(axis=0)):
-        place, error = drawn[first], found[first, axis]
-        for _ in range(_CLIMBS):
-            tried = [
-                (name, at) for name in moved for at in (ends[name][0], sum(ends[name]) / 2, ends[name][1])
-            ]
-            there = look([place | {name: at} for name, at in tried])[:, axis]
-            order = np.argsort(there)  # the worst last: of each name, it is the one that stays
-            together = place | {tried[k][0]: tried[k][1] for k in order if there[k] > error}
-            alone = place | dict([tried[order[-1]]])
-            of_both = look([together, alone])[:, axis]
-            if of_both.max() <= error:
-                break
-            place, error = (together, alone)[of_both.argmax()], of_both.max()
+    for _ in range(_CLIMBS):
+        tried = [(name, at) for name in moved for at in (ends[name][0], sum(ends[name]) / 2, ends[name][1])]
+        there = (yield [(place | {name: at}, level) for name, at in tried])[:, axis]
+        order = np.argsort(there)  # the worst last: of each name, it is the one that stays
+        together = place | {tried[k][0]: tried[k][1] for k in order if there[k] > error}
+        alone = place | dict([tried[order[-1]]])
+        of_both = (yield [(together, level), (alone, level)])[:, axis]
+        if of_both.max() <= error:
+            break
+        place, error = (together, alone)[of_both.argmax()], of_both.max()
 
 
 def sample_all(
@@ -379,7 +452,7 @@ class Reader:
         """What is read now; box, level, age: as of `Samples`."""
         return [*self._plant.read_all(self._names), box, level, age]
 
-    def samples(self, rows: Sequence[Row]) -> Samples:
+    def samples(self, rows: Sequence[Row] | np.ndarray) -> Samples:
         """All rows in one, also those whose accelerations are not finite."""
         blocks = np.split(np.array(rows), self._ends, axis=1)
         x, y, signals, u, rate, indices = (block.copy() for block in blocks)
@@ -392,18 +465,18 @@ class Tanks:
     """The tanks of an aircraft in trim, and what flight at full power burns of them."""
 
     def __init__(self, plant: Plant, trim: FlightState) -> None:
-        self._plant, self.full_lbs = plant, plant.tanks_lbs
+        self.full_lbs = plant.tanks_lbs
         power = {name: setting.range[1] for name, setting in plant.aircraft.engine.settings.items()}
         plant.start(replace(trim, settings=power))
         flows = [f"propulsion/engine[{i}]/fuel-flow-rate-pps" for i in range(plant.n_engines)]
         flow_pps, total = sum(plant.read(f) for f in flows if plant.has(f)), sum(self.full_lbs.values())
         self.per_s = flow_pps / total if total > 0.0 and np.isfinite(flow_pps) else 0.0
 
-    def fill(self, age_s: float) -> None:
-        """As they are after so many seconds at full power."""
+    def fill(self, plant: Plant, age_s: float) -> None:
+        """Those of a plant like this one, as they are after so many seconds at full power."""
         left = 1.0 - min(self.per_s * age_s, _MOST_BURNT)
         for name, full in self.full_lbs.items():
-            self._plant.write(name, left * full)
+            plant.write(name, left * full)
 
 
 def quantities(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:

@@ -60,6 +60,15 @@ def test_fuel_is_what_the_model_starts_with_however_long_its_engines_have_run(st
     assert all(0.0 < plant.read(name) < 100.0 for name in plant.tanks_lbs)
 
 
+def test_thrust_at_full_power_is_within_the_map(stranger):
+    """Its engine stops at high altitudes: it must run again at the next start."""
+    found, _ = stranger
+    plant = Plant(100, aircraft=found.aircraft)
+    plant.start(replace(found.trim, settings={"throttle": 1.0}))
+    least, largest = found.error_map.boxes[-1].signals["thrust"]
+    assert least < plant.read(found.aircraft.signals["thrust"].property) < largest
+
+
 def test_what_is_derived_of_a_model(stranger, changed):
     for part, said in parts_of(stranger).items():
         assert not changed(said, part=part)

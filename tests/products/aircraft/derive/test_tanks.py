@@ -38,7 +38,7 @@ class Bench:
 def left(flow_pps, age_s):
     """Pounds in each tank after a flight at full throttle; trim is at half of it."""
     bench = Bench(flow_pps)
-    Tanks(bench, FlightState(45.0, 1000.0, settings={"throttle": 0.5})).fill(age_s)
+    Tanks(bench, FlightState(45.0, 1000.0, settings={"throttle": 0.5})).fill(bench, age_s)
     return [bench.state[name] for name in FULL_LBS]
 
 

@@ -426,7 +426,6 @@ def test_a_diagnosis_is_of_rates_that_live_and_doubts_names_under_other_laws(
     bank, samples, rows = SimpleNamespace(no_response_hypothesis_index=1), small.flight(model, 3), "rows"
     posterior, told = np.array([[0.5, 0.5], [0.49, 0.51], [0.9, 0.1]]), {}
     stubs = {
-        "check_log_fits_model": lambda of, by: told.update(checked=(of, by)),
         "build_hypothesis_bank": lambda by: bank,
         "hypothesis_state_and_noise_posterior": lambda *of: (
             told.update(filtered=of) or (posterior, None, None)
@@ -438,9 +437,8 @@ def test_a_diagnosis_is_of_rates_that_live_and_doubts_names_under_other_laws(
     for name, stub in stubs.items():
         monkeypatch.setattr(diagnose, name, stub)
     monkeypatch.setattr(diagnose.trust, "with_rates_unknown_where_frozen_or_clipped", lambda of, by: "alive")
-    found = diagnose.diagnose(samples, model)
+    found = diagnose._diagnose_checked_log(samples, model)
     assert found == ((samples, model, "doubted rows" if doubts else rows), [False, True, False])
-    assert told["checked"] == (samples, model)
     assert told["filtered"] == ("alive", model, bank)
     assert told["read"] == (samples, model, bank, posterior)
     assert told.get("doubted") == (("alive", model, rows, threshold) if doubts else None)

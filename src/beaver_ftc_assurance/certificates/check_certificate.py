@@ -30,6 +30,7 @@ EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905
 ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding
 MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
 MAX_RELATIVE_DIFFERENCE = 1e-12  # of a stated side from the recomputed one: order of summation
+MAX_RELATIVE_DIFFERENCE_OF_EFFECT = 1e-9  # of what is stated from what the log has
 TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
     "engine_rpm", "manifold_pressure",
@@ -59,6 +60,16 @@ def require(condition, why):
     """Refuse with this sentence unless the condition holds."""
     if not condition:
         raise Refused(why)
+
+
+def is_same(stated, known):
+    """Whether a stated number is this one, but for rounding."""
+    return np.isclose(stated, known, MAX_RELATIVE_DIFFERENCE, 0)
+
+
+def is_same_effect(stated, known):
+    """Whether a stated effect of a fault is this one, but for rounding of what it is computed from."""
+    return np.isclose(stated, known, MAX_RELATIVE_DIFFERENCE_OF_EFFECT, MIN_EFFECT_RAD_S2)
 
 
 # --- 1. The form: which fields there are, and what may stand in each -------------------------------------
@@ -355,26 +366,26 @@ def check_declared(document, declared):
     check_form(document.get("declared"), DECLARED_FIELDS, {}, "declared")
     for axis, (offset, bias, slope) in declared.gyro_errors.items():
         o, B, m = (document["declared"][name].get(axis, 0.0) for name in "oBm")
-        same = np.isclose(o, offset, 1e-12, 0) and np.isclose(m, slope, 1e-12, 0)
-        require(same and (B == 0 or np.isclose(B, bias, 1e-12, 0)),
+        same = is_same(o, offset) and is_same(m, slope)
+        require(same and (B == 0 or is_same(B, bias)),
                 f"the declared error of gyro {axis} is not that of the scenario")  # fmt: skip
         require(o >= B, f"gyro {axis}: the constant error is larger than the whole error")
         if "omega_E" not in document:
             continue
         c, b, g = (document["declared"][name].get(axis, 0.0) for name in "cbg")
         require(
-            b >= declared.constant_bounds[axis] * (1 - 1e-12),
+            b >= declared.constant_bounds[axis] * (1 - MAX_RELATIVE_DIFFERENCE),
             f"b on {axis} is smaller than the scenario's bound",
         )
         require(c == 0 or declared.inertia_shares[axis] > 0, f"c on {axis}: the scenario declares none")
         require(g >= 1 if document["omega_E"] else g == 0, f"g on {axis} is not allowed")
-    require(np.isclose(document.get("dt_s", declared.dt), declared.dt, 1e-12, 0),
+    require(is_same(document.get("dt_s", declared.dt), declared.dt),
             "dt_s is not the frame of the scenario")  # fmt: skip
     require(
         document.get("instants", declared.instants) == declared.instants,
         "instants: not those of the scenario",
     )
-    require(document.get("omega_E", 0) == 0 or np.isclose(document["omega_E"], EARTH_RATE_RAD_S, 1e-12, 0),
+    require(document.get("omega_E", 0) == 0 or is_same(document["omega_E"], EARTH_RATE_RAD_S),
             "omega_E is not the Earth's rate")  # fmt: skip
 
 
@@ -653,7 +664,10 @@ def checked_effect_before(term, h, Z, r, effect, decay, dt, written):
     places = np.arange(written)[known]
     most = effect.max_effect(h[:written], Z[:written], r[:written])[known]
     least = float(dt * decay ** (written - 1.0 - places) @ most) if len(places) else 0.0
-    require(stated >= least * (1 - 1e-9) - 1e-15, "the effect before the written frames is too small")
+    require(
+        stated >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT) - 1e-15,
+        "the effect before the written frames is too small",
+    )
     return stated
 
 
@@ -661,7 +675,7 @@ def check_stated_effect(term, h, Z, r, effect, said):
     """Where h, Z, r are stated they are those of the log; null where the fault adds only rounding."""
     for name, known in (("h", h), ("Z", Z), ("r", r)):
         for stated, value in zip(term.get(name, ()), known, strict=False):
-            require(stated is None or np.isclose(stated, value, 1e-9, MIN_EFFECT_RAD_S2),
+            require(stated is None or is_same_effect(stated, value),
                     f"{name} is not that of the log")  # fmt: skip
     require(np.isfinite(h).all() and np.isfinite(Z).all() and np.isfinite(r).all(),
             "the log has no effect of this fault in these rows")  # fmt: skip
@@ -722,7 +736,7 @@ def course_pairs(said, frames, declared):
         require(sign == stop, "the surface runs the other way")
         require(said["stops"] == [ends[1]], "the stop is not that of the log")
         rate = radians(declared.scenario["actuators"][surface]["rate_limit_deg_s"]) or pi / 3
-        require(np.isclose(said["pace_rad_s"], rate / 2, 1e-12, 0), "pace_rad_s is not half the rate limit")
+        require(is_same(said["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
         went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late_frames)
         return [(ends[1], most), (above, first), (went, most)]
     if comparison == "swing":
@@ -744,8 +758,8 @@ def position_bound(bound, place, k, frames, effect):
     d = np.array(bound["d"])
     h, Z, r = (bound[name][place] for name in "hZr")
     known_h, known_Z, known_r = (float(values[0]) for values in effect.along(d, slice(k, k + 1)))
-    same = [np.isclose(h, known_h, 1e-9, 1e-12), np.isclose(abs(Z), abs(known_Z), 1e-9, 1e-12)]
-    require(all(same) and np.isclose(r, known_r, 1e-9, 1e-12), "h, Z or r is not that of the log")
+    same = [is_same_effect(h, known_h), is_same_effect(abs(Z), abs(known_Z))]
+    require(all(same) and is_same_effect(r, known_r), "h, Z or r is not that of the log")
     theta = (frames.innovation_rad_s2[k] @ d - h - frames.innovation_bound_rad_s2[k] @ np.abs(d) - r) / Z
     return theta, -h / Z, int(np.sign(Z * known_Z))
 
@@ -777,7 +791,10 @@ def check_level(said, declared):
     require(statistical and said["what"] is None, "the scenario declares no statistical detector")
     one_test = statistical["false_alarms_per_h"] / (3600 / declared.dt)
     least = -NormalDist().inv_cdf(one_test)
-    require(said["level"] >= least * (1 - 1e-9), "level: the declared rate allows no smaller one")
+    require(
+        said["level"] >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT),
+        "level: the declared rate allows no smaller one",
+    )
     last = said["first"] + len(said["frames"]) - 1
     require(last == said["frame"] >= said["first"], "frames are missing")
     require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
@@ -852,7 +869,8 @@ def instrument_sides(said, log):
     require(all(most >= 0 for _, _, most in said["looks"]), "looks: a bound is below zero")
     residual = sum(z - other for z, other, _ in said["looks"])
     bound = sum(most for *_, most in said["looks"])
-    require(bound > 0 and log["watch_share"][k] * (1 + 1e-9) > residual / bound, "the log's share is smaller")
+    logged = log["watch_share"][k] * (1 + MAX_RELATIVE_DIFFERENCE_OF_EFFECT)
+    require(bound > 0 and logged > residual / bound, "the log's share is smaller")
     return residual, bound
 
 

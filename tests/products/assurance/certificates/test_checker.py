@@ -758,3 +758,10 @@ def test_a_level_is_that_of_a_test_in_each_frame_at_the_declared_rate():
     its = declared(scenario={"fdi": {"statistical": {"false_alarms_per_h": rate_per_h}}})
     for level, says in ((4.7 * (1 + 1e-6), ""), (4.7 * (1 - 1e-6), "level: the declared rate allows")):
         refused_with(says, lambda level=level: checker.check_level(CHANCE | {"level": level}, its))
+
+
+@pytest.mark.parametrize(("is_same", "share"), [("is_same", 1e-12), ("is_same_effect", 1e-9)])
+def test_numbers_are_the_same_but_for_rounding(is_same, share):
+    found = [getattr(checker, is_same)(-3.0, -3.0 * (1.0 + off * share)) for off in (0.9, -0.9, 1.3, -1.3)]
+    assert found == [True, True, False, False]
+    assert [checker.is_same_effect(stated, 0.0) for stated in (0.9e-12, 1.3e-12)] == [True, False]

@@ -50,7 +50,7 @@ class EffectivenessFilter:
         self.turbulence_model = TurbulenceModel(context)
         self.n_states = N_STATES_WITHOUT_GUSTS + self.turbulence_model.n_states
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
-        self.z = np.zeros(self.n_states)
+        self.z, self.diagonal = np.zeros(self.n_states), np.diag_indices(self.n_states)
         self.P = np.diag(
             np.concatenate((measured_rate_variance, [0.01] * 3, self.turbulence_model.initial_variance))
         )
@@ -141,6 +141,14 @@ class AugmentedEkf(EffectivenessFilter):
     # alarm: chi-square value of the largest theta^2 / variance
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {"alarm": 20.0}
 
+    def reset(self, context: Context) -> None:
+        """As the base does, with what the Jacobian is in every frame."""
+        super().reset(context)
+        gusts = slice(N_STATES_WITHOUT_GUSTS, None)
+        self.constant_jacobian = np.eye(self.n_states)
+        self.constant_jacobian[:3, gusts] = self.turbulence_model.rate_effect
+        self.constant_jacobian[gusts, gusts] = np.diag(self.turbulence_model.decay_factor)
+
     def propagate(self, measured: Measured) -> None:
         """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""
         F = self.jacobian(measured)
@@ -153,20 +161,16 @@ class AugmentedEkf(EffectivenessFilter):
             self.z[:3] += self.turbulence_model.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
             self.z[N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.decay_factor
         self.P = F @ self.P @ F.T
-        self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
+        self.P[self.diagonal] += self.process_noise_variances(measured)
 
     def jacobian(self, measured: Measured) -> np.ndarray:
         """F (n, n): [[1 + dt df/dx, dt G_s u_s], [0, 1]], and with the air [.., dt B] and its decay."""
         f, y, dt = self.context.model.f, measured.y, self.context.dt_s
-        F = np.eye(self.n_states)
+        F = self.constant_jacobian.copy()
         rate_steps = _DIFFERENCE_STEP_RAD_S * np.eye(3)
         f_at_steps = f(np.concatenate((measured.x + rate_steps, measured.x - rate_steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
         F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surface_indices]
-        F[:3, N_STATES_WITHOUT_GUSTS:] = self.turbulence_model.rate_effect
-        F[range(N_STATES_WITHOUT_GUSTS, self.n_states), range(N_STATES_WITHOUT_GUSTS, self.n_states)] = (
-            self.turbulence_model.decay_factor
-        )
         return F
 
     def update_statistic(self, normalised_innovation_square: float) -> float:
@@ -198,7 +202,7 @@ class AugmentedUkf(EffectivenessFilter):
         self.z = point_weights @ state_points
         point_deviations = state_points - self.z
         self.P = (point_deviations.T * point_weights) @ point_deviations
-        self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
+        self.P[self.diagonal] += self.process_noise_variances(measured)
 
     def propagate_points(self, state_points: np.ndarray, measured: Measured) -> np.ndarray:
         """Each sigma point a frame later; f differs between points by its change from the measured state."""

@@ -25,6 +25,7 @@ LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
 LOSS_MODES = tuple((leading_axis, theta) for leading_axis in range(3) for theta in LOSS_THETA_LEVELS)
 _LOSS_THETAS = np.array([[theta] for _, theta in LOSS_MODES])
 N_MODES = 1 + len(LOSS_MODES) + 1
+_RATES, _GUSTS = np.arange(3), np.arange(3, 6)  # places of the states
 _MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 
 
@@ -93,8 +94,9 @@ class InteractingMultipleModels:
             self.turbulence_model.rate_effect,
             np.diag(self.turbulence_model.decay_factor),
         )
-        self.acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
-        self.acceleration_noise_scale[-1] = self.options["unknown_noise"]
+        acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
+        acceleration_noise_scale[-1] = self.options["unknown_noise"]
+        self.process_noise_scale = (self.dt * acceleration_noise_scale) ** 2
         self.detected = False
         self.is_first_frame = True
 
@@ -108,12 +110,10 @@ class InteractingMultipleModels:
         )
         if self.turbulence_model.n_states:
             x, P = x @ self.F.T, self.F @ P @ self.F.T
-            P[:, range(3, 6), range(3, 6)] += self.turbulence_model.process_noise_variance
+            P[:, _GUSTS, _GUSTS] += self.turbulence_model.process_noise_variance
         x[:, :3] += self.dt * self.accelerations(measured)
         unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
-        P[:, :3, :3] += np.einsum(
-            "m,ij->mij", (self.dt * self.acceleration_noise_scale) ** 2, np.diag(unexplained_acceleration**2)
-        )
+        P[:, _RATES, _RATES] += self.process_noise_scale[:, None] * unexplained_acceleration**2
         nu = measured.x - x[:, :3]
         self.x, self.P, S = update_state_and_covariance(x, P, nu, self.R)
         self.mode_probabilities = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))

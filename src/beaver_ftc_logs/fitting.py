@@ -39,8 +39,6 @@ COMMAND_LAG_COUNT_CANDIDATES = (2, 3, 4, 6)
 _NEWEY_WEST_MAX_LAG_S = 2.0
 _MIN_RATE_SD_RAD_S = 1e-6
 _UNFITTED_MARGIN_BEFORE_FAILURE_S = 1.0
-_FAULT_PROBABILITY_FOR_ALARM = 0.995
-_ALARM_CONFIRMATION_TIME_S = 0.3
 _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED = 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
 With parts enough that are not fitted, the rate of false alarms decides instead."""
@@ -515,8 +513,6 @@ def _filter_settings_without_labelled_faults(
         max_effective_sample_share, 1.0 / gain_error_overdispersion(usable_flights, model_with_trim_drift)
     )
     return FilterSettings(
-        alarm=_FAULT_PROBABILITY_FOR_ALARM,
-        hold_s=_ALARM_CONFIRMATION_TIME_S,
         **other_laws_settings,
         power=effective_sample_share,
         trim_walk=trim_walk_sd_per_sample,
@@ -892,7 +888,7 @@ def _alarm_rate_and_threshold(
             f"identify: false_alarms_per_hour {requested_false_alarms_per_hour:g}: {reason}, allowed: "
             f"{missing_minutes:.0f} min more"
         )
-    if target_false_alarms_per_hour and (peak_tail or model.vehicle.other_laws):
+    if target_false_alarms_per_hour:
         return target_false_alarms_per_hour, _choose_alarm_threshold(
             peak_tail, target_false_alarms_per_hour, model
         )
@@ -967,12 +963,11 @@ def _gain_variance_between_laws(prior_gain_sd: Floats, squared_gain_deviations: 
 def _choose_alarm_threshold(
     tail: extremes.PeakTail | None, target_false_alarms_per_hour: float, model: Model
 ) -> float:
-    """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
-    lorden_bound_factor = (
-        (1.0 if model.vehicle.moving_air else _LORDEN_BOUND_FACTOR_OTHER_LAWS)
-        if model.vehicle.other_laws
-        else 0.0
-    )
+    """By the tail, or by theory if there is no tail. Under laws of which the parts left out say nothing, by
+    theory if that asks for more."""
+    lorden_bound_factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
+    if model.vehicle.other_laws and not model.vehicle.moving_air:
+        lorden_bound_factor = _LORDEN_BOUND_FACTOR_OTHER_LAWS
     min_threshold = lorden_bound_factor * extremes.threshold_by_lorden_bound(
         model.rate_hz, target_false_alarms_per_hour
     )

@@ -242,15 +242,7 @@ def test_settings_by_hand(fitted):
     stuck = fitting.estimate_filter_settings(
         fitting.flights_with_usable_rows([small.flight(TAIL, 400)]), TAIL
     )
-    assert (
-        stuck.fault_probability_for_alarm,
-        stuck.alarm_confirmation_time_s,
-        stuck.likely_effectiveness_levels_by_group,
-    ) == (
-        0.995,
-        0.3,
-        {},
-    )
+    assert stuck.likely_effectiveness_levels_by_group == {}
     assert 0.0 < stuck.effective_sample_share <= 0.9
     given = settings.model_copy(update={"fault_probability_for_alarm": 0.7})
     usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300)])

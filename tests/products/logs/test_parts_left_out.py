@@ -548,8 +548,7 @@ def test_settings_are_by_law_and_air_and_by_what_labels_say(monkeypatch, laws, a
     bare = fitting.flights_with_usable_rows([small.flight(small.model(small.TAIL | {"signals": []}), 120)])
     for power in (most, 0.25):
         found = fitting.estimate_filter_settings(bare, model).model_dump(by_alias=True)
-        sure = {"alarm": 0.995, "hold_s": 0.3, "trim_walk": walk, "power": power}
-        assert found == usual | more | delays | sure
+        assert found == usual | more | delays | {"trim_walk": walk, "power": power}
     assert [one.model_dump(by_alias=True) for one in asked] == [usual | more | {"trim_walk": walk}] * 2
     flight = small.flight(model, 300, lost=((0, 80, 140, 0.3), (1, 180, 240, 0.6)))
     labelled = fitting.flights_with_usable_rows([flight])
@@ -617,7 +616,7 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
         tail, {"p": pytest.approx(max(wide)), "fit": (2, 3)},
     )  # fmt: skip
     assert ranges.max_column_mistake_log_likelihood_gain == pytest.approx(0.3)
-    threshold = (tail, aimed) if aimed and (tail or laws) else None
+    threshold = (tail, aimed) if aimed else None
     assert found.settings == settings.model_copy(
         update={"false_alarms_per_hour": aimed, "alarm_threshold": threshold}
     )

@@ -10,7 +10,12 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.fitting import fit_model, flights_with_usable_rows, validation_folds
+from beaver_ftc_logs.fitting import (
+    add_fitted_ranges_and_alarm_threshold,
+    fit_model,
+    flights_with_usable_rows,
+    validation_folds,
+)
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
 from beaver_ftc_logs.vehicle import load_vehicle
@@ -57,7 +62,8 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())
     flights = load_flights_for_fit(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
-    model = fit_model(flights_with_usable_rows([one for one in flights if one is not kept]), vehicle)
+    others = flights_with_usable_rows([one for one in flights if one is not kept])
+    model = add_fitted_ranges_and_alarm_threshold(others, fit_model(others, vehicle))
     read = {*model.vehicle.command_column_names, *model.vehicle.signal_column_names}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)

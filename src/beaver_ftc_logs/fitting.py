@@ -95,7 +95,6 @@ _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
 likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
 _MAX_CROSS_VALIDATION_SPLITS, _GROUP_GAIN_STANDARD_ERROR_CAP = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
-_COLUMN_GAIN_STANDARD_ERROR_CAP = 1e3
 _N_PRIOR_CHANGES_FOR_REPAIR_SHARE = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
 _CREDIBLE_MASS_CANDIDATES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
@@ -798,15 +797,11 @@ def add_fitted_ranges_and_alarm_threshold(
         np.sqrt(group_gain_standard_error(rate_regression, model) ** 2 + gain_variance_between_laws),
         _GROUP_GAIN_STANDARD_ERROR_CAP,
     )
-    standard_error_by_rate_or_signal = rate_and_signal_gain_standard_error(
-        rate_regression, model, float(gain_variance_between_laws.max())
-    )
     peak_tail = extremes.fit_peak_tail(held_out.peaks_and_hours)
     fitted_ranges = trust.compute_fitted_ranges(
         samples_and_is_usable_by_flight, model, gain_standard_errors
     ).model_copy(
         update={
-            "gain_standard_error_by_column": standard_error_by_rate_or_signal,
             "alarm_peak_tail": peak_tail,
             "max_column_mistake_log_likelihood_gain": held_out.max_column_mistake_log_likelihood_gain,
         }
@@ -1113,43 +1108,6 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
         else relative_error_sd_of_summed_response,
         _GROUP_GAIN_STANDARD_ERROR_CAP,
     )
-
-
-def rate_and_signal_gain_standard_error(
-    rate_regression: regression.RateRegression, model: Model, gain_variance_between_laws: float
-) -> dict[str, float]:
-    """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
-    `group_gain_standard_error` of a whole response; K coefficients of nothing but errors have the information
-    K. As much wider as the noise of parts left out. gain_variance_between_laws: variance of a gain between
-    laws: a law ties commands to these columns.
-    """
-    max_covariance_inflation = max(
-        (noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0
-    )
-    noise_sd = np.sqrt(np.diag(rate_regression.residual_covariance))
-    standard_error_by_rate_or_signal = {}
-    for name, (past_rows, coefficients) in trust.rows_and_coefficients_without_own_axis(model).items():
-        coefficient_rows = [1 + row for row in past_rows]
-        coefficients_over_standard_errors = coefficients / np.maximum(
-            rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
-        )
-        inverse_coefficient_error_correlation = np.linalg.pinv(
-            rate_regression.coefficient_error_correlation[np.ix_(coefficient_rows, coefficient_rows)],
-            rcond=_RANK_TOLERANCE,
-        )
-        information = np.einsum(
-            "la,lm,ma->",
-            coefficients_over_standard_errors,
-            inverse_coefficient_error_correlation,
-            coefficients_over_standard_errors,
-        ) - np.count_nonzero(coefficients)
-        standard_error_by_rate_or_signal[name] = min(
-            float(
-                np.sqrt(max_covariance_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)
-            ),
-            _COLUMN_GAIN_STANDARD_ERROR_CAP,
-        )
-    return standard_error_by_rate_or_signal
 
 
 def prediction_quality_by_fold(

@@ -20,7 +20,12 @@ _MAX_FILE_BYTES = 20_000_000
 _MAX_COEFFICIENT = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
-_KEYS_WITHOUT_EFFECT = ("correlation", "scale", "minutes")  # of `fitted`, in files of release 1.0.0
+_KEYS_WITHOUT_EFFECT = (
+    "correlation",
+    "scale",
+    "minutes",
+    "column_sd",
+)  # of `fitted`, in files of release 1.0.0
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEFFICIENT, le=_MAX_COEFFICIENT)]
 CoefficientRow = list[Coefficient]
@@ -199,11 +204,6 @@ class FittedRanges(Section):
     )
     group_gain_standard_error: CoefficientRow = Field(
         default=[], description="standard error of each group's gain", alias="gain_sd"
-    )
-    gain_standard_error_by_column: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
-        default={},
-        description="standard error of the gain of what the rates answer to each rate and signal",
-        alias="column_sd",
     )
     longest_unchanged_time_s_by_column: dict[str, Number] = Field(
         default={}, description="longest time each column stood still, s", alias="still_s"

@@ -43,10 +43,9 @@ _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `sca
 _RANGE_QUANTILES = (0.001, 0.999)
 _MEDIAN_CHI_SQUARE_3_DOF = 2.366
 """The median of a square of three axes."""
-MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN, _MIN_COLUMN_GAIN = -0.3, 0.2, 0.5
-"""Gains below which a command works the other way round, or hardly, and another column is another. Of 576
-correct logs with faults of any kind none was below 0.98 and 0.87, in light turbulence 0.93 and 0.99
-(`own_logs.py`, seeds 31 to 42; 71 to 201)."""
+MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
+"""Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
+kind none was below 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
 
 
 def compute_fitted_ranges(
@@ -345,12 +344,11 @@ def refuse_commands_in_other_unit(
 
 class _GainBoundsOverFlight(NamedTuple):
     """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
-    command, (G,), and at most to each column, by its name, there is; and the log likelihood of a sample of
-    each part, (4,), but for what all colours have alike."""
+    command, (G,), there is; and the log likelihood of a sample of each part, (4,), but for what all colours
+    have alike."""
 
     largest_group_gain_upper_bounds: list[float]
     smallest_group_gain_lower_bounds: list[float]
-    largest_gain_upper_bound_by_column: dict[str, float]
     sample_log_likelihood_by_part: Floats
 
 
@@ -479,28 +477,7 @@ def _column_mistake_texts(
             mistakes[f"unit {surface_group_name}"] = (
                 f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
             )
-    if mistaken_columns := [
-        column_name
-        for column_name, column_gain_upper_bound in gain_bounds.largest_gain_upper_bound_by_column.items()
-        if column_gain_upper_bound < _min_plausible_column_gain(model, column_name)
-    ]:
-        mistakes["columns"] = (
-            f"what the rates answer to {', '.join(mistaken_columns)} is not what it is in the model, in all "
-            "of it"
-        )
     return mistakes
-
-
-def _min_plausible_column_gain(model: Model, column_name: str) -> float:
-    """The gain of what the rates answer to a column below which it is another: below what the model's error
-    explains; none where that may be all of it."""
-    gain_standard_error = (
-        model.fitted_ranges.gain_standard_error_by_column.get(column_name, 0.0)
-        if model.fitted_ranges is not None
-        else 0.0
-    )
-    min_gain = 1.0 - regression.BOUND_MARGIN_STANDARD_ERRORS * gain_standard_error
-    return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
 
 
 def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
@@ -652,44 +629,31 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     )
     if (rows_by_part := regression.split_into_parts_for_bounds(np.flatnonzero(is_predictable))) is None:
         return None
-    column_contributions, column_names = _rate_contributions_and_column_names(samples, model)
-    column_contributions = regression.subtract_noise_prediction(
-        column_contributions, model.residual_ar_coefficients(samples.noise_ma_coefficients)
-    )
     (whitening_matrix, effective_sample_share, log_unfiltered_noise_sd_product), n_groups = (
         _whitening_sample_share_and_log_noise(samples, model),
         len(model.groups),
     )
     gain_upper_bounds = np.full(n_groups, -np.inf)
     gain_lower_bounds = np.full(n_groups, np.inf)
-    column_gain_upper_bounds = np.full(len(column_names), -np.inf)
     noise_variance_scales = []
-    responses_and_contributions = np.concatenate([group_responses, column_contributions], axis=1)
     for part_rows in rows_by_part:
         regressors, whitened_targets = _trim_and_gain_regression_data(
-            part_rows, rates_unexplained_by_past, responses_and_contributions, whitening_matrix
+            part_rows, rates_unexplained_by_past, group_responses, whitening_matrix
         )
         part_coefficient_upper_bounds, squared_residuals = (
             regression.coefficient_upper_bounds_and_squared_residuals(
-                regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
+                regressors, whitened_targets, effective_sample_share
             )
         )
         negated_part_coefficient_lower_bounds, _ = regression.coefficient_upper_bounds_and_squared_residuals(
-            -regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
-        )
-        part_upper_bounds_with_columns, _ = regression.coefficient_upper_bounds_and_squared_residuals(
-            regressors, whitened_targets, effective_sample_share
+            -regressors, whitened_targets, effective_sample_share
         )
         gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
         gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
-        column_gain_upper_bounds = np.maximum(
-            column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
-        )  # what the past does is taken off already
         noise_variance_scales.append(_noise_variance_scale(squared_residuals))
     return _GainBoundsOverFlight(
         gain_upper_bounds.tolist(),
         gain_lower_bounds.tolist(),
-        dict(zip(column_names, column_gain_upper_bounds.tolist(), strict=True)),
         -log_unfiltered_noise_sd_product - 1.5 * np.log(noise_variance_scales),
     )
 
@@ -703,40 +667,6 @@ def _relative_group_command_motion(samples: Samples, model: Model, group: list[s
         _range_widths(model.fitted_ranges.command_ranges), MIN_DIVISOR
     )
     return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
-
-
-def _rate_contributions_and_column_names(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
-    """Compute the contribution of each column to each predicted sample: rates of the other axes, and signals,
-    (n, C, 3); and their names."""
-    n_signal_lags = model.vehicle.n_signal_lags(model.n_rate_lags)
-    past_regressors, _, _ = regression.build_regressors(
-        samples, [[0]], model.n_rate_lags, 1, False, n_signal_lags
-    )
-    rows_and_coefficients_by_column = rows_and_coefficients_without_own_axis(model)
-    return np.stack(
-        [
-            past_regressors[:, rows] @ coefficients
-            for rows, coefficients in rows_and_coefficients_by_column.values()
-        ],
-        axis=1,
-    ), list(rows_and_coefficients_by_column)
-
-
-def rows_and_coefficients_without_own_axis(model: Model) -> dict[str, tuple[list[int], Floats]]:
-    """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
-    rate on its own axis."""
-    rate_column_names = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-    column_name_of_row = (
-        rate_column_names * model.n_rate_lags
-        + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(model.n_rate_lags)
-    )
-    coefficients = np.array(model.lagged_rate_and_signal_coefficients)
-    rows_by_column_name = dict[str, list[int]]()
-    for row, name in enumerate(column_name_of_row):
-        rows_by_column_name.setdefault(name.removesuffix(" by airspeed"), []).append(row)
-        if row < 3 * model.n_rate_lags:
-            coefficients[row, row % 3] = 0.0
-    return {name: (rows, coefficients[rows]) for name, rows in rows_by_column_name.items()}
 
 
 def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:

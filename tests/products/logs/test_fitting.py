@@ -442,10 +442,6 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
         fitting.trust, "effect_share_explained_by_other_regressors", lambda used, model: np.zeros(2)
     )
 
-    monkeypatch.setattr(
-        fitting, "rate_and_signal_gain_standard_error", lambda fit, model, between: {"p": between}
-    )
-
     def copied(known):
         return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))
 
@@ -471,7 +467,6 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
         "alarm_peak_tail": None,
         "max_column_mistake_log_likelihood_gain": 0.6,
         "of": [0.25],
-        "gain_standard_error_by_column": {"p": 0.0},
     }
     assert found["fitted_ranges"].known == expected
     assert found["settings"] == {"false_alarms_per_hour": None, "alarm_threshold": None}

@@ -45,7 +45,7 @@ def test_the_model_itself_is_one(tmp_path):
 
 def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):
     former = [
-        (("fitted", key), value) for key, value in (("correlation", [[1.0]]), ("scale", 2), ("minutes", 9))
+        (("fitted", key), value) for key, value in (("correlation", [[1.0]]), ("scale", 2), ("column_sd", {}))
     ]
     assert load_model(written(tmp_path, *former)) == load_model(written(tmp_path))
 

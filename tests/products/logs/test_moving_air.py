@@ -422,11 +422,10 @@ def test_noise_by_which_parts_are_compared_is_that_of_the_fit():
 BEFORE = np.array([[[0.4, 0.05, -0.03], [0.02, 0.3, 0.07], [-0.06, 0.01, 0.2]]])
 
 
-def by_parts(model, flight, columns, every=1):
-    """Of each quarter of the flight: least squares on trims, answers and columns, four errors either way,
-    and the squares of what is left, by the symmetric root of the noise."""
-    ok, left, answers = unexplained_rates_and_responses(flight, model)
-    shown = np.concatenate([answers, columns], axis=1)
+def by_parts(model, flight, every=1):
+    """Of each quarter of the flight: least squares on trims and answers, four errors either way, and the
+    squares of what is left, by the symmetric root of the noise."""
+    ok, left, shown = unexplained_rates_and_responses(flight, model)
     rows = np.array([k for k in np.flatnonzero(ok) if k and ok[k - 1]])[::every]
     size, turn = np.linalg.eigh(np.array(model.noise_models[0].residual_covariance))
     root = turn @ np.diag(size**-0.5) @ turn.T
@@ -443,25 +442,19 @@ def by_parts(model, flight, columns, every=1):
 
 
 def test_what_answers_in_every_part_of_a_flight_is_by_least_squares_of_each(monkeypatch):
-    """The largest of upper and the least of lower bounds; of columns beside the answers, which leave the
-    bounds of these as they are. A scale by the median of three squares, which is 2.366 of a right one."""
+    """The largest of upper and the least of lower bounds. A scale by the median of three squares, which is
+    2.366 of a right one."""
     model, _ = in_colour(BEFORE)
     colours = [model.noise_models[0].model_copy(update={"covariance_inflation": 1.7})]
     settings = model.settings.model_copy(update={"effective_sample_share": 0.8})
     model = model.model_copy(update={"noise_models": colours, "settings": settings})
     flight = small.flight(model, 421, gap=130, lost=((0, 0, 420, 0.7), (1, 200, 300, 0.2)))
     flight = replace(flight, noise_ma_coefficients=(1.0,))
-    columns, names = trust._rate_contributions_and_column_names(flight, model)
-    bare = [*by_parts(model, flight, columns[:, :0])]
-    beside = [*by_parts(model, flight, columns)]
+    bare = [*by_parts(model, flight)]
     found = trust._bound_gains_over_flight_parts(flight, model)
     lows, highs = (np.array([part[i] for part in bare]) for i in (1, 2))
     np.testing.assert_allclose(found.largest_group_gain_upper_bounds, highs.max(axis=0), rtol=1e-6)
     np.testing.assert_allclose(found.smallest_group_gain_lower_bounds, lows.min(axis=0), rtol=1e-6)
-    tops = 1.0 + np.max([part[2][2:] for part in beside], axis=0)
-    assert found.largest_gain_upper_bound_by_column == {
-        name: pytest.approx(top, rel=1e-6) for name, top in zip(names, tops, strict=True)
-    }
     scales = [np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366 for part in bare]
     noise = 0.5 * np.linalg.slogdet(colours[0].residual_covariance)[1]
     np.testing.assert_allclose(found.sample_log_likelihood_by_part, -noise - 1.5 * np.log(scales))
@@ -472,10 +465,7 @@ def test_what_answers_in_every_part_of_a_flight_is_by_least_squares_of_each(monk
     monkeypatch.setattr(trust, "_MAX_COMPARED_SAMPLES", 130)  # of 413 every third
     monkeypatch.setattr("beaver_ftc_logs.regression._MIN_PART_ROWS_FOR_BOUNDS", 34)
     likely, count = trust._part_log_likelihoods_and_sample_count(flight, model)
-    scales = [
-        np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366
-        for part in by_parts(model, flight, columns[:, :0], 3)
-    ]
+    scales = [np.median(part[3].reshape(-1, 3).sum(axis=1)) / 2.366 for part in by_parts(model, flight, 3)]
     np.testing.assert_allclose(likely, -noise - 1.5 * np.log(scales))
     assert count == pytest.approx(34 * 0.8 / 1.7)
     monkeypatch.setattr("beaver_ftc_logs.regression._MIN_PART_ROWS_FOR_BOUNDS", 35)

@@ -444,20 +444,6 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     assert trust._likelier_column_mistake_text("as it is", small.model()) is None
 
 
-def test_what_each_column_brings_to_the_axes_of_others():
-    """Of a rate what its past does to other axes than its own; of a signal what it does to all."""
-    model = small.model(small.TAIL)
-    flown = small.flight(model, n=7)
-    found, names = trust._rate_contributions_and_column_names(flown, model)
-    past, rates = np.array(model.lagged_rate_and_signal_coefficients), flown.rates
-    assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
-    for k in range(2, 7):
-        for i in range(3):
-            brought = rates[k - 1, i] * past[i] + rates[k - 2, i] * past[3 + i]
-            np.testing.assert_allclose(found[k, i], np.where(np.arange(3) == i, 0.0, brought))
-        np.testing.assert_allclose(found[k, 3], flown.signals[k - 1, 0] * past[6])
-
-
 @pytest.mark.parametrize(
     ("most", "least", "moved", "says"),
     [
@@ -470,7 +456,7 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
     monkeypatch.setattr(trust, "_relative_group_command_motion", lambda samples, model, group: moved)
     model = SimpleNamespace(groups=[["right", "left"]], fitted_ranges=None)
-    found = trust._GainBoundsOverFlight([most], [least], {"V": 0.5, "p": 0.6}, np.zeros(4))
+    found = trust._GainBoundsOverFlight([most], [least], np.zeros(4))
     wrong = trust._column_mistake_texts(None, model, found)
     if not says:
         assert wrong == {}
@@ -478,31 +464,23 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     ((what, line),) = wrong.items()
     assert what == ("sign right+left" if says == "sign" else "unit right+left")
     assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
-    faint = trust._column_mistake_texts(
-        None, model, found._replace(largest_gain_upper_bound_by_column={"V": 0.49, "p": 0.5})
-    )
-    assert list(faint) == [what, "columns"]
-    assert "answer to V is not" in faint["columns"]
 
 
-@pytest.mark.parametrize(
-    ("sd", "refused"), [(0.1, ["sign wing", "unit wing", "columns"]), (0.25, ["sign wing"])]
-)
+@pytest.mark.parametrize(("sd", "refused"), [(0.1, ["sign wing", "unit wing"]), (0.25, ["sign wing"])])
 def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkeypatch, sd, refused):
     """Four standard errors of a quarter: by such a model a sound log answers with a gain of 0.19, too."""
     monkeypatch.setattr(trust, "_relative_group_command_motion", lambda samples, model, group: 3.1)
     known = SimpleNamespace(
         effect_share_explained_by_other_regressors=[0.9],
         group_gain_standard_error=[sd],
-        gain_standard_error_by_column={"V": sd},
     )
     model = SimpleNamespace(groups=[["wing"]], fitted_ranges=known, vehicle=SimpleNamespace(other_laws=True))
     found: dict[str, str] = {}
     for most in (-0.31, 0.19):
         found |= trust._column_mistake_texts(
-            None, model, trust._GainBoundsOverFlight([most], [0.0], {"V": 0.1}, np.zeros(4))
+            None, model, trust._GainBoundsOverFlight([most], [0.0], np.zeros(4))
         )
-    assert [what for what in ("sign wing", "unit wing", "columns") if what in found] == refused
+    assert list(found) == refused
 
 
 def test_of_a_rate_without_a_number_no_unit_is_judged():
@@ -658,14 +636,6 @@ def test_under_any_law_a_gain_is_known_where_four_errors_are_less_than_it(laws, 
     assert trust.is_group_gain_known(bare) == [share < 0.98 for share in tied]
 
 
-@pytest.mark.parametrize(("sd", "least"), [
-    (None, 0.5), ({}, 0.5), ({"V": 0.1}, 0.5), ({"V": 0.15}, 0.4), ({"V": 0.25}, -np.inf), ({"p": 0.2}, 0.5),
-])  # fmt: skip
-def test_a_column_is_another_below_half_of_its_gain_and_below_what_errors_explain(sd, least):
-    model = small.model(**({} if sd is None else {"fitted": {"commands": [], "rates": [], "column_sd": sd}}))
-    assert trust._min_plausible_column_gain(model, "V") == pytest.approx(least)
-
-
 def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
     """The likelier of the model's two colours is asked; of the others those that are likelier still have a
     say, and what all of them find is told."""
@@ -690,7 +660,7 @@ def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
     def bounds(flight, of):
         asked.append((flight.by, len(of.noise_models)))
         parts = likely[flight.by]
-        return parts and trust._GainBoundsOverFlight([], [], {"by": flight.by}, np.array(parts))
+        return parts and trust._GainBoundsOverFlight(flight.by, [], np.array(parts))
 
     monkeypatch.setattr(
         trust, "_part_log_likelihoods_and_sample_count", lambda flight, of: (np.array(likely[flight.by]), 9.0)
@@ -699,7 +669,7 @@ def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
     monkeypatch.setattr(
         trust,
         "_column_mistake_texts",
-        lambda flight, of, by: wrong[by.largest_gain_upper_bound_by_column["by"]],
+        lambda flight, of, by: wrong[by.largest_group_gain_upper_bounds],
     )
     told = []
     monkeypatch.setattr(
@@ -720,22 +690,3 @@ def test_a_mistake_is_one_by_each_colour_that_is_likelier(monkeypatch):
     assert told == [((1.0, 0.2), [1.0, 0.2])]
     nothing = {"commands": [], "rates": [], "tied": [1.0, 0.99]}
     trust.refuse_columns_not_as_identified(log, small.model(colours=colours, fitted=nothing))
-
-
-def test_a_column_has_its_rows_of_every_lag_and_what_the_airspeed_makes_of_it():
-    """In moving air signals have as many lags as rates; a rate tells nothing of its own axis."""
-    air = {"signals": ["a", "b"], "airspeed": "tas", "reference_airspeed_mps": 30.0, "moving_air": True}
-    vehicle = small.vehicle(small.TAIL | air)
-    past = np.random.default_rng(3).uniform(0.1, 0.9, (6 + 2 * 7, 3))
-    model = SimpleNamespace(vehicle=vehicle, n_rate_lags=2, lagged_rate_and_signal_coefficients=past.tolist())
-    found = trust.rows_and_coefficients_without_own_axis(model)
-    rows = {
-        "p_rad_s": [0, 3, 8, 15], "q_rad_s": [1, 4, 9, 16], "r_rad_s": [2, 5, 10, 17],
-        "a": [6, 11, 13, 18], "b": [7, 12, 14, 19],
-    }  # fmt: skip
-    assert {name: places for name, (places, _) in found.items()} == rows
-    for name, (places, values) in found.items():
-        expected = past[places]
-        if name in ("p_rad_s", "q_rad_s", "r_rad_s"):
-            expected[:2, "pqr".index(name[0])] = 0.0
-        np.testing.assert_array_equal(values, expected)

@@ -78,6 +78,8 @@ CANNOT = {
     "thrust by no setting": {"engine": {"thrust": THRUST}, "trim": {"throttle": "a/b"}},
     "thrust below the setting": {"engine": {"thrust": THRUST | {"setting": [-1, 900, 2000]}}},
     "thrust above the setting": {"engine": {"thrust": THRUST | {"setting": [0, 900, 3001]}}},
+    "thrust of a row too few": {"engine": {"thrust": THRUST | {"force_n": [[-9, 7, 80]]}}},
+    "thrust that falls": {"engine": {"thrust": THRUST | {"force_n": [[-9, 7, 80], [-30, 5, 4]]}}},
     "thrust of no mass": {"engine": {"thrust": THRUST}, "mass": {"mass_kg": None}, "forces": None},
     "writing": {"trim": {"throttle": "simulation/do_linearization"}},
 }

@@ -70,7 +70,7 @@ def test_what_is_known_of_turbulence_by_its_severity(severity):
     slopes = [3.0 * low**2 / h / of**2 for of in (pitching, yawing)]
     assert walks_low == pytest.approx([2.0 * roll_low**2 / length, *slopes])
     assert air.velocity_walk(V, 1.7) == pytest.approx(3.0 * sigma**2 * 1.7 * V / 533.4)
-    assert air.velocity_walk(V) == pytest.approx(air.angle_walk(V) * V**2)
+    assert air.velocity_walk(V, 1.0) == pytest.approx(air.angle_walk(V) * V**2)
     assert air.angle_walk(V) == pytest.approx(3.0 * sigma**2 / (533.4 * V))
     if air.moves:
         assert low**2 / air.low_m == pytest.approx(sigma**2 / 533.4)

@@ -81,7 +81,7 @@ def test_a_replayed_alarm_is_as_late_as_a_flown_one():
     played = Recording(SimpleNamespace(dt_s=0.02), seen, np.zeros(300), Onset(4.995, RATE_HZ))
     replayed = trace(played, np.where(np.arange(300) >= 255, 2.0, 0.0))
     assert replayed.delay_s() == measure(flight(5.1)).detection.delay_s == 0.1
-    assert not replayed.false_alarm()
+    assert not replayed.false_alarm(1.0)
 
 
 def test_a_truth_without_frames_begins_when_it_is_said_to():

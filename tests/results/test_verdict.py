@@ -303,6 +303,7 @@ def test_in_colour_what_is_missed_is_red_and_names_stand_out():
     assert any("\x1b[1;31mMISSED" in line for line in lines)
     assert any("\x1b[32mmet" in line for line in lines)
     assert "\x1b[1m" in lines[-1]
+    assert "\x1b[1;36m" not in "".join(lines), "numbers are not coloured as numbers"
     long = flown(scenario="a" * 200, passed=True)
     assert "\x1b[1;32m" in verdict.verdict_text(Metrics.of(long), "x", colour=True)
 

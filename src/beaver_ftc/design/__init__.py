@@ -140,7 +140,7 @@ class Dryden:
         """
         return _rotation_walk(self.low_sigma_mps, 1.0, span_m)
 
-    def velocity_walk(self, airspeed_mps: float, faster: float = 1.0) -> float:
+    def velocity_walk(self, airspeed_mps: float, faster: float) -> float:
         """Intensity, m2/s3, of the random walk that a vertical or lateral gust is over short times, for an
         aircraft so many times faster than this airspeed: 3 sigma_w^2 V / L [MIL-F-8785C, 3.7.1]."""
         return 3.0 * self.sigma_mps**2 * faster * airspeed_mps / SCALE_M

@@ -37,10 +37,10 @@ class Stopped(SystemExit):
 NO_FAILURE = (BeaverFtcError, KeyboardInterrupt, Stopped)  # of a plug-in: what passes through its code
 
 
-def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+def suggestion(given: str, known: Iterable[str]) -> str:
     """`, did you mean x?` if something known is near to what was given, and what is allowed."""
     names = list(known)
-    return hint(nearest(given, names, cutoff), names)
+    return hint(nearest(given, names), names)
 
 
 def hint(near: str | None, known: Iterable[str]) -> str:

@@ -175,9 +175,10 @@ def as_text(found: list[Quality]) -> str:
     lines = []
     for start in range(0, len(found), len(LIMITS)):
         row = found[start : start + len(LIMITS)]
-        ended = " at the end" if row[0].where == "at the end" else ""
+        first, *_ = row
+        ended = " at the end" if first.where == "at the end" else ""
         cells = [f"{number(each.value)} ({said(each.level)})" for each in row]
-        lines.append([f"{row[0].airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
+        lines.append([f"{first.airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
     clauses = ", ".join(dict.fromkeys(f"{each.clause} {each.table}".strip() for each in LIMITS))
     says = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
     return f"{aligned([*head, *lines])}\n\n{says}"

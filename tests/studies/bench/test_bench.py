@@ -78,7 +78,7 @@ def published():
 @pytest.mark.parametrize("at_s", [measure.BEFORE_ALARM_S, measure.AFTER_ALARM_S])
 def test_the_bare_aircraft_starts_where_the_loop_does_and_stays_in_the_envelope(published, at_s):
     loop = ClosedLoop(published, at_s)
-    bare = Bare(take_over(published, at_s))
+    bare = Bare(take_over(published, at_s), 1)
     bare.prepare()
     loop.prepare()
     assert state_of(bare.plant) == state_of(loop.loop.plant)

@@ -72,7 +72,7 @@ def test_a_machine_is_said_by_its_processors_name_or_by_its_kind(lines, said, mo
 def test_what_a_benchmark_times_and_says(timed, monkeypatch, changed):
     said, kinds = [], []
     monkeypatch.setattr(measure, "by_kind", lambda rounds: kinds.append(rounds) or {"kind": {}})
-    document = measure.bench(24, say=said.append)
+    document = measure.bench(24, True, said.append)
     machine = document.pop("machine")
     assert set(machine) == {"processor", "cores", "python", "jsbsim", "numba", "numpy", "native_properties"}
     assert (list(document["parts"]), kinds) == (["calling", *PARTS], [24])
@@ -81,7 +81,6 @@ def test_what_a_benchmark_times_and_says(timed, monkeypatch, changed):
     short = measure.bench(6, with_parts=False)
     assert short["parts"] == short["before_alarm"]["parts"] == {}
     assert [(len(one["who"]), one["rounds"]) for one in timed] == [(2, 6), (2, 6), (6, 3), (3, 3)]
-    assert measure.bench.__defaults__[0] == 60
 
 
 def test_kinds_of_flights_take_turns_after_a_warm_up(monkeypatch, changed):
@@ -168,5 +167,5 @@ def test_jsbsim_alone_runs_so_often_a_frame_from_the_moment_on():
         bare.prepare()
         bare.fly(4)
         assert bare.plant.read("simulation/sim-time-sec") == pytest.approx(0.01 * 4 * runs)
-    Bare(moment).fly(2)
+    Bare(moment, 1).fly(2)
     assert bare.plant.read("simulation/sim-time-sec") == pytest.approx(0.14)

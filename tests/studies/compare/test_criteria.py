@@ -115,7 +115,7 @@ def law(monkeypatch):
     monkeypatch.setattr(criteria, "flights", lambda *_: CASES)
     monkeypatch.setattr(criteria, "yardsticks", lambda *_: ((1.0, 2.0, 4.0, 1.0), 2.0))
     monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
-    return LawCost("lqr", "exact", None)
+    return LawCost("lqr", "exact", None, 0)
 
 
 def test_a_law_costs_its_error_over_the_oracles(law, monkeypatch):
@@ -209,5 +209,5 @@ def test_the_yardsticks_are_the_oracle_and_the_default_law(monkeypatch):
     """On the faulted flights alone."""
     monkeypatch.setattr(criteria, "flights", lambda *_: CASES[:3])
     asked = given(monkeypatch, [replace(SOUND, rms_deg_s=3.0), SOUND, SOUND, SOUND])
-    assert criteria.yardsticks.__wrapped__("exact", None) == ((3.0, 2.0), 2.0)
+    assert criteria.yardsticks.__wrapped__("exact", None, 0) == ((3.0, 2.0), 2.0)
     assert [entry.law for entry, _, _ in asked] == [ORACLE, ORACLE, LAW, LAW]

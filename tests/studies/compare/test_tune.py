@@ -163,7 +163,7 @@ def test_a_class_that_says_nothing_has_nothing_to_tune(monkeypatch):
 
 def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     with pytest.raises(BadInput, match="nothing to tune"):
-        tune([], 5, 1, None, 1, None)
+        tune([], 5, 1, None, 1, None, 0)
     (tmp_path / "a.json").write_text('{"grades": {"windy": {}}}')
     for name in ("a.json", "nowhere.json"):
         with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):

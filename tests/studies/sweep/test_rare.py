@@ -362,7 +362,7 @@ def test_a_flight_that_cannot_be_flown_is_no_event(biased, monkeypatch):
 
 @pytest.mark.parametrize("flown_first", [True, False])
 def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
-    biased, tmp_path, monkeypatch, flown_first
+    biased, tmp_path, monkeypatch, flown_first, capsys
 ):
     """Two flights of which one fails, then one that is flown: as many failures as flights of this round."""
 
@@ -376,7 +376,8 @@ def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
         assert [of.tolist() for of in scores] == [[-1.0, -2.0], [-1.0]]
 
     monkeypatch.setattr(Chains, "go", go)
-    monkeypatch.setattr(rare, "in_rounds", lambda *of: contextlib.nullcontext(flies))
+    asked = []
+    monkeypatch.setattr(rare, "in_rounds", lambda *of: asked.append(of) or contextlib.nullcontext(flies))
     monkeypatch.setattr(rare, "_document", lambda sweep, expectation, chains, failed: {"failed": failed})
     told = []
     if not flown_first:
@@ -386,6 +387,10 @@ def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
         return
     assert run_rare(biased, EXPECTATION, tmp_path, tell=told.append)["failed"] == 1
     assert [line.partition(": ")[2] for line in told] == ["2 flights, level 0", "1 flights, level 0"]
+    ((of, out, workers),) = asked
+    assert (out, workers, of.follows_from[1:]) == (tmp_path, 1, [rare.RUNS, rare.MEMBERS])
+    assert of.lost(None, "was killed") == {"score": -math.inf, "failed": True}
+    assert "of a flight was killed; such flights count as no event" in capsys.readouterr().err
 
 
 def test_the_design_point_is_the_nearest_event_by_the_number_of_its_flight():

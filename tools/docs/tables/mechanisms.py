@@ -47,7 +47,7 @@ _PICTURED = (
 @shared
 def _flown() -> tuple[Document, bytes]:
     with TemporaryDirectory() as name:
-        document = run_mechanisms(Path(name), seed=SEED, workers=2)
+        document = run_mechanisms(Path(name), DRAWS, SEED, workers=2)
         return document, Path(document["folder"], f"{shown.NAME}.png").read_bytes()
 
 

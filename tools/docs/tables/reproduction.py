@@ -106,7 +106,7 @@ MANY = 10  # settings of a row that are written only once, if several rows have 
 
 @shared
 def _document() -> Document:
-    return reproduced()[0]
+    return reproduced(2)[0]
 
 
 def reproduction_headline() -> str:

@@ -128,7 +128,7 @@ class ClosedLoop:
 class Bare:
     """JSBSim alone: an aircraft from a moment on, surfaces held, nothing read, nothing written."""
 
-    def __init__(self, moment: Moment, runs: int = 1) -> None:
+    def __init__(self, moment: Moment, runs: int) -> None:
         self.plant, self._moment, self._runs = moment.plant, moment, runs
 
     def prepare(self) -> None:

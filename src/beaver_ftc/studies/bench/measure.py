@@ -45,7 +45,7 @@ LONG_FLIGHT_S = 330.0  # two row groups of the log file
 Say = Callable[[str], None]
 
 
-def bench(rounds: int = 60, with_parts: bool = True, say: Say = lambda text: None) -> Document:
+def bench(rounds: int, with_parts: bool, say: Say = lambda text: None) -> Document:
     """Time everything; the document of `bench --format json`. `say` is told what is being done.
 
     The figures at the top are those after the alarm: every estimator, the network and the fault-tolerant law

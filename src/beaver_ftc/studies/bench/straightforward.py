@@ -181,7 +181,7 @@ class FeedbackLinearisation:
 class Straightforward:
     """A contender: flies a scenario from `at_s` on, as the loop does."""
 
-    def __init__(self, scenario: Scenario, at_s: float = 0.0, frames: int = 1000) -> None:
+    def __init__(self, scenario: Scenario, at_s: float, frames: int) -> None:
         self.scenario, self.at_s = scenario, at_s
         self.start = take_over(scenario, at_s)
         self.plant = self.start.plant

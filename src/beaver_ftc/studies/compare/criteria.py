@@ -120,7 +120,7 @@ def delay_cost(delay_s: float) -> float:
 class LawCost:
     """J of a law, with what makes a candidate inadmissible."""
 
-    def __init__(self, name: str, grade: str, most: int | None, draw: int = 0) -> None:
+    def __init__(self, name: str, grade: str, most: int | None, draw: int) -> None:
         self._entry = Entry(SCHEME, name)
         self._cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
         self._oracle, self._effort_allowed = yardsticks(grade, most, draw)
@@ -180,7 +180,7 @@ def _ratio(result: Result, oracle_deg_s: float) -> float:
 
 
 @cache
-def yardsticks(grade: str, most: int | None, draw: int = 0) -> tuple[tuple[float, ...], float]:
+def yardsticks(grade: str, most: int | None, draw: int) -> tuple[tuple[float, ...], float]:
     """Of each faulted flight the oracle's error, deg/s; and the default law's RMS surface rate, deg/s."""
     cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
     oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)

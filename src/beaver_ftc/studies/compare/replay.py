@@ -55,11 +55,11 @@ class Trace:
     us: float = 0.0
     rises: tuple[tuple[float, float], ...] = ()
 
-    def fault_free_s(self, level: float = 1.0) -> float:
+    def fault_free_s(self, level: float) -> float:
         """Time in which an alarm would have been false: until the fault, the end or the alarm itself."""
         return next((at_s for at_s, value in self.rises if value > level), self.healthy_s)
 
-    def false_alarm(self, level: float = 1.0) -> bool:
+    def false_alarm(self, level: float) -> bool:
         """Whether it raises an alarm without a fault, at this level of the statistic."""
         return self.before > level
 

@@ -94,7 +94,7 @@ def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str
 
 def tune(
     methods: Sequence[Method], trials: int, seed: int, most: int | None, workers: int,
-    progress: Progress | None, draw: int = 0,
+    progress: Progress | None, draw: int,
 ) -> Document:  # fmt: skip
     """The document of tuned.json. most: flights of each calibration sweep; None is all of them.
 

@@ -210,7 +210,7 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
         shutil.rmtree(kept, ignore_errors=True)
 
 
-def fly_all(fly: Fly, cases: Sequence[Any], workers: int = 1, progress: Progress | None = None) -> list[Any]:
+def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
     return _all_rows(fly, cases, workers, progress)
 

@@ -18,7 +18,7 @@ from beaver_ftc.studies.mechanisms.survey import DRAWS, cases_of, fly_one, margi
 
 
 def run_mechanisms(
-    out: Path, draws: int = DRAWS, seed: int = 1, workers: int = 1, progress: Progress | None = None
+    out: Path, draws: int, seed: int, workers: int, progress: Progress | None = None
 ) -> Document:
     """Write `out/mechanisms/`; return the document."""
 

@@ -283,14 +283,14 @@ FILES: Makers = {
 }
 
 
-def reproduce(out: Path, workers: int = 2, progress: Progress | None = None) -> Document:
+def reproduce(out: Path, workers: int, progress: Progress | None = None) -> Document:
     """Write `out/reproduction/` (tables as JSON, Markdown and HTML, and the figures); return the document."""
     study = Study(NAME, STUDIED, row_of, _found, FILES, row=list[float])
     document: Document = run_study(study, out, workers, progress)[0]
     return document
 
 
-def reproduced(workers: int = 2) -> tuple[Document, Flights]:
+def reproduced(workers: int) -> tuple[Document, Flights]:
     """The document and the flights of its figures, kept nowhere."""
     return _found(fly_all(row_of, STUDIED, workers))
 

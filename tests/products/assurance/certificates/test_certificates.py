@@ -671,3 +671,17 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)
     assert said["sides"] == pytest.approx([8.0, 4.7])
+
+
+def test_an_engines_reading_is_held_against_its_command_alone():
+    """There is no filter: one look, with the error of the reading itself, and rounding."""
+    watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=3, size=0.3)
+    number, redundancy = TESTS.index("manifold_pressure"), watch["redundancy"]
+    watch["output"]["worst_test_index"], watch["output"]["worst_residual_bound_ratio"] = number, 1.2
+    redundancy["memory"]["commanded_engine_readings"] = 1800.0, 20.0
+    redundancy["memory"]["reading_error_bound"][SENSORS.index("manifold_pressure")] = 0.4
+    redundancy["test"]["residual"][number] = -0.5
+    said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
+    assert said["test"] == "manifold_pressure"
+    assert said["looks"] == [pytest.approx([20.0, 19.5, 0.4 + 1e-6], abs=1e-12)]
+    assert said["sides"] == pytest.approx([0.5, 0.4 + 1e-6], abs=1e-12)

@@ -420,3 +420,33 @@ def test_a_flight_that_fails_says_how(tmp_path, monkeypatch, error, status, why)
     row = fly_flight(plan, plan.cases[1])
     assert (row["flight"], row["status"], row["why"]) == ("other", status, why)
     assert [each["verdict"] for each in row["found"]["A"]] == [NOT_SHOWN]
+
+
+@pytest.mark.parametrize("faults", [(), ("a fault",)])
+def test_handling_is_held_against_each_limit_of_its_level(monkeypatch, faults):
+    """Where a flight with a fault ended, or where one without is trimmed; ends that are none are left out."""
+    limits = [
+        SimpleNamespace(
+            mode=mode,
+            quantity="damping",
+            levels=((9.0, 9.5), levels),
+            margin=lambda value, level: value - level,
+        )
+        for mode, levels in (("roll", (0.2, inf)), ("spiral", (-inf, 0.7)))
+    ]
+    qualities = [SimpleNamespace(value=2.5, level=2), SimpleNamespace(value=inf, level=4)]
+    monkeypatch.setattr(bf.studies, "HANDLING_LIMITS", limits, raising=False)
+    monkeypatch.setattr(
+        bf.studies, "where_ended", lambda scenario, end: faults and end == "end" and qualities
+    )
+    monkeypatch.setattr(bf.studies, "where_trimmed", lambda scenario: None if faults else qualities)
+    asked = SimpleNamespace(bar=SimpleNamespace(level=2), scenario=SimpleNamespace(faults=faults))
+    found = flown._of_handling(
+        asked.bar, asked.scenario, SimpleNamespace(departure=None), SimpleNamespace(end="end")
+    )
+    assert [tuple(row.values()) for row in found] == [
+        ("roll damping", {"at_least": 0.2, "level": 2}, 2.5, MET, 0.5, "level 2"),
+        ("spiral damping", {"at_most": 0.7, "level": 2}, None, NOT_MET, None, "no level"),
+    ]
+    (lost,) = flown._of_handling(asked.bar, asked.scenario, SimpleNamespace(departure="x"), None)
+    assert (lost["verdict"], lost["says"]) == (NOT_SHOWN, "the aircraft was lost")

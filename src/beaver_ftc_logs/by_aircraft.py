@@ -7,6 +7,7 @@ outside the aircraft's envelope, after a gap, and where a number is missing.
 """
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,7 +85,8 @@ class AircraftDiagnosisInputs:
     rates_signals_commands_attitude: one array (n, ...) each, as `stepped.log_column_names_of_each_input`.
     mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
     rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
-    which the diagnosis is stepped without a reset."""
+    which the diagnosis is stepped without a reset. full_deflection_rad (S,): what a command of 1 is in the
+    log."""
 
     samples: Samples
     diagnosis: "Diagnosis"
@@ -93,6 +95,7 @@ class AircraftDiagnosisInputs:
     mean_age_s_by_held_column: dict[str, float]
     has_missing_value: Mask
     gap_free_stretches: list[tuple[int, int]]
+    full_deflection_rad: Floats
 
 
 def read_diagnosis_inputs(
@@ -133,6 +136,7 @@ def read_diagnosis_inputs(
         mean_age_s_by_held_column,
         has_missing_value,
         gap_free_stretches,
+        _full_deflection_rad(vehicle, diagnosed_aircraft.aircraft),
     )
 
 
@@ -153,6 +157,7 @@ def diagnose_aircraft_inputs(
     rows = _rows_of_replayed_flight(aircraft_inputs, aircraft, replayed_flight_verdicts)
     if rows.has_credible_alarm():
         _refuse_reversed_command_without_alarm(aircraft_inputs, aircraft, replayed_flight_verdicts, rows)
+        _refuse_exchanged_commands_without_alarm(aircraft_inputs, aircraft, rows)
     return rows, _verdict_document(
         samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
     )
@@ -223,6 +228,44 @@ def _refuse_reversed_command_without_alarm(
             )
 
 
+def _refuse_exchanged_commands_without_alarm(
+    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, rows: DiagnosisRows
+) -> None:
+    """Raise BadInput if the log has no alarm once two commands are exchanged."""
+    rates, signals, _, attitude = aircraft_inputs.rates_signals_commands_attitude
+    for first, second in combinations(range(len(aircraft.surfaces)), 2):
+        order = np.arange(len(aircraft.surfaces))
+        order[[first, second]] = second, first
+        exchanged_commands = aircraft_inputs.samples.commands[:, order] * aircraft_inputs.full_deflection_rad
+        corrected_inputs = replace(
+            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, exchanged_commands, attitude]
+        )
+        if _raises_any_alarm(corrected_inputs):
+            continue
+        corrected_rows = _rows_of_replayed_flight(
+            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
+        )
+        if corrected_rows.are_healthy_where_credible_in(rows):
+            raise BadInput(
+                f"{aircraft_inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
+                f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
+                f"{aircraft.name}"
+            )
+
+
+def _raises_any_alarm(aircraft_inputs: AircraftDiagnosisInputs) -> bool:
+    """Whether an alarm is raised in any stretch; nothing after it is replayed."""
+    for begin, end in aircraft_inputs.gap_free_stretches:
+        aircraft_inputs.diagnosis.reset()
+        arrays = [
+            np.ascontiguousarray(array[begin:end])
+            for array in aircraft_inputs.rates_signals_commands_attitude
+        ]
+        if any(aircraft_inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
+            return True
+    return False
+
+
 def _check_command_signs(
     flight_name: str, aircraft: Aircraft, replayed_verdicts_by_stretch: list[ReplayedVerdicts]
 ) -> None:
@@ -273,6 +316,10 @@ def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
     return [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
 
 
+def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
+    return np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
+
+
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
     first_times_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
@@ -313,7 +360,7 @@ def _read_sample_inputs(
         *signals_beyond_flow,
     ]
     surface_indices = _vehicle_surface_indices(vehicle, aircraft)
-    full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
+    full_deflection_rad = _full_deflection_rad(vehicle, aircraft)
     attitude = np.zeros_like(samples.rates)
     if needs_attitude:
         for axis, angle_name in enumerate(_ATTITUDE_ANGLE_NAMES):

@@ -181,7 +181,7 @@ def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_
 ):
     """Gyro noise hides the sign in each second. The turned log of a lost surface has an alarm too."""
     noise = {axis: {"noise_std_deg_s": 0.05} for axis in "pqr"}
-    sine = [{"sine": {"amplitude_deg_s": 2.0, "frequency_hz": 0.4}}]
+    sine = [{"sine": {"amplitude_deg_s": 1.0, "frequency_hz": 0.3}}]
     lost = {"actuator": "aileron", "type": "loss_of_effectiveness", "at_s": 0.0, "magnitude": loss}
     scenario = bf.load({
         "name": "noisy", "duration_s": 4.0, "reference": dict.fromkeys("pqr", sine), "sensors": noise,
@@ -197,6 +197,10 @@ def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_
     if not loss:
         with pytest.raises(BadInput, match=r"command of aileron has the other sign, there is no alarm"):
             diagnose_with_aircraft_model(changed(recording, aileron_command=np.negative), vehicle, declared)
+        aileron, flap = (recording.columns[f"{name}_command"].values for name in ("aileron", "flap"))
+        exchanged = changed(recording, aileron_command=lambda _: flap, flap_command=lambda _: aileron)
+        with pytest.raises(BadInput, match=r"aileron and flap are exchanged, there is no alarm"):
+            diagnose_with_aircraft_model(exchanged, vehicle, declared)
 
 
 def without(vehicle, **keys):

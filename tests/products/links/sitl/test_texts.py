@@ -218,6 +218,10 @@ def test_what_is_new_is_said_once():
     assert len(teller.news(SimpleNamespace(t_s=10.0, verdict=verdict, **flight))) == 2
     assert len(teller.kept) == 200
     teller.begin()
+    early = Verdict(True, **LOSS, estimate=-0.25)  # named within the first second of a flight
+    counts = [len(teller.news(SimpleNamespace(t_s=t_s, verdict=early, **flight))) for t_s in (0.4, 1.3, 1.5)]
+    assert counts == [2, 0, 1]
+    teller.begin()
     verdict = Verdict(True)
     (text,) = teller.news(SimpleNamespace(t_s=1.0, verdict=verdict, **flight))
     assert text.text == "FDI: alarm between the instruments"

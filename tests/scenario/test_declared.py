@@ -9,10 +9,10 @@ import pytest
 
 from beaver_ftc.design import SEVERITIES, Dryden
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.declared import Declared, _inconclusive, _power
+from beaver_ftc.scenario.declared import Declared, _inconclusive, _power, undeclared
 from beaver_ftc.scenario.diagnosis import Bounds, failing, of_several, pairs_refused
 from beaver_ftc.scenario.schema import load
-from flying import declared_in
+from flying import declared_in, scenario
 from test_architecture import PRODUCTS, modules, tree
 from trainer import trainer
 
@@ -309,6 +309,13 @@ def test_where_a_model_was_not_measured_is_said_of_each_key_that_leads_there():
     ]  # fmt: skip
     other = SimpleNamespace(scheme="rls-monitor", diagnoses=False)
     assert planned(duration_s=901.0, fdi=other) == []
+
+
+@pytest.mark.parametrize(("rad_s2", "rad_s", "faster"), [(0.0, 20.0, 0), (1e-3, 20.0, 1), (1e-3, 15.0, 0)])
+def test_a_sinusoid_is_faster_than_the_statistics_admit_only_if_there_is_one(rad_s2, rad_s, faster):
+    sinusoid = {"p": {"amplitude_rad_s2": rad_s2, "frequency_rad_s": rad_s}}
+    beyond = undeclared(scenario(uncertainty={"sinusoid": sinusoid}, fdi={"statistical": {}}))
+    assert [fact.key for fact in beyond] == ["uncertainty.sinusoid.p"] * faster
 
 
 @pytest.mark.parametrize(

@@ -35,11 +35,15 @@ class CorrectedLog(NamedTuple):
 def logs_with_one_mistake_corrected(
     samples: Samples, vehicle: Vehicle, surfaces_of_unknown_effect: Collection[str] = ()
 ) -> Iterator[CorrectedLog]:
-    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit.
-    surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
-    commands."""
+    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
+    that the attitude confirms stays as it is. surfaces_of_unknown_effect: surfaces whose effect the model
+    does not know: that shows nothing of their commands."""
     surfaces = list(vehicle.surfaces)
-    rate_column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    doubtful_rate_column_names = [
+        name
+        for axis in "pqr"
+        if (name := getattr(vehicle.rates, axis).column) not in samples.rates_confirmed_by_attitude
+    ]
     for first_surface_index, second_surface_index in combinations(
         [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
     ):
@@ -53,7 +57,7 @@ def logs_with_one_mistake_corrected(
             f"the commands of {surfaces[first_surface_index]} and {surfaces[second_surface_index]} exchanged",
             exchanged_samples,
         )
-    for first_rate_column_name, second_rate_column_name in combinations(rate_column_names, 2):
+    for first_rate_column_name, second_rate_column_name in combinations(doubtful_rate_column_names, 2):
         exchanged_samples = _with_exchanged_or_scaled_columns(
             samples,
             vehicle,
@@ -66,10 +70,10 @@ def logs_with_one_mistake_corrected(
         yield CorrectedLog(
             f"{first_rate_column_name} and {second_rate_column_name} exchanged", exchanged_samples
         )
-    for name in [*rate_column_names, *vehicle.signal_column_names]:
+    for name in [*doubtful_rate_column_names, *vehicle.signal_column_names]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
-            log_jacobian = float(np.log(abs(factor))) if name in rate_column_names else 0.0
+            log_jacobian = float(np.log(abs(factor))) if name in doubtful_rate_column_names else 0.0
             yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian)
 
 

@@ -250,6 +250,25 @@ def find_attitude_mistake(
     return None
 
 
+def rates_confirmed_by_attitude(
+    rate_by_column_name: Mapping[str, Column], named_angles: Sequence[NamedColumn | None]
+) -> frozenset[str]:
+    """The columns of p, q and r whose integral is the change of roll, pitch and yaw, in sign and unit too."""
+    rate_columns = list(rate_by_column_name.values())
+    fits = {
+        rate_column_name: _fit_angle_of_axis(rate_columns, named_angles, axis)
+        for axis, rate_column_name in enumerate(rate_by_column_name)
+    }
+    return frozenset(name for name, fit in fits.items() if fit is not None and _is_exact(fit))
+
+
+def _is_exact(fit: AngleRateFit) -> bool:
+    return (
+        fit.correlation > _EXACT_CORRELATION
+        and 1.0 / _MAX_RATIO_TO_UNIT_FACTOR < fit.slope < _MAX_RATIO_TO_UNIT_FACTOR
+    )
+
+
 def _agreeing_rate_factor_remark(
     named_rate_fit: AngleRateFit,
     rate_columns: list[Column],
@@ -267,11 +286,7 @@ def _agreeing_rate_factor_remark(
         scaled_fit = _fit_angle_of_axis(
             [*rate_columns[:axis], scaled_column, *rate_columns[axis + 1 :]], named_angles, axis
         )
-        if (
-            scaled_fit is not None
-            and scaled_fit.correlation > _EXACT_CORRELATION
-            and 1.0 / _MAX_RATIO_TO_UNIT_FACTOR < scaled_fit.slope < _MAX_RATIO_TO_UNIT_FACTOR
-        ):
+        if scaled_fit is not None and _is_exact(scaled_fit):
             return (
                 f"the {_RATE_TITLES[axis]} {rate_column_name} does not make the change of its angle "
                 f"(correlation {named_rate_fit.correlation:.2f}): a factor of {factor:.4g} on "

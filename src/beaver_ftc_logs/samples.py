@@ -57,7 +57,7 @@ class Samples:
     the energy height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving
     average of the noise by which rates, commands and signals are whitened, empty if they are not. fit_weight
     of each sample in a fit. n_log_parts: number of parts in which the log was read; if several, the samples
-    are chosen stretches.
+    are chosen stretches. rates_confirmed_by_attitude: the columns of rates that the logged angles confirm.
     """
 
     name: str
@@ -79,6 +79,7 @@ class Samples:
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
     n_log_parts: int = 1
+    rates_confirmed_by_attitude: frozenset[str] = frozenset()
 
 
 _PER_SAMPLE_FIELDS = (
@@ -95,7 +96,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     )
     recording = convert_to_si(recording, vehicle)
     _refuse_missing_or_implausible_columns(recording, used_column_names, rate_column_names=rate_column_names)
-    _check_rates_attitude_and_gravity(recording, vehicle)
+    confirmed_rates = _check_gravity_and_confirm_rates_by_attitude(recording, vehicle)
     log_stamps_s = recording.columns[rate_column_names[0]].t_s
     t_s, stretch_number, step_s = _check_stamps_and_make_time_base(
         recording.name, log_stamps_s, vehicle.max_sample_rate_hz
@@ -145,6 +146,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         energy_height_rate_mps=_sampled_energy_height_rate_mps(
             recording, vehicle, (t_s, stretch_number, step_s)
         ),
+        rates_confirmed_by_attitude=confirmed_rates,
     )
     reference_airspeed_mps = vehicle.reference_airspeed_mps
     return (
@@ -282,9 +284,13 @@ def _sampled_energy_height_rate_mps(
     return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
-def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicle) -> None:
-    """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
+def _check_gravity_and_confirm_rates_by_attitude(
+    recording: RecordedFlight, vehicle: Vehicle
+) -> frozenset[str]:
+    """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
+    contradict one another: what is in another unit."""
     columns, attitude_settings, mistake = recording.columns, vehicle.attitude, None
+    confirmed_rates = frozenset[str]()
     rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
     if (
         attitude_settings
@@ -306,6 +312,9 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
         mistake = physics.find_attitude_mistake(
             rate_column_by_name, named_angle_columns_or_none, possible_rate_columns
         )
+        confirmed_rates = physics.rates_confirmed_by_attitude(
+            rate_column_by_name, named_angle_columns_or_none
+        )
     z_acceleration_column = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and z_acceleration_column:
         mistake = physics.gravity_remark(z_acceleration_column, vehicle.acceleration.column)
@@ -313,6 +322,7 @@ def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicl
         raise BadInput(
             f"{recording.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended"
         )
+    return confirmed_rates
 
 
 def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
@@ -635,6 +645,9 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_log_parts: int) 
         n_log_parts=n_log_parts,
         log_stamps_s=joined_fields["t_s"],
         time_since_change_s_by_column=time_since_change_s_by_column,
+        rates_confirmed_by_attitude=frozenset.intersection(
+            *(stretch.rates_confirmed_by_attitude for stretch in stretches)
+        ),
         **joined_fields,
     )
 

@@ -1,5 +1,7 @@
 """A log with one mistake mended: every column of a sample follows its name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,16 @@ def test_commands_of_unknown_effect_are_exchanged_with_none(log):
         "the commands of elevator and right_aileron exchanged",
     ]
     assert [text for text in every if text in fewer] == fewer
+
+
+@pytest.mark.parametrize("confirmed", [(), ("q_rad_s",), ("p_rad_s", "r_rad_s")])
+def test_a_rate_that_the_attitude_confirms_is_what_it_is(log, confirmed):
+    vehicle, samples = log
+    of_angles = replace(samples, rates_confirmed_by_attitude=frozenset(confirmed))
+    every, fewer = (
+        [one.correction_text for one in logs_with_one_mistake_corrected(flight, vehicle)]
+        for flight in (samples, of_angles)
+    )
+    assert fewer == [text for text in every if not any(name in text for name in confirmed)]
+    pairs = {0: 0, 1: 2, 2: 3}[len(confirmed)]  # of three rates, those with a confirmed one
+    assert len(every) - len(fewer) == pairs + 5 * len(confirmed)  # a sign and two units either way

@@ -11,7 +11,7 @@ from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from products.logs import small
 from products.logs.test_signals import T_S, turning, yawed
 
-WING = small.vehicle()
+WING, WING_RATES = small.vehicle(), tuple(small.RATES.values())
 
 
 def column(t_s, values, note=""):
@@ -126,6 +126,17 @@ def recording(n=60, step=0.1, **changes):
     values = {"p_rad_s": 0.1, "q_rad_s": 0.2, "r_rad_s": 0.3, "roll": 0.4, "pitch": 0.6}
     columns = {name: column(t_s, size * np.cos(t_s)) for name, size in values.items()}
     return RecordedFlight("log", columns | changes, (LoggedFailure(3.0, "rudder"),), ("said of the log",))
+
+
+def test_the_angles_of_a_log_confirm_its_rates():
+    """At no bank and no pitch the change of roll is the integral of p, and that of pitch of q."""
+    t_s = stamps(0.1, 300)
+    rates = {name: column(t_s, 0.1 * k * np.cos(k * t_s)) for k, name in enumerate(WING_RATES, 1)}
+    vehicle = small.vehicle(attitude={"roll": "phi", "pitch": "theta"})
+    angles = {"phi": column(t_s, 0.1 * np.sin(t_s)), "theta": column(t_s, 0.01 * np.sin(7.0 * t_s))}
+    found = of.resample(recording(300, **rates, **angles), vehicle)
+    assert found.rates_confirmed_by_attitude == {"p_rad_s"}
+    assert not of.resample(recording(300, **rates), vehicle).rates_confirmed_by_attitude
 
 
 def test_a_log_on_one_time_base():
@@ -479,6 +490,7 @@ def filled(n=12, first=0.0, **changes):
         "notes": ("one",),
         "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
         "noise_ma_coefficients": (1.0, 0.5), "fit_weight": 1.5, "n_log_parts": 1,
+        "rates_confirmed_by_attitude": frozenset({"roll", "yaw"}),
     }  # fmt: skip
     assert {one.name for one in fields(of.Samples)} == {*per_row, *given}
     return of.Samples(**(per_row | given | changes)), per_row, given
@@ -517,6 +529,7 @@ def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
     """The second has a gap of its own; remarks are said once, after what is said of the whole."""
     (one, *_), (other, *_) = filled(4), filled(9, first=20.0, notes=("two", "one"))
     other = replace(other, stretch_number=np.repeat([7, 9], [6, 3]), dt_s=0.3, name="other")
+    other = replace(other, rates_confirmed_by_attitude=frozenset({"pitch", "yaw"}))
     found = of._concatenate_samples("long", [one, other], 5)
     per_row, (_, _, given) = {}, filled()
     for name in ("t_s", "rates", "commands", "signals", "labels", "airspeed", "is_rate_clipped"):
@@ -526,7 +539,7 @@ def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
     at = np.concatenate([np.arange(4.0), 20.0 + np.arange(9.0)])
     assert_same(found, given | per_row | {
         "name": "long", "n_log_parts": 5, "notes": (note, "one", "two"), "log_stamps_s": per_row["t_s"],
-        "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]),
+        "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]), "rates_confirmed_by_attitude": frozenset({"yaw"}),
         "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
     })  # fmt: skip
 

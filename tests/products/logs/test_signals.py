@@ -210,20 +210,41 @@ def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
     (1.0, None),
 ])  # fmt: skip
 def test_a_wrong_yaw_rate_is_found_in_a_flight_that_banks_and_pitches_more_than_it_yaws(factor, says):
-    """psi = 0.02 sin(0.7 t), theta = 0.3 sin(0.5 t), phi = 0.4 sin(0.9 t), and their rates."""
+    (p, q, r), angles = banked_and_pitched()
+    rates = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, factor * r)}
+    said = physics.find_attitude_mistake(rates, angles, {})
+    assert (said is None) if says is None else (says in said)
+
+
+def banked_and_pitched():
+    """psi = 0.02 sin(0.7 t), theta = 0.3 sin(0.5 t), phi = 0.4 sin(0.9 t): their rates, and the angles."""
     phi, theta = 0.4 * np.sin(0.9 * T_S), 0.3 * np.sin(0.5 * T_S)
     dphi, dtheta, dpsi = 0.36 * np.cos(0.9 * T_S), 0.15 * np.cos(0.5 * T_S), 0.014 * np.cos(0.7 * T_S)
     p = dphi - np.sin(theta) * dpsi
     q = np.cos(phi) * dtheta + np.sin(phi) * np.cos(theta) * dpsi
     r = np.cos(phi) * np.cos(theta) * dpsi - np.sin(phi) * dtheta
-    rates = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, factor * r)}
     angles = [
         ("roll", Column(T_S, phi)),
         ("pitch", Column(T_S, theta)),
         ("yaw", Column(T_S, 0.02 * np.sin(0.7 * T_S))),
     ]
-    said = physics.find_attitude_mistake(rates, angles, {})
-    assert (said is None) if says is None else (says in said)
+    return (p, q, r), angles
+
+
+@pytest.mark.parametrize(("factors", "without", "confirmed"), [
+    ((1.0, 1.0, 1.0), None, {"gx", "gy", "gz"}),
+    ((-1.0, 1.0, 1.0), None, {"gy", "gz"}),
+    ((1.0, 1.4, 1.0), None, {"gx"}),  # yaw follows both q and r
+    ((1.0, 1.0, 0.02), None, {"gx", "gy"}),
+    ((1.0, 1.0, 1.0), 2, {"gx", "gy"}),
+    ((1.0, 1.0, 1.0), 0, set()),  # without roll no rate of an angle is known
+])  # fmt: skip
+def test_the_attitude_confirms_the_rates_that_make_it(factors, without, confirmed):
+    rates, angles = banked_and_pitched()
+    angles = [None if k == without else one for k, one in enumerate(angles)]
+    named = ("gx", "gy", "gz")
+    given = {name: Column(T_S, f * one) for name, f, one in zip(named, factors, rates, strict=True)}
+    assert physics.rates_confirmed_by_attitude(given, angles) == confirmed
 
 
 def test_another_column_in_the_place_of_a_rate_is_found_by_the_angle_that_follows_it():

@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.units import SIGN_AND_UNIT_FACTORS
 from beaver_ftc_logs.vehicle import Vehicle
-
-_UNIT_SIZE_RATIOS = (180.0 / np.pi, 1000.0)
-"""Sizes of units in one another: degrees in a radian, thousandths in one."""
 
 
 class CorrectedLog(NamedTuple):
@@ -71,7 +69,7 @@ def logs_with_one_mistake_corrected(
             f"{first_rate_column_name} and {second_rate_column_name} exchanged", exchanged_samples
         )
     for name in [*doubtful_rate_column_names, *vehicle.signal_column_names]:
-        for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
+        for factor in SIGN_AND_UNIT_FACTORS:
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
             log_jacobian = float(np.log(abs(factor))) if name in doubtful_rate_column_names else 0.0
             yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian)

@@ -12,7 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from beaver_ftc_logs.recording import Column, Floats
-from beaver_ftc_logs.units import ACCELERATION, ANGLE, KIND_AND_SI_FACTOR_OF_UNIT, RATE, nearest_unit
+from beaver_ftc_logs.units import (
+    ACCELERATION,
+    ANGLE,
+    KIND_AND_SI_FACTOR_OF_UNIT,
+    RATE,
+    SIGN_AND_UNIT_FACTORS,
+    nearest_unit,
+)
 
 _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
 _MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_RATIO_TO_UNIT_FACTOR = 20, 0.7, 1.3
@@ -205,7 +212,6 @@ def _full_circle(angle: Floats) -> float:
 
 NamedColumn = tuple[str, Column]
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
-_RATE_UNIT_RATIOS = (180.0 / np.pi, 1000.0)
 
 
 def find_attitude_mistake(
@@ -281,7 +287,7 @@ def _agreeing_rate_factor_remark(
     since q turns it as well."""
     if abs(named_rate_fit.correlation) >= _MIN_AGREEING_CORRELATION:
         return None
-    for factor in (-1.0, *_RATE_UNIT_RATIOS, *(1.0 / unit_ratio for unit_ratio in _RATE_UNIT_RATIOS)):
+    for factor in SIGN_AND_UNIT_FACTORS:
         scaled_column = replace(rate_columns[axis], values=factor * rate_columns[axis].values)
         scaled_fit = _fit_angle_of_axis(
             [*rate_columns[:axis], scaled_column, *rate_columns[axis + 1 :]], named_angles, axis

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.documents import document, files
 from beaver_ftc.documents.document import MAX_NODES, MalformedDocumentError, parse, scalar
-from beaver_ftc.documents.files import UnreadableError, read_bytes, read_text
+from beaver_ftc.documents.files import UnreadableError, put_folder, read_bytes, read_text
 from beaver_ftc.documents.validation import UnusableKeyError, parse_key, plain, with_values
 
 
@@ -343,3 +343,41 @@ def test_a_damaged_document_is_a_value_error_however_deep(tmp_path, text):
     (tmp_path / "f").write_text(text)
     with pytest.raises(ValueError, match=r"nested|Expecting"):
         files.read_json(tmp_path / "f")
+
+
+def put(folder, target, text, page):
+    (folder / "engines").mkdir(parents=True)
+    (folder / "engines" / "one.xml").write_text(text)
+    (folder / "page.md").write_text(page)
+    put_folder(folder, target, compare_all_but="page.md")
+    return (target / "engines" / "one.xml").stat().st_ino, (target / "page.md").read_text()
+
+
+def test_a_folder_takes_the_place_of_another_unless_it_is_the_same(tmp_path):
+    target = tmp_path / "cache" / "pa28"
+    first, page = put(tmp_path / "a", target, "<engine/>", "in 3 s")
+    assert put(tmp_path / "b", target, "<engine/>", "in 4 s") == (first, page)  # another process reads it
+    assert put(tmp_path / "c", target, "<engine2/>", "in 5 s")[1] == "in 5 s"
+    assert (target / "engines" / "one.xml").read_text() == "<engine2/>"
+    assert [one.name for one in target.parent.iterdir()] == ["pa28"]
+
+
+def test_the_folder_of_a_quicker_process_stays(tmp_path, monkeypatch):
+    """It appears after what was there is removed."""
+    target = tmp_path / "pa28"
+    monkeypatch.setattr("shutil.rmtree", lambda folder, **_: put_by_another(target, folder))
+    assert put(tmp_path / "a", target, "<engine/>", "mine")[1] == "another's"
+
+
+def put_by_another(target, folder):
+    if folder == target:
+        (target / "engines").mkdir(parents=True)
+        (target / "engines" / "one.xml").write_text("<engine/>")
+        (target / "page.md").write_text("another's")
+
+
+def test_a_folder_that_cannot_be_put_is_said(tmp_path, monkeypatch):
+    (tmp_path / "pa28").write_text("a file")
+    with pytest.raises(OSError, match="Not a directory"):
+        put(tmp_path / "a", tmp_path / "pa28", "<engine/>", "")
+    assert [one.name for one in tmp_path.iterdir()] == ["pa28"]

@@ -150,6 +150,32 @@ def _discard_old(base: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def put_folder(folder: Path, target: Path, compare_all_but: str = "") -> None:
+    """Move a folder to the place of another, whole. One with the same files stays, since another process that
+    made it may be reading it. compare_all_but: name of a file that may differ."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if _content(folder, compare_all_but) == _content(target, compare_all_but):
+        return
+    beside = target.with_name(f".{target.name}-{os.getpid()}")
+    shutil.move(folder, beside)  # from another file system file by file
+    shutil.rmtree(target, ignore_errors=True)
+    try:
+        beside.rename(target)
+    except OSError:
+        shutil.rmtree(beside)
+        if not target.is_dir():  # else another process was quicker
+            raise
+
+
+def _content(folder: Path, compare_all_but: str) -> dict[str, bytes]:
+    """The files of a folder; empty if there is none."""
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file() and file.name != compare_all_but
+    }
+
+
 class UnreadableError(Exception):
     """The file cannot be used as text; the message says why and what is allowed, the line where: 0 if it is
     the file as a whole."""

@@ -32,6 +32,7 @@ from beaver_ftc.aircraft import (
 from beaver_ftc.design import design_record
 from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL_NAME
 from beaver_ftc.documents import BadInput, SimulationFailed
+from beaver_ftc.documents.files import put_folder
 from beaver_ftc.plant import (
     AT_IDLE,
     GEAR,
@@ -193,10 +194,7 @@ def derive(
         text = yaml.safe_dump(twice, sort_keys=False, default_flow_style=None, width=120)
         (folder / AIRCRAFT_FILE).write_text(first_line_of() + text, encoding="utf-8")
         (folder / PAGE).write_text(page_of(found), encoding="utf-8")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists():
-            shutil.rmtree(target)
-        shutil.move(str(folder), target)
+        put_folder(folder, target, compare_all_but=PAGE)  # the page has the time it took
     return found
 
 

@@ -1,7 +1,5 @@
 """`beaver-ftc import gtm`: from the data base to an aircraft folder that flies, here and in plain JSBSim."""
 
-import os
-import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +9,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import imported_folder
 from beaver_ftc.documents import BadInput
+from beaver_ftc.documents.files import put_folder
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import (
@@ -65,11 +64,7 @@ def convert(database: Path, out: Path | None = None, tell: Tell = lambda line: N
         write_start(folder, steady)
         write_scripts(folder, steady)
         write_notice(folder, database)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        beside = target.parent / f".{NAME}-{os.getpid()}"
-        shutil.move(str(folder), beside)  # whole, before what was there goes
-        shutil.rmtree(target, ignore_errors=True)
-        beside.rename(target)
+        put_folder(folder, target)
     return Imported(target, made.aircraft.surfaces, steady, perf_counter() - started_s)
 
 

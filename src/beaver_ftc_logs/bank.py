@@ -230,8 +230,11 @@ class TrimAndGainStateModel(NamedTuple):
     random_walk_variance: Floats
 
 
-def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
-    """The prior and the limits of trim and gains, from a model's settings."""
+def build_trim_and_gain_state_model(
+    model: Model, noise_ma_coefficients: Sequence[float] = ()
+) -> TrimAndGainStateModel:
+    """The prior and the limits of trim and gains, from a model's settings. noise_ma_coefficients: as in
+    `build_residual_noise`."""
     settings, n_groups = model.settings, len(model.groups)
     _, _, response_coefficients, residual_covariance = model.intercept_past_response_noise()
     residual_variance = np.diag(residual_covariance)
@@ -242,12 +245,14 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
         + trim_sd_of_group_shift_rad_s.T @ trim_sd_of_group_shift_rad_s
     )
     initial_covariance[3, 3] = settings.gain_sd**2
-    initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
-        settings.group_gain_offset_sd** 2 + _gain_variance_beyond_level_step(model)
+    drifting_variance = settings.group_gain_offset_sd**2 + _gain_variance_beyond_level_step(model)
+    hidden_variance = model.hidden_gain_error_sd(noise_ma_coefficients) ** 2
+    initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = drifting_variance + hidden_variance
+    # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
+    group_return_times_s = settings.group_gain_offset_return_time_s * (
+        1.0 + hidden_variance / np.maximum(drifting_variance, MIN_DIVISOR)
     )
-    return_times_s = np.array(
-        [np.inf] * 3 + [settings.gain_return_time_s] + [settings.group_gain_offset_return_time_s] * n_groups
-    )
+    return_times_s = np.array([np.inf] * 3 + [settings.gain_return_time_s, *group_return_times_s])
     deviation_retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
     random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)
     random_walk_variance[:3] = residual_variance * np.array(settings.trim_walk_sd_per_sample) ** 2

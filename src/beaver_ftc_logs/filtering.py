@@ -240,7 +240,7 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
         group_responses,
         is_predictable,
         bank,
-        build_trim_and_gain_state_model(model),
+        build_trim_and_gain_state_model(model, samples.noise_ma_coefficients),
         noise_parameters,
         min_noise_variance_scales,
     )

@@ -23,6 +23,7 @@ from beaver_ftc_logs.filtering import (
     any_fault_log_odds_gains,
     hypothesis_state_and_noise_posterior,
     page_cusum,
+    recent_noise_variance_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
@@ -383,7 +384,8 @@ def _fit_model_of_order_uncached(
         response_sd=rate_regression.standard_errors[first_command_row:].reshape(response_shape).tolist(),
         noise=rate_regression.residual_covariance.tolist(),
     )
-    return model.model_copy(update={"noise_models": _fit_noise_models(usable_flights, model)})
+    model = model.model_copy(update={"noise_models": _fit_noise_models(usable_flights, model)})
+    return _with_hidden_gain_errors(usable_flights, model) if vehicle.other_laws else model
 
 
 def _fit_noise_models(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> list[NoiseModel]:
@@ -399,6 +401,53 @@ def _fit_noise_models(usable_flights: Sequence[FlightWithUsableRows], model: Mod
         ]
         noise_models.append(_fit_noise_model(list(noise_ma_coefficients), rows_and_residuals))
     return noise_models
+
+
+def _with_hidden_gain_errors(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
+    """The model with how far it may misread the groups' effects, by the noise of the flights.
+
+    What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
+    surfaces makes it look like their effect. On an axis with the power q of what is lacking and P of the
+    effect, both in variances of the noise, the effect is then misread by sqrt(q / P) of itself at most; over
+    axes, that least squares weighs by P, by sqrt(sum q P) / sum P. A law that feeds back otherwise shows it.
+    """
+    return model.model_copy(
+        update={
+            "noise_models": [
+                noise_model.model_copy(
+                    update={
+                        "hidden_group_gain_error_sd": hidden_gain_errors(usable_flights, model, noise_model)
+                    }
+                )
+                for noise_model in model.noise_models
+            ]
+        }
+    )
+
+
+def hidden_gain_errors(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model, noise_model: NoiseModel
+) -> list[float]:
+    """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
+    standard deviation of an error that is anywhere below the largest."""
+    flights_of_noise = [
+        usable_flight
+        for usable_flight in usable_flights
+        if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
+    ]
+    residual = np.vstack([rows_and_one_step_residuals(model, flight)[1] for flight in flights_of_noise])
+    response_power_by_flight = [
+        _without_mean(rows_whitened_residual_and_responses(model, flight)[2]) ** 2
+        for flight in flights_of_noise
+    ]
+    noise_variance = np.diag(np.array(noise_model.residual_covariance))
+    response_power = np.vstack(response_power_by_flight).mean(axis=0) / noise_variance
+    lacking_power = np.maximum(residual.var(axis=0) / noise_variance - 1.0, 0.0)
+    max_errors = np.minimum(
+        np.sqrt(response_power @ lacking_power) / np.maximum(response_power.sum(axis=1), MIN_DIVISOR),
+        _GROUP_GAIN_STANDARD_ERROR_CAP,
+    )
+    return (max_errors / np.sqrt(3.0)).tolist()
 
 
 def _fit_noise_model(
@@ -550,7 +599,9 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
                 _normalized_squared_gain_error_and_rank(
                     group_responses,
                     residual.ravel(),
-                    _prior_total_group_gain_covariance(fold_model, is_group_effect_separable),
+                    _prior_total_group_gain_covariance(
+                        fold_model, is_group_effect_separable, held_out.samples.noise_ma_coefficients
+                    ),
                 )
             )
             held_out_normalized_error_sum = (
@@ -566,47 +617,28 @@ def _with_noise_inflated_for_gain_errors(
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
+    window_inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
     samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    window_inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
     for fold_model, held_out_flights in _fold_models_and_held_out_flights(
         usable_flights,
         model,
         trust.effect_share_explained_by_other_regressors(samples_and_is_usable_by_flight, model).tolist(),
     ):
-        is_group_effect_separable = np.array(trust.is_group_effect_known(fold_model))
-        prior_axis_gain_covariance: Floats = np.asarray(
-            np.kron(
-                _prior_total_group_gain_covariance(fold_model, is_group_effect_separable), np.ones((3, 3))
-            ),
-            dtype=float,
-        )
+        other_flights = [
+            flight
+            for flight in usable_flights
+            if all(flight is not held_out for held_out in held_out_flights)
+        ]
         for held_out in held_out_flights:
-            group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
-            if not len(residual):  # a part without a residual shows no gain
-                continue
-            group_responses = group_responses[:, :, is_group_effect_separable].reshape(*residual.shape, -1)
-            n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
-            for window_rows in np.array_split(np.arange(len(residual)), n_windows):
-                window_responses = _without_mean(group_responses[window_rows])
-                standardised_window_residual = _without_mean(residual[window_rows])
-                normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
-                    window_responses.reshape(standardised_window_residual.size, -1),
-                    standardised_window_residual.ravel(),
-                    prior_axis_gain_covariance,
-                )
-                window_inflations_by_ma_coefficients.setdefault(
-                    held_out.samples.noise_ma_coefficients, []
-                ).append(
-                    min(
-                        normalized_squared_gain_error / max(n_determined_gains, 1),
-                        _MAX_WINDOW_COVARIANCE_INFLATION,
-                    )
-                )
+            window_inflations_by_ma_coefficients.setdefault(
+                held_out.samples.noise_ma_coefficients, []
+            ).extend(_window_inflations(fold_model, held_out, other_flights))
     covariance_inflation_by_ma_coefficients = {
         ma_coefficients: max(float(np.mean(window_inflations)), 1.0)
         for ma_coefficients, window_inflations in window_inflations_by_ma_coefficients.items()
+        if window_inflations
     }
     if model.vehicle.other_laws:
         covariance_inflation_by_ma_coefficients = {
@@ -621,14 +653,72 @@ def _with_noise_inflated_for_gain_errors(
     return _with_covariance_inflation(model, covariance_inflation_by_ma_coefficients)
 
 
+def _window_inflations(
+    fold_model: Model, held_out: FlightWithUsableRows, other_flights: Sequence[FlightWithUsableRows]
+) -> list[float]:
+    """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
+    filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
+    others (`recent_noise_variance_scale`): what it widens by itself is not counted again."""
+    is_group_effect_separable = np.array(trust.is_group_effect_known(fold_model))
+    group_responses, residual = _standardized_centred_responses_and_residual(fold_model, held_out)
+    if not len(residual):  # a part without a residual shows no gain
+        return []
+    prior_gain_covariance = _prior_total_group_gain_covariance(
+        fold_model, is_group_effect_separable, held_out.samples.noise_ma_coefficients
+    )
+    prior_axis_gain_covariance = np.asarray(np.kron(prior_gain_covariance, np.ones((3, 3))), dtype=float)
+    group_responses = group_responses[:, :, is_group_effect_separable].reshape(*residual.shape, -1)
+    loudness = _noise_variance_scale_beyond_others(fold_model, held_out, other_flights)
+    n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
+    window_inflations = []
+    for window_rows in np.array_split(np.arange(len(residual)), n_windows):
+        window_responses = _without_mean(group_responses[window_rows]) / np.sqrt(loudness)
+        standardised_window_residual = _without_mean(residual[window_rows]) / np.sqrt(loudness)
+        normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+            window_responses.reshape(standardised_window_residual.size, -1),
+            standardised_window_residual.ravel(),
+            prior_axis_gain_covariance,
+        )
+        window_inflations.append(
+            min(normalized_squared_gain_error / max(n_determined_gains, 1), _MAX_WINDOW_COVARIANCE_INFLATION)
+        )
+    return window_inflations
+
+
+def _noise_variance_scale_beyond_others(
+    fold_model: Model, held_out: FlightWithUsableRows, other_flights: Sequence[FlightWithUsableRows]
+) -> float:
+    """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
+    flight of the same noise; 1 if it is within the range of these, or under the same law."""
+    if not fold_model.vehicle.other_laws:
+        return 1.0
+
+    def scale(flight: FlightWithUsableRows) -> float:
+        _, residual = _standardized_centred_responses_and_residual(fold_model, flight)
+        is_usable = np.ones(len(residual), dtype=bool)
+        scales = recent_noise_variance_scale(residual, is_usable, np.eye(3), fold_model.rate_hz)
+        return float(scales.mean()) if len(scales) else 1.0
+
+    other_scales = [
+        scale(flight)
+        for flight in other_flights
+        if flight.samples.noise_ma_coefficients == held_out.samples.noise_ma_coefficients
+    ]
+    return max(scale(held_out) / max([1.0, *other_scales]), 1.0)
+
+
 def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
     """Whether noise takes from the next sample what it added to one, as an instrument's does."""
     return len(noise_ma_coefficients) > 1 and noise_ma_coefficients[1] < 0.0
 
 
-def _prior_total_group_gain_covariance(model: Model, is_group_effect_separable: NDArray[np.bool_]) -> Floats:
+def _prior_total_group_gain_covariance(
+    model: Model, is_group_effect_separable: NDArray[np.bool_], noise_ma_coefficients: tuple[float, ...]
+) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    initial_gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
+    initial_gain_covariance = build_trim_and_gain_state_model(
+        model, noise_ma_coefficients
+    ).initial_covariance[3:, 3:]
     return np.asarray(
         initial_gain_covariance[0, 0]
         + np.diag(np.diag(initial_gain_covariance)[1:][is_group_effect_separable])

@@ -78,6 +78,8 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     quietest_covariance = min(
         (np.array(noise_model.residual_covariance) for noise_model in model.noise_models), key=np.linalg.det
     )
+    hidden_gain_errors = [model.hidden_gain_error_sd(known) for known in known_ma_coefficients]
+    max_hidden_gain_error_sd = np.max(hidden_gain_errors, axis=0).tolist()
     noise_models = list(model.noise_models)
     for ma_coefficients in UNFITTED_NOISE_MA_CANDIDATES:
         if ma_coefficients not in known_ma_coefficients:
@@ -95,6 +97,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                     average=list(ma_coefficients),
                     noise=np.cov(residuals.T).tolist(),
                     wider=max_covariance_inflation,
+                    misreads=max_hidden_gain_error_sd,
                 )
             )
     for gyro_noise_rad_s in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
@@ -102,7 +105,14 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
             model, quietest_covariance, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
         )
         ar_and_covariance = {"before": ar_coefficients.tolist(), "noise": residual_covariance.tolist()}
-        noise_models.append(NoiseModel(average=[1.0], wider=max_covariance_inflation, **ar_and_covariance))
+        noise_models.append(
+            NoiseModel(
+                average=[1.0],
+                wider=max_covariance_inflation,
+                misreads=max_hidden_gain_error_sd,
+                **ar_and_covariance,
+            )
+        )
     return model.model_copy(update={"noise_models": noise_models})
 
 

@@ -258,6 +258,11 @@ class NoiseModel(Section):
         description="how many times as far, in squares, gains left out and other laws' differ",
         alias="wider",
     )
+    hidden_group_gain_error_sd: list[Annotated[Number, Field(ge=0, lt=1)]] = Field(
+        default=[],
+        description="share of its effect by which the fit may misread each group in this noise",
+        alias="misreads",
+    )
 
 
 class Model(Section):
@@ -352,6 +357,8 @@ class Model(Section):
                 ((*noise_model_key_path, "noise"), noise_model.residual_covariance, (3, 3)),
                 ((*noise_model_key_path, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
             ]
+            if misreads := noise_model.hidden_group_gain_error_sd:
+                key_paths_arrays_and_shapes += [((*noise_model_key_path, "misreads"), misreads, (n_groups,))]
             if noise_model.ma_coefficients[0] != 1.0:
                 yield (*noise_model_key_path, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (fitted_ranges := self.fitted_ranges) is not None:
@@ -437,6 +444,16 @@ class Model(Section):
             ),
             1.0,
         )
+
+    def hidden_gain_error_sd(self, ma_coefficients: Sequence[float]) -> Floats:
+        """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
+        0 where that is not known."""
+        fitted_errors = [
+            noise_model.hidden_group_gain_error_sd
+            for noise_model in self.noise_models
+            if noise_model.ma_coefficients == list(ma_coefficients) and noise_model.hidden_group_gain_error_sd
+        ]
+        return np.array(fitted_errors[0]) if fitted_errors else np.zeros(len(self.groups))
 
     def residual_ar_coefficients(self, ma_coefficients: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""

@@ -72,6 +72,7 @@ WRONG = [
     (("settings",), {"trim_walk": [0.1, -0.1, 0.2]}, "settings.trim_walk[1]"),
     (("settings",), {"gain_time_s": 1e300}, "settings.gain_time_s"), (("rate_hz",), 1e-9, "rate_hz"),
     (("rate_hz",), 1e9, "rate_hz"), (("intercept", 0), 1e7, "intercept[0]"),
+    (("colours", 0, "misreads"), [0.1], "colours[0].misreads"),
 ]  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """What the parts that a fit leaves out say of a model: by closed forms, by hand, and by another road."""
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from types import SimpleNamespace
 
 import numpy as np
@@ -591,3 +591,28 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
         update={"false_alarms_per_hour": aimed, "alarm_threshold": threshold}
     )
     assert found.identification_results == {"parts": 3, "rate": aimed}
+
+
+def test_a_fit_may_misread_an_effect_by_what_its_noise_model_foretells():
+    """By hand: the root of the lacking power over that of the effect, axes weighed as least squares does."""
+    one, other = flown(seed=5), flown(seed=6, gains=(0.4, 1.0))
+    noise = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
+    rest = np.vstack([fitting.rows_and_one_step_residuals(MODEL, flight)[1] for flight in (one, other)])
+    answers = [fitting.rows_whitened_residual_and_responses(MODEL, flight)[2] for flight in (one, other)]
+    answers = np.vstack([each - each.mean(axis=0) for each in answers])
+    lacking = [max(np.var(rest[:, axis]) / HEARD[axis, axis] - 1.0, 0.0) for axis in range(3)]
+    for group, found in enumerate(fitting.hidden_gain_errors([one, other], MODEL, noise)):
+        power = [np.mean(answers[:, group, axis] ** 2) / HEARD[axis, axis] for axis in range(3)]
+        by_hand = np.sqrt(sum(q * p for q, p in zip(lacking, power, strict=True))) / sum(power)
+        assert found == pytest.approx(min(by_hand, 0.33) / np.sqrt(3.0))  # the sd of anything below
+
+
+def test_a_flight_louder_than_all_that_were_fitted_widens_no_noise_under_other_laws():
+    """The filter does so by itself. Under the same law it does not; nor if a fitted flight was as loud."""
+    found = {}
+    for laws, fitted in product((False, True), (1.0, 100.0)):
+        model = MODEL.model_copy(update={"vehicle": MODEL.vehicle.model_copy(update={"other_laws": laws})})
+        one, other = (flown((1.0, 1.0), loud, 600, seed) for loud, seed in ((100.0, 5), (fitted, 6)))
+        found[laws, fitted] = np.mean(fitting._window_inflations(known(model, 0.3, 0.4), one, [other]))
+    assert found[False, 1.0] == found[False, 100.0] == found[True, 100.0] > 20.0
+    assert found[True, 1.0] < 3.0

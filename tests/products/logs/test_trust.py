@@ -12,7 +12,7 @@ from beaver_ftc_logs.bank import build_trim_and_gain_state_model
 from beaver_ftc_logs.column_mistakes import CorrectedLog
 from beaver_ftc_logs.diagnose import diagnose, finalize_rows_at_log_stamps
 from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
-from beaver_ftc_logs.model import FittedRanges
+from beaver_ftc_logs.model import FittedRanges, NoiseModel
 from products.logs import small
 from telling import apart
 
@@ -248,6 +248,15 @@ def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
     step, own = model.settings.effectiveness_level_step, model.settings.group_gain_offset_sd
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
     assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
+    noise = {"average": [1.0, 0.5], "noise": model.residual_covariance, "misreads": [0.3, 0.1]}
+    misread = model.model_copy(update={"noise_models": [NoiseModel(**noise)]})
+    for average, more in (((1.0, 0.5), [0.09, 0.01]), ((1.0, 0.4), [0.0, 0.0])):
+        found = build_trim_and_gain_state_model(misread, average)
+        usual = build_trim_and_gain_state_model(model)
+        variance, usual_variance = (np.diag(one.initial_covariance)[4:] for one in (found, usual))
+        assert variance - usual_variance == pytest.approx(more)
+        drift, usual_drift = (one.random_walk_variance[4:] for one in (found, usual))  # of a law: none
+        assert drift == pytest.approx(usual_drift, rel=1e-3)
 
 
 def test_a_model_that_was_fitted_on_little_says_little(model):

@@ -31,8 +31,7 @@ from beaver_ftc.aircraft import (
 )
 from beaver_ftc.design import design_record
 from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL_NAME
-from beaver_ftc.documents import BadInput, SimulationFailed
-from beaver_ftc.documents.files import put_folder
+from beaver_ftc.documents import BadInput, SimulationFailed, put_folder
 from beaver_ftc.plant import (
     AT_IDLE,
     GEAR,

@@ -8,8 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from beaver_ftc.aircraft import imported_folder
-from beaver_ftc.documents import BadInput
-from beaver_ftc.documents.files import put_folder
+from beaver_ftc.documents import BadInput, put_folder
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import (

@@ -29,7 +29,6 @@ STARTS, STARTS_OF_WORST = 48, 96
 # Of the angular accelerations, from one look at a state to the next: since each changes them by less than a
 # tenth of what the one before did, what is left is less than the error of their rounding in the file.
 STILL_RAD_S2 = 1e-6
-BLOCK = 1
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 ALTITUDE_M = 1500.0  # half width of what is derived, about the trim's
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
@@ -302,9 +301,8 @@ def sample(
                 standing.begin(start)
                 forks.give(partial(standing.look, None), standing.pass_over)
         else:
-            look = partial(_look_at_block, plant, draw, properties, tanks, errors)
-            for k in range(0, starts, BLOCK):
-                forks.give(partial(look, drawn[k : k + BLOCK]))
+            for start in drawn:
+                forks.give(partial(_look_at_start, plant, draw, properties, tanks, errors, start))
         rows = np.concatenate(forks.results())
     tanks.fill(plant, 0.0)
     _together(plant)
@@ -312,19 +310,16 @@ def sample(
     return finite(reader.samples(rows))
 
 
-def _look_at_block(
+def _look_at_start(
     plant: Plant, draw: Draw, properties: Mapping[str, str], tanks: "Tanks", errors: Errors | None,
-    starts: Sequence[Start],
+    start: Start,
 ) -> np.ndarray:  # fmt: skip
-    """The rows of some starts, each of a newly loaded plant like this one."""
-    rows = []
+    """The rows of a start, of a newly loaded plant like this one."""
     with translated(plant.aircraft.jsbsim):  # here, because JSBSim's errors do not pass between processes
-        for start in starts:
-            own = Plant(plant.rate_hz, plant.substeps, plant.aircraft)
-            standing = _Standing(own, draw, Reader(own, properties), tanks)
-            standing.begin(start)
-            rows.append(standing.look(errors))
-    return np.concatenate(rows)
+        own = Plant(plant.rate_hz, plant.substeps, plant.aircraft)
+        standing = _Standing(own, draw, Reader(own, properties), tanks)
+        standing.begin(start)
+        return standing.look(errors)
 
 
 Asked = Sequence[tuple[Place, int]]  # places to look at, each with its share of the travel

@@ -28,6 +28,8 @@ _PEAK_RATE_QUANTILE_PROBABILITIES = (np.arange(40) + 0.5) / 40.0
 _MIN_PEAKS, _PEAKS_PER_ROOT_OF_COUNT = 10, 2.0
 """Peaks over the level: so many at least, else so many times the root of their number."""
 _CREDIBLE_INTERVAL_PROBABILITIES = (0.05, 0.95)
+_CHANCE_OF_MORE_ALARMS = 0.05
+"""Chance that the declared rate itself raises more alarms in the held-out flights than are permitted."""
 EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
 _MAX_SEARCHED_EXCESS = 1e4
@@ -138,8 +140,24 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
-    """The threshold at which this rate of false alarms is expected; the level of the tail if the rate there
-    is lower."""
+    """The threshold at which this rate of false alarms is expected, but not below any peak by which the
+    held-out flights raise more alarms than the rate does by chance; the level of the tail if that is higher.
+
+    If a few flights are far from the others, no Pareto tail fits them: it expects fewer alarms than there
+    were.
+    """
+    from scipy.stats import poisson
+
+    expected_count = false_alarms_per_hour * tail.healthy_minutes / 60.0
+    n_permitted = int(poisson.ppf(1.0 - _CHANCE_OF_MORE_ALARMS, expected_count))
+    descending_excesses = sorted(tail.excess_over_level, reverse=True)
+    observed_excess = descending_excesses[n_permitted] if n_permitted < len(descending_excesses) else 0.0
+    return tail.tail_start_level + max(observed_excess, _excess_of_expected_rate(tail, false_alarms_per_hour))
+
+
+def _excess_of_expected_rate(tail: PeakTail, false_alarms_per_hour: float) -> float:
+    """Excess over the level of the tail at which the posterior mean of the rate is this; 0 if the rate at the
+    level is lower."""
     pareto_shapes, pareto_scales, grid_probabilities = _pareto_posterior(tail)
     mean_peaks_per_hour = float(_peaks_per_hour_quantiles(tail).mean())
 
@@ -152,7 +170,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
 
     low_excess, high_excess = 0.0, 1.0
     if not has_too_many_alarms(low_excess):
-        return tail.tail_start_level
+        return 0.0
     while has_too_many_alarms(high_excess) and high_excess < _MAX_SEARCHED_EXCESS:
         low_excess, high_excess = high_excess, 2.0 * high_excess
     for _ in range(40):
@@ -162,7 +180,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
             if has_too_many_alarms(middle_excess)
             else (low_excess, middle_excess)
         )
-    return tail.tail_start_level + high_excess
+    return high_excess
 
 
 def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> float:

@@ -2,15 +2,16 @@
 
 Under hypothesis h, with effectiveness e_h of the groups, the part of the rates unexplained by the past is
 
-    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, r R)
+    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, q r R)
 
 with the intercept b of the model. The trim c (3,), the common gain s and the additional gain d (G,) of each
 group belong to the flight: each hypothesis estimates them with a Kalman filter. r is the running scale of the
-noise. The common gain multiplies the intercept and all responses, whose sum vanishes in trimmed flight: it
-shows in the motion about trim, as the dynamic pressure does, and not in the trim. One hypothesis changes to
-another at random times (interacting multiple models [Blom1988]); the new one inherits trim and gains, plus an
-offset of the rates if a surface may be stuck. The last hypothesis is that nothing answers the commands, as on
-the ground: it estimates no trim and no gain.
+noise, and q the variance of a sample over that of the noise, larger after quick commands
+(`quick_response_variance_scale`). The common gain multiplies the intercept and all responses, whose sum
+vanishes in trimmed flight: it shows in the motion about trim, as the dynamic pressure does, and not in the
+trim. One hypothesis changes to another at random times (interacting multiple models [Blom1988]); the new one
+inherits trim and gains, plus an offset of the rates if a surface may be stuck. The last hypothesis is that
+nothing answers the commands, as on the ground: it estimates no trim and no gain.
 
 The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
 the probabilities of the delays.
@@ -33,6 +34,8 @@ _MIN_HYPOTHESIS_PROBABILITY = 1e-15
 _SQUARED_RESIDUAL_CLIP_PER_AXIS = 3.0
 _RESIDUAL_SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
+_QUICK_RESPONSE_SPAN_S = 0.5
+"""A response is quick if it differs from its mean over so many seconds."""
 _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 _MIN_NOISE_MODEL_PROBABILITY = 1e-3
@@ -137,11 +140,14 @@ def _noise_model_log_likelihood(whitened_flight: Samples, model: Model, noise_mo
         - group_responses.sum(axis=1)
         - model.whitened_intercept(noise_model.ma_coefficients)
     )
-    squared_residual = np.einsum(
-        "na,ab,nb->n", residual, np.linalg.inv(noise_model.residual_covariance), residual
+    covariance = np.array(noise_model.residual_covariance)
+    quick_variance_scale = quick_response_variance_scale(
+        np.nan_to_num(group_responses), covariance, model, noise_model.ma_coefficients
     )
+    squared_residual = np.einsum("na,ab,nb->n", residual, np.linalg.inv(covariance), residual)
+    squared_residual /= quick_variance_scale
     t_degrees_of_freedom = model.settings.t_degrees_of_freedom
-    log_determinant = np.linalg.slogdet(noise_model.residual_covariance)[1]
+    log_determinant = np.linalg.slogdet(covariance)[1] + 3.0 * np.log(quick_variance_scale)
     log_likelihood = -0.5 * (
         (t_degrees_of_freedom + 3.0) * np.log1p(squared_residual / t_degrees_of_freedom) + log_determinant
     ) + 3.0 * np.log(sum(noise_model.ma_coefficients))
@@ -225,13 +231,19 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
         np.ascontiguousarray(np.nan_to_num(array)) for array in rates_and_responses
     )
     noise_parameters = build_residual_noise(model, samples.noise_ma_coefficients)
+    quick_variance_scales = quick_response_variance_scale(
+        group_responses,
+        model.covariance_of_noise_model(samples.noise_ma_coefficients),
+        model,
+        samples.noise_ma_coefficients,
+    )
     min_noise_variance_scales = np.zeros(len(is_predictable))
     if model.vehicle.other_laws:
         residual = np.where(
             is_predictable[:, None],
             rates_unexplained_by_past - noise_parameters.intercept_rad_s - group_responses.sum(axis=1),
             0.0,
-        )
+        ) / np.sqrt(quick_variance_scales[:, None])
         min_noise_variance_scales = recent_noise_variance_scale(
             residual, is_predictable, noise_parameters.covariance, model.rate_hz
         )
@@ -243,8 +255,40 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
         build_trim_and_gain_state_model(model, samples.noise_ma_coefficients),
         noise_parameters,
         min_noise_variance_scales,
+        quick_variance_scales,
     )
     return bank_run
+
+
+def quick_response_variance_scale(
+    group_responses: Floats, noise_covariance: Floats, model: Model, ma_coefficients: Sequence[float]
+) -> Floats:
+    """Return the variance of the residual over that of the noise, (n,), where responses (n, G, 3) are quicker
+    than usual in the fit: a share of the quick part may be missing, or be too much.
+
+    Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
+    noise: it has the same sign in many samples.
+    """
+    power = quick_response_power(group_responses, noise_covariance, model.rate_hz)
+    unusual_power = np.maximum(power - model.usual_quick_response_power(ma_coefficients), 0.0)
+    return np.asarray(1.0 + model.settings.quick_response_error_share**2 * unusual_power)
+
+
+def quick_response_power(group_responses: Floats, noise_covariance: Floats, rate_hz: float) -> Floats:
+    """Return the power of the quick part of the responses (n, G, 3) an axis, in variances of the noise, (n,).
+
+    The quick part is the difference from the mean over the last half second.
+    """
+    window_end_rows = np.arange(1, len(group_responses) + 1)
+    window_begin_rows = np.maximum(window_end_rows - max(round(_QUICK_RESPONSE_SPAN_S * rate_hz), 1), 0)
+    cumulated_responses = np.concatenate(
+        [np.zeros((1, *group_responses.shape[1:])), np.cumsum(group_responses, axis=0)]
+    )
+    slow_responses = (cumulated_responses[window_end_rows] - cumulated_responses[window_begin_rows]) / (
+        window_end_rows - window_begin_rows
+    )[:, None, None]
+    whitening_matrix = np.linalg.inv(np.linalg.cholesky(noise_covariance)).T
+    return np.asarray((((group_responses - slow_responses) @ whitening_matrix) ** 2).sum(axis=(1, 2)) / 3.0)
 
 
 def recent_noise_variance_scale(
@@ -288,13 +332,15 @@ def run_bank(
     state_model,
     noise_parameters,
     min_noise_variance_scales,
+    quick_variance_scales,
 ):
     """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and sample_log_likelihoods
     (n,): the log likelihood of a sample given all before it, times effective_sample_share.
 
     Shapes: rates_unexplained_by_past (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the
     sample may be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise_parameters:
-    ResidualNoise (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise.
+    ResidualNoise (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise;
+    quick_variance_scales (n,): by `quick_response_variance_scale`.
     """
     n_samples = len(rates_unexplained_by_past)
     n_hypotheses = len(bank.transition_share)
@@ -329,7 +375,7 @@ def run_bank(
                     group_responses[k],
                     bank,
                     noise_parameters,
-                    max(noise_variance_scale, min_noise_variance_scales[k]),
+                    quick_variance_scales[k] * max(noise_variance_scale, min_noise_variance_scales[k]),
                 )
             )
             _limit_states(

@@ -23,6 +23,8 @@ from beaver_ftc_logs.filtering import (
     any_fault_log_odds_gains,
     hypothesis_state_and_noise_posterior,
     page_cusum,
+    quick_response_power,
+    quick_response_variance_scale,
     recent_noise_variance_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
@@ -90,6 +92,10 @@ _MAX_WINDOW_COVARIANCE_INFLATION = 200.0
 seed 205, else 5)."""
 _COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
+_USUAL_QUICK_RESPONSE_SHARE = 0.9
+"""Share of the samples of the fit whose responses count as usual."""
+_MIN_QUICK_SAMPLES = 10
+"""Samples with quick responses that a flight must have, for the mean of their errors."""
 _RANK_TOLERANCE = 1e-9
 _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
 """Number of held-out flights that are also read with each mistake in their columns. The largest gain in
@@ -416,13 +422,66 @@ def _with_hidden_gain_errors(usable_flights: Sequence[FlightWithUsableRows], mod
             "noise_models": [
                 noise_model.model_copy(
                     update={
-                        "hidden_group_gain_error_sd": hidden_gain_errors(usable_flights, model, noise_model)
+                        "hidden_group_gain_error_sd": hidden_gain_errors(usable_flights, model, noise_model),
+                        "usual_quick_response_power": usual_quick_response_power(
+                            usable_flights, model, noise_model
+                        ),
                     }
                 )
                 for noise_model in model.noise_models
             ]
         }
     )
+
+
+def usual_quick_response_power(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model, noise_model: NoiseModel
+) -> float:
+    """The power of the quick part of the responses that the flights of one noise exceed in a tenth of their
+    samples, in variances of this noise."""
+    powers = [
+        quick_response_power(
+            rows_whitened_residual_and_responses(model, usable_flight)[2],
+            np.array(noise_model.residual_covariance),
+            model.rate_hz,
+        )
+        for usable_flight in usable_flights
+        if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
+    ]
+    return float(np.quantile(np.concatenate(powers), _USUAL_QUICK_RESPONSE_SHARE))
+
+
+def quick_response_error_share(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> float:
+    """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
+    flights left out; 1 if none of them has such responses."""
+    squared_shares = [
+        _squared_quick_response_error_share(fit_with_same_order(fitted_flights, model), held_out)
+        for fitted_flights, held_out_flights in _fitted_and_held_out_by_split(usable_flights)
+        for held_out in held_out_flights
+    ]
+    known_squared_shares = [squared_share for squared_share in squared_shares if squared_share is not None]
+    return float(np.sqrt(np.clip(max(known_squared_shares, default=1.0), 0.0, 1.0)))
+
+
+def _squared_quick_response_error_share(fold_model: Model, held_out: FlightWithUsableRows) -> float | None:
+    """The square of the error of unusually quick responses in a flight left out, as a share of them; None if
+    it has too few.
+
+    In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 s), with
+    the variance r of the noise of this flight and the power s of the quick responses.
+    """
+    ma_coefficients = held_out.samples.noise_ma_coefficients
+    _, residual, rate_responses = rows_whitened_residual_and_responses(fold_model, held_out)
+    covariance = fold_model.covariance_of_noise_model(ma_coefficients)
+    power = quick_response_power(rate_responses, covariance, fold_model.rate_hz)
+    is_unusual = power > fold_model.usual_quick_response_power(ma_coefficients)
+    if is_unusual.sum() < _MIN_QUICK_SAMPLES:
+        return None
+    whitening_matrix = np.linalg.inv(np.linalg.cholesky(covariance)).T
+    squares = (((residual - np.median(residual, axis=0)) @ whitening_matrix) ** 2).sum(axis=1)
+    noise_variance = max(float(np.median(squares)) / trust.MEDIAN_CHI_SQUARE_3_DOF, 1.0)
+    relative_squares = squares[is_unusual] / (3.0 * noise_variance)
+    return float(((relative_squares - 1.0) / power[is_unusual]).mean())
 
 
 def hidden_gain_errors(
@@ -484,11 +543,13 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         delay_samples / model.rate_hz
         for delay_samples in ((0.0,) if may_air_move else _COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES)
     ]
-    other_laws_settings = (
+    other_laws_settings: dict[str, Any] = (
         _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if may_air_move else {})
         if model.vehicle.other_laws
         else {}
     )
+    if model.vehicle.other_laws and model.noise_models:
+        other_laws_settings |= {"quick_error": quick_response_error_share(usable_flights, model)}
     labelled = _count_labelled_faults(usable_flights, model)
     if not labelled.fault_levels_by_group:
         return _filter_settings_without_labelled_faults(
@@ -751,20 +812,19 @@ def _standardized_centred_responses_and_residual(
     model: Model, held_out: FlightWithUsableRows
 ) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
-    both in sd of the noise, without means."""
+    both in sd of the noise, without means; where responses are quick, of the noise and their error."""
     _, residual, rate_responses = rows_whitened_residual_and_responses(model, held_out)
-    whitening_matrix = np.linalg.inv(
-        np.linalg.cholesky(
-            np.array(
-                model.with_inflated_covariance_of_noise_model(
-                    held_out.samples.noise_ma_coefficients
-                ).residual_covariance
-            )
-        )
-    ).T
+    ma_coefficients = held_out.samples.noise_ma_coefficients
+    covariance = model.covariance_of_noise_model(ma_coefficients)
+    sd_scale = np.sqrt(quick_response_variance_scale(rate_responses, covariance, model, ma_coefficients))
+    inflated_covariance = model.covariance_inflation_of_noise_model(ma_coefficients) * covariance
+    whitening_matrix = np.linalg.inv(np.linalg.cholesky(inflated_covariance)).T
     noise_whitened_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
     noise_whitened_residual = residual @ whitening_matrix
-    return _without_mean(noise_whitened_responses), _without_mean(noise_whitened_residual)
+    return (
+        _without_mean(noise_whitened_responses) / sd_scale[:, None, None, None],
+        _without_mean(noise_whitened_residual) / sd_scale[:, None],
+    )
 
 
 def _without_mean(values: Floats) -> Floats:

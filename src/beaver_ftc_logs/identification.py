@@ -80,6 +80,14 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     )
     hidden_gain_errors = [model.hidden_gain_error_sd(known) for known in known_ma_coefficients]
     max_hidden_gain_error_sd = np.max(hidden_gain_errors, axis=0).tolist()
+    least_usual_power = min(
+        (
+            noise_model.usual_quick_response_power
+            for noise_model in model.noise_models
+            if noise_model.usual_quick_response_power is not None
+        ),
+        default=None,
+    )
     noise_models = list(model.noise_models)
     for ma_coefficients in UNFITTED_NOISE_MA_CANDIDATES:
         if ma_coefficients not in known_ma_coefficients:
@@ -98,6 +106,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                     noise=np.cov(residuals.T).tolist(),
                     wider=max_covariance_inflation,
                     misreads=max_hidden_gain_error_sd,
+                    quick=least_usual_power,
                 )
             )
     for gyro_noise_rad_s in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
@@ -110,6 +119,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                 average=[1.0],
                 wider=max_covariance_inflation,
                 misreads=max_hidden_gain_error_sd,
+                quick=least_usual_power,
                 **ar_and_covariance,
             )
         )

@@ -89,6 +89,13 @@ class FilterSettings(Section):
         description="in which that returns to the common gain, s",
         alias="own_gain_time_s",
     )
+    quick_response_error_share: Number = Field(
+        1.0,
+        ge=0,
+        le=1,
+        description="error of responses quicker than the fitted flights have, as a share of them",
+        alias="quick_error",
+    )
     max_trim_deviation_in_sd: Number = Field(
         4.0,
         gt=0,
@@ -263,6 +270,14 @@ class NoiseModel(Section):
         description="share of its effect by which the fit may misread each group in this noise",
         alias="misreads",
     )
+    usual_quick_response_power: Number | None = Field(
+        default=None,
+        ge=0,
+        le=_MAX_COEFFICIENT,
+        description="power of the quick part of the responses, in variances of the noise, that the fitted "
+        "flights exceed in a tenth of their samples",
+        alias="quick",
+    )
 
 
 class Model(Section):
@@ -419,50 +434,55 @@ class Model(Section):
 
         ma_coefficients: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        matching_covariances = [
-            np.array(noise_model.residual_covariance)
+        if not self._noise_models_of(ma_coefficients):
+            return self
+        inflated_covariance = self.covariance_inflation_of_noise_model(
+            ma_coefficients
+        ) * self.covariance_of_noise_model(ma_coefficients)
+        return self.model_copy(update={"residual_covariance": inflated_covariance.tolist()})
+
+    def covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> Floats:
+        """Covariance (3, 3) of the noise fitted for flights of this moving average, (rad/s)2; that of all
+        flights where none was fitted."""
+        noise_models = self._noise_models_of(ma_coefficients)
+        return np.array(noise_models[0].residual_covariance if noise_models else self.residual_covariance)
+
+    def _noise_models_of(self, ma_coefficients: Sequence[float]) -> list[NoiseModel]:
+        return [
+            noise_model
             for noise_model in self.noise_models
             if noise_model.ma_coefficients == list(ma_coefficients)
         ]
-        if not matching_covariances:
-            return self
-        return self.model_copy(
-            update={
-                "residual_covariance": (
-                    self.covariance_inflation_of_noise_model(ma_coefficients) * matching_covariances[0]
-                ).tolist()
-            }
-        )
 
     def covariance_inflation_of_noise_model(self, ma_coefficients: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        return next(
-            (
-                float(noise_model.covariance_inflation)
-                for noise_model in self.noise_models
-                if noise_model.ma_coefficients == list(ma_coefficients)
-            ),
-            1.0,
-        )
+        noise_models = self._noise_models_of(ma_coefficients)
+        return float(noise_models[0].covariance_inflation) if noise_models else 1.0
 
     def hidden_gain_error_sd(self, ma_coefficients: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
         fitted_errors = [
             noise_model.hidden_group_gain_error_sd
-            for noise_model in self.noise_models
-            if noise_model.ma_coefficients == list(ma_coefficients) and noise_model.hidden_group_gain_error_sd
+            for noise_model in self._noise_models_of(ma_coefficients)
+            if noise_model.hidden_group_gain_error_sd
         ]
         return np.array(fitted_errors[0]) if fitted_errors else np.zeros(len(self.groups))
 
+    def usual_quick_response_power(self, ma_coefficients: Sequence[float]) -> float:
+        """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
+        the noise; infinite where that is not known."""
+        known_powers = [
+            noise_model.usual_quick_response_power
+            for noise_model in self._noise_models_of(ma_coefficients)
+            if noise_model.usual_quick_response_power is not None
+        ]
+        return known_powers[0] if known_powers else float("inf")
+
     def residual_ar_coefficients(self, ma_coefficients: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        matching_coefficients = [
-            noise_model.ar_coefficients
-            for noise_model in self.noise_models
-            if noise_model.ma_coefficients == list(ma_coefficients)
-        ]
-        return np.reshape(np.array(matching_coefficients[0] if matching_coefficients else []), (-1, 3, 3))
+        noise_models = self._noise_models_of(ma_coefficients)
+        return np.reshape(np.array(noise_models[0].ar_coefficients if noise_models else []), (-1, 3, 3))
 
     def whitened_intercept(self, ma_coefficients: Sequence[float]) -> Floats:
         """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""

@@ -41,7 +41,7 @@ _MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RANGE_QUANTILES = (0.001, 0.999)
-_MEDIAN_CHI_SQUARE_3_DOF = 2.366
+MEDIAN_CHI_SQUARE_3_DOF = 2.366
 """The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
 """Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
@@ -619,7 +619,7 @@ def _trim_and_gain_regression_data(
 
 def _noise_variance_scale(squared_residuals: Floats) -> float:
     """The scale of the noise by the squares of what is left, (3 n,)."""
-    return float(np.median(squared_residuals.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3_DOF)
+    return float(np.median(squared_residuals.reshape(-1, 3).sum(axis=1)) / MEDIAN_CHI_SQUARE_3_DOF)
 
 
 def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:

@@ -221,12 +221,27 @@ def test_the_sums_of_flights_that_differ_are_as_many_times_wider():
     assert extremes._excess_overdispersion([(np.empty(0), 1.0), (np.zeros(2), 3.0)]) == 1.0
 
 
+@pytest.mark.parametrize(("hours", "permitted"), [(0.05, 0), (0.06, 1), (0.3, 1), (0.4, 2), (0.8, 2)])
+def test_no_more_held_out_peaks_raise_an_alarm_than_the_rate_permits(hours, permitted):
+    """Three flights are far from the others: a tail through all puts 1 an hour below them. By Poisson's law
+    the rate raises no more than are permitted with a probability of 0.95, by hand: exp(-0.05) = 0.951,
+    1.06 exp(-0.06) = 0.998, 1.3 exp(-0.3) = 0.963, and 1.4 exp(-0.4) = 0.938, (1.8 + 0.32) exp(-0.8) = 0.953.
+    """
+    excess = [0.01] * 40 + [116.0, 158.0, 132.0]
+    tail = extremes.PeakTail(level=0.05, excess=excess, minutes=60.0 * hours, dispersion=15.0)
+    expected = 0.05 + extremes._excess_of_expected_rate(tail, 1.0)
+    highest = 0.05 + [158.0, 132.0, 116.0][permitted]
+    assert expected < highest
+    assert extremes.threshold_for_false_alarms(tail, 1.0) == highest
+
+
 def test_where_hardly_any_peak_is_as_high_as_the_level_it_is_the_threshold():
     """Ten peaks in a hundred hours are fewer than one an hour already."""
     tail = extremes.PeakTail(level=2.5, excess=[0.1 * k for k in range(1, 11)], minutes=6000.0)
     assert extremes.threshold_for_false_alarms(tail, 1.0) == 2.5
-    low, high = (extremes.threshold_for_false_alarms(tail, rate) for rate in (0.05, 0.01))
+    low, high = (2.5 + extremes._excess_of_expected_rate(tail, rate) for rate in (0.05, 0.01))
     assert 2.5 < low < high
+    assert extremes.threshold_for_false_alarms(tail, 0.05) == low
     for rate, threshold in ((0.05, low), (0.01, high)):
         assert extremes.expected_false_alarms_per_hour(tail, threshold).value == pytest.approx(rate, rel=1e-6)
     at_level = extremes.expected_false_alarms_per_hour(tail, 2.5)

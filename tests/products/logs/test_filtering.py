@@ -14,6 +14,7 @@ from beaver_ftc_logs.filtering import (
     _with_command_delay,
     hypothesis_state_and_noise_posterior,
 )
+from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import small, synthetic
 from telling import apart
@@ -165,20 +166,29 @@ def test_a_covariance_stays_symmetric_to_the_bit():
 
 
 @pytest.mark.parametrize("average", [(1.0, 0.6, -0.2), (1.0, -0.35)])
-def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monkeypatch, average):
-    """Filtered by C(1) / C(z) a white residual is C(1) times as large, and so is its noise: the density by
-    each is the same once the volume is."""
+@pytest.mark.parametrize("usual", [np.inf, 0.4])
+def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monkeypatch, average, usual):
+    """Filtered by C(1) / C(z) a white residual is C(1) times as large, and so are its noise and the answers:
+    the density by each is the same once the volume is."""
     rng, gain = np.random.default_rng(5), sum(average)
     white = rng.normal(0.0, (0.05, 0.02, 0.09), (40, 3))
     noise = np.array([[0.0025, 0.0003, -0.0007], [0.0003, 0.0004, 0.0001], [-0.0007, 0.0001, 0.0081]])
     constant, known = np.array([0.3, -0.2, 0.1]), np.arange(40) != 7
     apart(noise=noise[np.triu_indices(3)], constant=constant, average=average)
-    settings = SimpleNamespace(t_degrees_of_freedom=7.0, effective_sample_share=0.4)
-    model = SimpleNamespace(settings=settings, whitened_intercept=lambda average: sum(average) * constant)
-    found = []
+    settings = SimpleNamespace(
+        t_degrees_of_freedom=7.0, effective_sample_share=0.4, quick_response_error_share=0.6
+    )
+    model = SimpleNamespace(
+        settings=settings,
+        whitened_intercept=lambda average: sum(average) * constant,
+        usual_quick_response_power=lambda average: usual,
+        rate_hz=8.0,
+    )
+    found, answers_by_hand = [], rng.normal(0.0, 0.05, (40, 2, 3))
     for of, size in ((average, gain), ((1.0,), 1.0)):
-        answers = rng.normal(size=(40, 2, 3))
+        answers = size * answers_by_hand
         unexplained = size * (white + constant) + answers.sum(axis=1)
+        answers = np.where(known[:, None, None], answers, np.nan)
         monkeypatch.setattr(
             filtering, "whitened_rates_and_responses", lambda *_, made=(known, unexplained, answers): made
         )
@@ -186,7 +196,10 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         found.append(filtering._noise_model_log_likelihood(None, model, colour))
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
     square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)
-    student = -0.5 * ((7.0 + 3.0) * np.log1p(square / 7.0) + np.log(np.linalg.det(noise)))
+    answers_by_hand[7] = 0.0  # unknown
+    wider = _quick_by_hand(answers_by_hand, noise, 4, usual, 0.6)
+    volume = np.log(np.linalg.det(noise)) + 3.0 * np.log(wider)
+    student = -0.5 * ((7.0 + 3.0) * np.log1p(square / wider / 7.0) + volume)
     np.testing.assert_allclose(found[1], np.where(known, 0.4 * student, 0.0))
 
 
@@ -228,6 +241,16 @@ def test_the_scale_of_the_last_two_seconds_is_of_samples_or_of_their_sums():
     np.testing.assert_allclose(found, np.max(means, axis=0), rtol=1e-9)
 
 
+def _quick_by_hand(responses, covariance, rows, usual, share):
+    """What differs from the mean of so many rows is quick: above the usual power a share may be wrong."""
+    found = []
+    for k in range(len(responses)):
+        quick = responses[k] - responses[max(k + 1 - rows, 0) : k + 1].mean(axis=0)
+        power = sum(each @ np.linalg.inv(covariance) @ each for each in quick) / 3.0
+        found.append(1.0 + share**2 * max(power - usual, 0.0))
+    return np.array(found)
+
+
 @pytest.mark.parametrize("laws", [False, True])
 def test_under_other_laws_the_noise_is_as_wide_as_the_last_seconds_show(monkeypatch, laws):
     """By what the flight leaves if it is healthy, less the constant; else by the filter's own scale."""
@@ -242,16 +265,25 @@ def test_under_other_laws_the_noise_is_as_wide_as_the_last_seconds_show(monkeypa
         lambda *of: given.append(of) or np.arange(40.0),
     )
     assert filtering._run_bank_on_flight(flight, model, "bank") == "run"
-    rates, responses, usable, bank, _, noise, least = given[-1]
+    rates, responses, usable, bank, _, noise, least, quick = given[-1]
     np.testing.assert_array_equal(rates, np.nan_to_num(left))
     np.testing.assert_array_equal(responses, np.nan_to_num(answers))
     np.testing.assert_array_equal(usable, ok)
     assert (bank, len(given)) == ("bank", 1 + laws)
     assert least.tolist() == (list(range(40)) if laws else [0.0] * 40)
+    np.testing.assert_allclose(quick, 1.0)  # no noise of the model says what is usual
+    colour = {"average": [1.0], "noise": model.residual_covariance, "wider": 2.0, "quick": 0.4}
+    model = model.model_copy(update={"noise_models": [NoiseModel(**colour)]})
+    white = replace(flight, noise_ma_coefficients=(1.0,))
+    filtering._run_bank_on_flight(white, model.with_inflated_covariance_of_noise_model((1.0,)), "bank")
+    wider = _quick_by_hand(responses, np.array(colour["noise"]), 5, 0.4, 1.0)
+    assert wider.max() > 2.0
+    np.testing.assert_allclose(given[-1][-1], wider)
+    del given[1 + laws :]
     if laws:
         residual, known, covariance, rate_hz = given[0]
         expected = np.where(ok[:, None], left - np.array(model.intercept) - answers.sum(axis=1), 0.0)
-        np.testing.assert_allclose(residual, expected, atol=1e-15)
+        np.testing.assert_allclose(residual, expected / np.sqrt(quick)[:, None], atol=1e-15)
         assert (known.tolist(), rate_hz) == (ok.tolist(), 10.0)
         np.testing.assert_array_equal(covariance, noise.covariance)
 

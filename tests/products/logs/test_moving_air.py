@@ -284,6 +284,9 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
         )
     assert (np.diff([np.linalg.det(one.residual_covariance) for one in gyros]) > 0.0).all()
     assert {one.covariance_inflation for one in gyros} == {model.noise_models[0].covariance_inflation}
+    assert {one.usual_quick_response_power for one in found.noise_models[1:]} == {
+        model.noise_models[0].usual_quick_response_power
+    }
     assert identification.add_unseen_noise_models(small.model(), flights).noise_models == []
 
 
@@ -326,8 +329,8 @@ def test_noisier_gyros_are_added_to_the_quietest_noise_and_as_wide_as_the_widest
     """Each with the predictor of as many lags as the fit has, by the covariance of least determinant."""
     quiet, loud = np.diag([1.0, 2.0, 3.0]) * 1e-6, np.diag([0.5, 9.0, 8.0]) * 1e-6
     known = [
-        NoiseModel(average=[1.0], noise=loud.tolist(), wider=1.5),
-        NoiseModel(average=[1.0, 0.5], noise=quiet.tolist(), wider=2.5),
+        NoiseModel(average=[1.0], noise=loud.tolist(), wider=1.5, quick=7.0),
+        NoiseModel(average=[1.0, 0.5], noise=quiet.tolist(), wider=2.5, quick=5.0),
         NoiseModel(average=list(AVERAGE), noise=loud.tolist(), wider=1.25),
     ]
     model = moving.model_copy(update={"noise_models": known})
@@ -337,6 +340,7 @@ def test_noisier_gyros_are_added_to_the_quietest_noise_and_as_wide_as_the_widest
     for one, gyro in zip(found[3:], np.geomspace(1e-5, 1e-2, 7), strict=True):
         before, noise = gyro_noise.residual_predictor_by_yule_walker(model, quiet, gyro, 20)
         assert (one.ma_coefficients, one.covariance_inflation) == ([1.0], 2.5)
+        assert one.usual_quick_response_power == 5.0  # of the noise whose responses are slowest
         np.testing.assert_allclose(one.ar_coefficients, before, atol=1e-12)
         np.testing.assert_allclose(one.residual_covariance, noise, atol=1e-15)
 

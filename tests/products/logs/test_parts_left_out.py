@@ -607,6 +607,60 @@ def test_a_fit_may_misread_an_effect_by_what_its_noise_model_foretells():
         assert found == pytest.approx(min(by_hand, 0.33) / np.sqrt(3.0))  # the sd of anything below
 
 
+def test_responses_are_usually_as_quick_as_in_nine_tenths_of_the_samples_of_a_noise():
+    """By hand: the power an axis of what differs from the mean of the last half second, in the noise."""
+    one, other = flown(seed=5), flown(seed=6, n=90)
+    noise = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
+    powers = []
+    for flight in (one, other):
+        answers = fitting.rows_whitened_residual_and_responses(MODEL, flight)[2]
+        last = round(0.5 * MODEL.rate_hz)
+        for k, now in enumerate(answers):
+            quick = now - answers[max(k + 1 - last, 0) : k + 1].mean(axis=0)
+            powers.append(sum(each @ np.linalg.inv(HEARD) @ each for each in quick) / 3.0)
+    found = fitting.usual_quick_response_power([one, other], MODEL, noise)
+    assert found == pytest.approx(np.quantile(powers, 0.9))
+
+
+@pytest.mark.parametrize(("errors", "loud", "share"), [
+    ([0.5], 1.0, 0.5), ([0.2, 0.5], 1.0, 0.5), ([0.8, 0.0], 3.0, 0.8 / 3.0), ([0.0], 1.0, 0.0),
+    ([5.0], 1.0, 1.0), ([None], 1.0, 1.0), ([None, 0.5], 1.0, 0.5),
+])  # fmt: skip
+def test_the_error_of_quick_responses_is_that_of_the_worst_flight_left_out(monkeypatch, errors, loud, share):
+    """A step in ten seconds, of which so much is missing while it is quick; in a loud flight that counts
+    less. Without such a step nothing is known of it, and all of it may be missing."""
+    rng, root, n = np.random.default_rng(4), np.linalg.cholesky(HEARD), 40_000
+    usual = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
+    model = MODEL.model_copy(
+        update={"noise_models": [usual.model_copy(update={"usual_quick_response_power": 4.0})]}
+    )
+    steps = np.zeros((n, 2, 3))
+    steps[:, 1, 2] = 20.0 * (np.arange(n) // 100 % 2)
+    begin = np.maximum(np.arange(n) - round(0.5 * MODEL.rate_hz) + 1, 0)
+    total = np.concatenate([np.zeros((1, 2, 3)), np.cumsum(steps, axis=0)])
+    slow = (total[1:] - total[begin]) / (np.arange(n) + 1 - begin)[:, None, None]
+
+    def rows_residual_answers(_, error):
+        noise = loud * rng.standard_normal((n, 3))
+        missing = 0.0 if error is None else error * (steps - slow).sum(axis=1)
+        return None, (noise + missing) @ root.T, steps @ root.T * (error is not None)
+
+    monkeypatch.setattr(
+        fitting,
+        "rows_whitened_residual_and_responses",
+        lambda model, flight: rows_residual_answers(model, flight.error),
+    )
+    monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, model: model)
+    flights = [
+        SimpleNamespace(error=error, samples=SimpleNamespace(noise_ma_coefficients=COLOUR))
+        for error in errors
+    ]
+    monkeypatch.setattr(
+        fitting, "_fitted_and_held_out_by_split", lambda of: [([], [flight]) for flight in of]
+    )
+    assert fitting.quick_response_error_share(flights, model) == pytest.approx(share, abs=0.02)
+
+
 def test_a_flight_louder_than_all_that_were_fitted_widens_no_noise_under_other_laws():
     """The filter does so by itself. Under the same law it does not; nor if a fitted flight was as loud."""
     found = {}

@@ -108,7 +108,7 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     check_log_fits_model(samples, model)
     rows = _diagnose_checked_log(samples, model)
     if rows.has_credible_alarm():
-        for group in trust.groups_with_negative_gain(samples, model):
+        for group in trust.groups_with_reversed_gain(samples, model):
             signs = [-1.0 if surface in group else 1.0 for surface in model.vehicle.surfaces]
             corrected_rows = _diagnose_checked_log(replace(samples, commands=samples.commands * signs), model)
             if corrected_rows.are_healthy_where_credible_in(rows):

@@ -44,6 +44,7 @@ _RANGE_QUANTILES = (0.001, 0.999)
 MEDIAN_CHI_SQUARE_3_DOF = 2.366
 """The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
+_REVERSED_GAIN_LIMIT = -0.5
 """Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
 kind none was below 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
 
@@ -413,9 +414,9 @@ def _whiten_by_likeliest_noise(samples: Samples, model: Model) -> tuple[Samples,
     return max(flights_and_log_likelihoods, key=lambda one: one[1][0].mean())[0]
 
 
-def groups_with_negative_gain(samples: Samples, model: Model) -> list[list[str]]:
+def groups_with_reversed_gain(samples: Samples, model: Model) -> list[list[str]]:
     """The groups of known effect to whose command the rates answer the other way round, by least squares
-    over all of a flight, however uncertain that is."""
+    over all of a flight: a gain nearer to -1 than to 0, which is that of a lost surface."""
     if (whitened_flight_and_model := _whiten_by_likeliest_noise(samples, model)) is None:
         return []
     is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
@@ -433,7 +434,7 @@ def groups_with_negative_gain(samples: Samples, model: Model) -> list[list[str]]
         for group, gain, has_known_effect in zip(
             model.groups, group_gains, is_group_effect_known(model), strict=True
         )
-        if has_known_effect and gain < 0.0
+        if has_known_effect and gain < _REVERSED_GAIN_LIMIT
     ]
 
 

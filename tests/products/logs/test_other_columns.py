@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.samples import load_flights_for_fit
-from beaver_ftc_logs.trust import central_ranges, groups_with_negative_gain, refuse_columns_not_as_identified
+from beaver_ftc_logs.trust import central_ranges, groups_with_reversed_gain, refuse_columns_not_as_identified
 from products.logs import small, synthetic
 
 
@@ -38,12 +38,21 @@ def test_a_command_of_the_other_sign_that_rests_at_the_end_is_refused(n_signal_l
     commands[800:, 1] = 0.0
     log = replace(flight, commands=commands)
     refuse_columns_not_as_identified(log, model)
-    assert groups_with_negative_gain(log, model) == ([["elevator"]] if sign < 0.0 else [])
+    assert groups_with_reversed_gain(log, model) == ([["elevator"]] if sign < 0.0 else [])
     if sign > 0.0:
         assert diagnose(log, model).has_credible_alarm() == (left < 1.0)
         return
     with pytest.raises(BadInput, match="if the command of elevator has the other sign, there is no alarm"):
         diagnose(log, model)
+
+
+@pytest.mark.parametrize(("gain", "reversed_groups"), [(-0.2, []), (-0.8, [["elevator"]])])
+def test_a_lost_surface_that_seems_to_answer_a_little_the_other_way_round_has_no_other_sign(
+    n_signal_lags, gain, reversed_groups
+):
+    model, _ = n_signal_lags
+    log = small.flight(model, n=1200, seed=10, lost=((1, 0, 1200, gain),))
+    assert groups_with_reversed_gain(log, model) == reversed_groups
 
 
 def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):

@@ -335,6 +335,13 @@ def test_power_goes_down_as_slowly_and_to_the_lowest():
     assert throttled(power={"enabled": 1})[1]["command"][0] == 21.0
 
 
+@pytest.mark.parametrize(("path", "expected"), [(-0.5, 13.2), (0.5, 26.8)])
+def test_engines_that_alone_yaw_half_the_time_keep_half_of_their_room_at_either_end(path, expected):
+    """Half of 15 % of 12 to 28 inHg."""
+    _, power = throttled(path=path, engines_alone_yaw_share=0.5)
+    assert power["base"] == pytest.approx(expected)
+
+
 def test_small_steps_of_power_are_taken_at_once():
     _, power = throttled(path=0.01 + (0.9 * PUSH + 0.2 - 0.05 - 0.04 - 0.3 - 0.2 + 0.001) / G)
     assert power["command"][0] == pytest.approx(power["base"])

@@ -401,10 +401,14 @@ def test_constant_errors_are_tolerated_term_by_term():
     ],
 )  # fmt: skip
 def test_the_angle_followed_drifts_by_gyros_and_by_gravity_s_share(bounds, side, up):
-    drift = felt(Bounds(sensors=bounds))["statistical"]["forces"]["component"]["flow_angle_drift_bound"]
-    still = felt()["statistical"]["forces"]["component"]["flow_angle_drift_bound"]
+    """Within a second by three tenths more or less: as the standard deviation of a walk."""
+    off, sound = (felt(b)["statistical"]["forces"]["component"] for b in (Bounds(sensors=bounds), Bounds()))
+    drift, still = off["flow_angle_drift_bound"], sound["flow_angle_drift_bound"]
     assert still == pytest.approx(7.292115e-5 + 0.03 / 46.0)  # the earth turns at this rate [WGS84]
     assert drift - still == pytest.approx([side, up], abs=1e-12)
+    gained = off["inertial_innovation_drift_intensity"] - sound["inertial_innovation_drift_intensity"]
+    angle_walk = gained / sound["axis_and_force_innovation_per_vane_error"][:, 1] ** 2
+    assert angle_walk == pytest.approx(0.09 * (drift**2 - still**2), rel=1e-6, abs=1e-15)
 
 
 def test_in_turbulence_gusts_turn_the_flow():
@@ -604,14 +608,15 @@ def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
     (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), PITCH), (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), ROLL),
 ])  # fmt: skip
 def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed, v, mix, axis):
-    """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads."""
+    """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads, first at 0 s."""
     chances, row = viewed["statistical"], np.full(5, 7.0)
     views, tests, alarm = chances["views"][: chances["n_views"]], chances["test_config"], chances["alarm"]
     views["direction"] = 0.0
     views["direction"][v], views["decaying_peak_score"], tests["isolation_llr_margin"] = mix, 9.0, 18.0
     alarm["detected_at_s"], tests["n_score_columns"] = -1.0, 4
-    statistical.update_alarm(alarm, tests, chances["block"], views, chances["forces"], chances["gust"], 2.5)
-    assert (alarm["score_over_alarm_level"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 2.5)
+    for t in (0.0, 2.5):
+        statistical.update_alarm(alarm, tests, chances["block"], views, chances["forces"], chances["gust"], t)
+    assert (alarm["score_over_alarm_level"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 0.0)
     statistical.write_alarm_scores_to_log_row(
         tests, chances["block"], views, chances["forces"], chances["gust"], row
     )

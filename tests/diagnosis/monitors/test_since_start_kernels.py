@@ -216,6 +216,32 @@ def test_small_errors_move_each_prediction_by_its_derivative():
     assert found == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("i", "test", "by_yaw", "by_force", "force"),
+    [
+        (ALPHA_HYPOTHESIS, BETA_FLOW_TEST, 0.4, 0.2, initial_errors.ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX),
+        (BETA_HYPOTHESIS, ALPHA_FLOW_TEST, 0.0, 0.1, initial_errors.BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX),
+    ],
+)
+def test_a_vane_is_off_by_no_more_than_its_least_effect_explains(i, test, by_yaw, by_force, force):
+    """The least of all errors within the bound, tried one by one, against what the force may take off it."""
+    monitor = new_watch(0.01)
+    errors, effects = (
+        monitor["initial_errors"],
+        monitor["initial_errors"]["filtered_signed_effect_per_unit_error"],
+    )
+    errors["error_bound"][i], effects[force] = 0.8, by_force
+    effects[initial_errors.VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX] = -0.9
+    effects[initial_errors.VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX] = by_yaw
+    seen = monitor["redundancy"]["test"]
+    seen["filtered_residual"][test], seen["filtered_bound"][test] = -0.12, 0.08
+    initial_errors.tighten_vane_error_bounds(monitor["redundancy"], errors, 1)
+    half = np.linspace(-np.arcsin(0.4), np.arcsin(0.4), 1001)  # 2 sin(half) is the error
+    least = np.min(0.9 * np.cos(half) - by_yaw * np.sin(half)) - by_force
+    share_left = 0.8  # of an effect, at least, within a filter's memory
+    assert errors["error_bound"][i] == pytest.approx(0.2 / (share_left * least))
+
+
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
 @pytest.mark.parametrize("i", range(N_INITIAL_ERROR_HYPOTHESES), ids=NAMES.get)
 @pytest.mark.parametrize(("seed", "h", "swiftly"), [(1, 0.01, True), (2, 0.05, False)])

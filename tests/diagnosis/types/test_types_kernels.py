@@ -341,7 +341,9 @@ def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0
 def test_a_slow_surface_never_moves_away_from_its_command():
     assert not slow_run([0.3, 0.25, 0.2])
     assert slow_run([0.2, 0.25])
-    assert not slow_run([0.2, 0.215])  # within what is known of it
+    for side in (1, -1):
+        assert not slow_run([side * 0.2, side * 0.215])  # within what is known of it
+        assert not slow_run([side * 0.1, side * 0.12])  # the intervals touch
     assert slow_run([-0.2, -0.25])
     assert not slow_run([-0.3, -0.2])
     assert not slow_run([0.2, 0.25], commands=(0.0, 0.3))  # it was told to
@@ -369,7 +371,9 @@ def test_which_side_of_its_orders_a_surface_stands_on():
     commands = surface["commands"]
     for newest, whole in ((1, 0), (2, 1)):
         fdi["types"]["config"]["frame_shows_single_instant"] = whole
-        for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
+        for low, high, side in (
+            (-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0), (-0.1, 0.1, 0), (0.2, 0.3, 0),
+        ):  # fmt: skip
             commands["min_command"], commands["max_command"] = 9.0, -9.0
             commands["min_command"][newest], commands["max_command"][newest] = low, high
             commands["min_command"][2] = min(commands["min_command"][2], low)

@@ -82,8 +82,7 @@ def disable_if_differential_thrust(engine_monitor, lever_offsets):
     """Disable the monitor once a law has moved an engine apart; lever_offsets (n and more,): of each, in
     addition to the common one."""
     for engine_index in range(engine_monitor.config.n_engines):
-        if lever_offsets[engine_index] != 0.0:
-            engine_monitor.memory.disabled_by_differential_thrust = 1
+        engine_monitor.memory.disabled_by_differential_thrust |= lever_offsets[engine_index] != 0.0
 
 
 @kernel

@@ -471,8 +471,10 @@ def update_rate_limit_returning_consistent_interval(config, surface, type_index,
     if side_of_command == 0 or side_of_command != memory.side_of_command or k != memory.last_known_frame + 1:
         memory.position_low, memory.position_high = position_low, position_high
     else:
-        moves_away_from_command = (side_of_command > 0 and position_low > memory.position_high) or (
-            side_of_command < 0 and position_high < memory.position_low
+        moves_away_from_command = (
+            position_low > memory.position_high
+            if side_of_command == 1
+            else position_high < memory.position_low
         )
         narrow_position_by_min_rate(config, surface, memory, side_of_command)
     memory.position_low, memory.position_high = (
@@ -494,12 +496,12 @@ def narrow_position_by_min_rate(config, surface, memory, side_of_command):
         surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.approach_share_per_substep
     )
     min_command, max_command = command_range_for_judged_frame(config, surface)
-    if side_of_command > 0:
+    if side_of_command == 1:
         memory.position_high = min(
             memory.position_high,
             max(memory.position_high - min_motion_in_frame, max_command + distance_where_lag_slows_approach),
         )
-    elif side_of_command < 0:
+    else:
         memory.position_low = max(
             memory.position_low,
             min(memory.position_low + min_motion_in_frame, min_command - distance_where_lag_slows_approach),

@@ -98,6 +98,15 @@ def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wro
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 
+def test_a_change_of_the_code_that_follows_addresses_asks_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr(addresses, "passes", lambda name, build, *_: asked.append(build))
+    for digest in ("one", "other"):
+        monkeypatch.setattr(addresses, "digest_of_files", lambda *_, digest=digest: digest)
+        addresses._is_proved_in_a_child(addresses.LAYOUT)
+    assert asked[0] != asked[1]
+
+
 @pytest.mark.parametrize("name", ["node_pointer", "executive_base", "executive_pointer"])
 def test_no_word_beyond_an_object_is_read(name):
     """The last word of an object fits, one byte more does not; whatever the other words are."""

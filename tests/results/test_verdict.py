@@ -295,6 +295,10 @@ def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
         assert f" {what:13} {how}" in text
     after = verdict.verdict_text(Metrics.of(flown()), "runs/a-flight")
     assert "tracking RMS  p 0.1  q 0.25  r 1 deg/s after the fault" in after
+    assert "certificate" not in after
+    certified = Metrics.of(flown(certificate={"statements": 1, "without": 0}))
+    row = " certificate   1 statement; check: beaver-ftc check runs/x"
+    assert row in verdict.verdict_text(certified, "runs/x").splitlines()
 
 
 def test_in_colour_what_is_missed_is_red_and_names_stand_out():

@@ -128,8 +128,8 @@ def _sizes_fit(layout: Layout) -> bool:
 def _is_proved_in_a_child(layout: Layout) -> bool:
     library = Path(_library_file())
     status = library.stat()
-    build = f"{sys.implementation.cache_tag} {library} {status.st_size} {status.st_mtime_ns} "
-    build += digest_of_files(Path(__file__))
+    here = digest_of_files(Path(__file__))
+    build = f"{sys.implementation.cache_tag} {library} {status.st_size} {status.st_mtime_ns} {here}"
     code = (
         "from beaver_ftc.aircraft import load; from beaver_ftc.plant import addresses, adapter; "
         f"addresses.LAYOUT = addresses.{layout}; "

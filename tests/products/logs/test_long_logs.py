@@ -254,6 +254,15 @@ def test_a_part_begins_with_the_last_value_of_a_slower_column(monkeypatch):
     assert list(readers.split_long_recording(whole, stamps, 2.5)) == [whole]
 
 
+@pytest.mark.parametrize(("n_rows", "parts"), [(480_000, [480_000]), (480_001, [400_000, 120_001])])
+def test_a_log_of_more_than_eighty_minutes_at_100_hz_has_parts_of_400_000_samples(n_rows, parts):
+    """As docs/explanation/flight-logs.md has it; each begins with the last 40,000 of the one before."""
+    stamps = np.arange(n_rows) / 100.0
+    whole = RecordedFlight("f", {"a": Column(stamps, stamps)})
+    split = readers.split_long_recording(whole, stamps, 1.0)
+    assert [len(part.columns["a"].t_s) for part in split] == parts
+
+
 def test_parts_of_a_ulog_say_what_the_whole_says(tmp_path, parted_log, wing_model):
     vehicle = wing_of_topic(tmp_path)
     whole = diagnose(

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
+from reportlab.pdfbase.pdfmetrics import getAscentDescent
 from reportlab.pdfgen.canvas import Canvas
 
 import beaver_ftc as bf
@@ -15,7 +16,7 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.present.page import Heading, contents
 from beaver_ftc.studies.sweep import one_flight
-from beaver_ftc_assurance.evidence import flown, shown
+from beaver_ftc_assurance.evidence import flown, paper, shown
 from beaver_ftc_assurance.evidence import judged as judged_module
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc_assurance.evidence.judged import document_of
@@ -116,6 +117,14 @@ def test_every_sheet_of_the_paper_has_its_foot_and_its_number(monkeypatch):
     sheets = len(drawn) // 2
     assert sheets > 2
     assert drawn == [text for n in range(1, sheets + 1) for text in ("the foot", str(n))]
+
+
+def test_lines_of_the_paper_neither_overlap_nor_stand_half_a_line_apart():
+    paper._register()
+    paragraph = paper._text("word " * 200, 10.0)
+    _, height = paragraph.wrap(300.0, 1e4)
+    ascent, descent = getAscentDescent("Body", 10.0)
+    assert 1.0 < height / len(paragraph.blPara.lines) / (ascent - descent) < 1.5
 
 
 @pytest.mark.parametrize(

@@ -176,9 +176,9 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
     pilot, layout, surfaces, _ = new(effectiveness=effectiveness)
     pilot["bank_limit"] = 0.1
     for k in range(6):
-        autopilot.record_limits_in_force(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
+        autopilot.record_limits_in_force(pilot, layout["main"], surfaces["output"]["effectiveness"], k - 4.0)
     assert pilot["holding"]["in_force"][BANK_LIMIT] == 1
-    assert pilot["holding"]["from_s"][BANK_LIMIT] == 4.0
+    assert pilot["holding"]["from_s"][BANK_LIMIT] == 0.0  # that it bites in the sixth as well is no news
     left = 0.1 + 0.4 * (1.0 - DT / 4.0) ** 6
     assert pilot["holding"]["value"][BANK_LIMIT] == pytest.approx(left)
     assert noted(limit=0.1)["bank"] == 0.5

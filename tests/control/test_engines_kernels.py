@@ -151,7 +151,6 @@ def test_engines_that_turn_the_aircraft_are_set_up_with_their_arms_over_its_iner
     assert found == pytest.approx(
         [3, 0.15, 0.9, 0.75 / 5.0 / RATE_HZ, 1.0 / RATE_HZ / 1.6, 1.0 / RATE_HZ / 20.0]
     )
-    assert memory["from_s"] == -1.0
     assert memory["problem"]["weight"].tolist() == [1.0] * 3 + [0.0] * (memory["problem"]["weight"].size - 3)
     expected = engine_of()
     for name in ("settings", "airspeeds", "setting", "airspeed", "table"):

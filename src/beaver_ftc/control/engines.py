@@ -317,9 +317,9 @@ LEAST_LAG_S, RELEASE_S = 0.5, 20.0
 ENGINES_CONFIG = record(
     n=int, low=float, high=float, step=float, part=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
-# serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w; from_s: since when they turn.
+# serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w.
 ENGINES_MEMORY = record(
-    thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS), from_s=float,
+    thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS),
 )  # fmt: skip
 # difference: of each engine's setting from the common lever; authority (2, 3) rad/s2: the least and the
 # greatest that all give about each axis.
@@ -334,7 +334,7 @@ def configure_engines(engines: np.void, scenario: Scenario) -> None:
     may_use = row_of(scenario.control.law).uses_verdict and scenario.control.power.enabled
     if not aircraft.effectors or not may_use or named is None:
         return
-    config["n"], engines["memory"]["from_s"] = len(aircraft.effectors), -1.0
+    config["n"] = len(aircraft.effectors)
     config["low"], config["high"] = low, high = named[1].range
     config["step"] = (high - low) / WHOLE_RANGE_S * dt
     config["part"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
@@ -405,11 +405,3 @@ def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed
         for i in (PITCH, YAW):
             memory.wanted[i] += memory.serving[i, e] * u
         output.difference[e] = power_for(memory.thrust, 0.0, base, u) - base
-
-
-@kernel
-def note_use(engines, power_output, t):
-    """Note since when engines turn the aircraft, t s."""
-    used = power_output.in_use and power_output.command[1] != 0.0
-    if used and engines.memory.from_s < 0.0:
-        engines.memory.from_s = t

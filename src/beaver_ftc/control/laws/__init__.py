@@ -173,4 +173,3 @@ def complete(control, assessment, faults, measured, t):
     if engine.config.n > 0 and detected:
         engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, measured.y[AIRSPEED])
         engines.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)
-        engines.note_use(engine, lever.output, t)

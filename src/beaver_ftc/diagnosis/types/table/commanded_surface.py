@@ -297,7 +297,7 @@ def has_run_towards_stop(surface, stop_direction):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
     if stop_direction == 0:
         return False
-    return surface.growing_bias.has_run_towards_stop[1 if stop_direction > 0 else 0] == 1
+    return surface.growing_bias.has_run_towards_stop[1 if stop_direction == 1 else 0] == 1
 
 
 def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
@@ -373,7 +373,7 @@ def update_oscillation_returning_consistent_interval(config, surface, type_index
     error_sign = 1 if deflection_error_low > 0.0 else (-1 if deflection_error_high < 0.0 else 0)
     if error_sign == 0 or (
         not config.frame_shows_single_instant
-        and surface.judged_observation.stop_can_hide_deflection[0 if error_sign > 0 else 1]
+        and surface.judged_observation.stop_can_hide_deflection[0 if error_sign == 1 else 1]
     ):
         memory.sign_since_frame = k + 1
         return UNLIMITED_SET

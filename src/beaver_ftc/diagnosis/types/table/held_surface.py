@@ -90,7 +90,7 @@ def simulate_return_in_frame(config, surface, start_position, mean_extreme_sign=
     the end of the frame, and the possible error of the mean where the effectiveness changes meanwhile.
 
     The release is at the beginning of the frame; with a mean_extreme_sign, at any instant of it: the least
-    mean if mean_extreme_sign < 0, else the greatest.
+    mean if it is -1, the greatest if it is 1.
     """
     position_sum = 0.0
     n_positions = 0
@@ -111,7 +111,9 @@ def simulate_return_in_frame(config, surface, start_position, mean_extreme_sign=
             )
             if mean_extreme_sign != 0:
                 position = (
-                    min(position, start_position) if mean_extreme_sign < 0 else max(position, start_position)
+                    min(position, start_position)
+                    if mean_extreme_sign == -1
+                    else max(position, start_position)
                 )
     return (
         position_sum / n_positions,

@@ -106,6 +106,20 @@ def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left
         assert pilot[name] == pytest.approx(0.5 + DT / 1.5 * (goal - 0.5))
 
 
+@pytest.mark.parametrize(
+    ("engines_yaw", "left", "at_stop", "alone"),
+    [(True, 0.0, 0, 1.0), (True, 1.0, 1, 1.0), (True, 0.1, 0, 0.0), (False, 0.0, 1, None)],
+)
+def test_engines_yaw_alone_once_the_rudder_is_gone_or_at_its_stop(engines_yaw, left, at_stop, alone):
+    """Within 5 s."""
+    pilot, control = new_autopilot(engines_alone_yaw_share=0.4), new_control()
+    surfaces, saturated = control["surfaces"], control["allocation"]["output"]["saturated"]
+    surfaces["output"]["effectiveness"][RUDDER], saturated[RUDDER] = left, at_stop
+    loops.smooth_signals_and_losses(pilot, control["layout"], surfaces, saturated, engines_yaw, new_y())
+    goal = 0.4 if alone is None else alone
+    assert pilot["engines_alone_yaw_share"] == pytest.approx(0.4 + DT / 5.0 * (goal - 0.4))
+
+
 def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
     pilot, control = new_autopilot(roll_loss_share=jammed, yaw_loss_share=loose), new_control(hold=hold)
     control["axes"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
@@ -225,12 +239,20 @@ def test_the_pitch_attitude_is_path_and_incidence_in_the_bank():
     assert loops.pitch_attitude_rate(new_autopilot(), new_y(), attitude, 0.02) == 0.0
 
 
-def test_a_heading_is_flown_by_a_bank():
+# Engines that alone yaw and roll get a quarter of the gain: 1 - 0.75 x 0.5 x 0.8 with half of the ailerons.
+BY_ENGINES = pytest.mark.parametrize(
+    ("jammed", "alone", "gain"), [(0.5, 0.0, 1.0), (0.0, 0.8, 1.0), (0.5, 0.8, 0.7)]
+)
+
+
+@BY_ENGINES
+def test_a_heading_is_flown_by_a_bank(jammed, alone, gain):
     pilot = new_autopilot(HEADING, missing_turn_rate=0.5, max_healthy_bank=2.0, bank_limit=2.0)
+    pilot["roll_loss_share"], pilot["engines_alone_yaw_share"] = jammed, alone
     pilot["command"][HEADING], pilot["command_rate"][HEADING] = 3.1, 0.01
     rate = loops.bank_angle_rate(pilot, np.array([0.02, 0.0, -3.1]))
     error = -(2 * np.pi - 6.2)
-    assert rate == pytest.approx(1.1 * (V / G * (0.25 * error + 0.01) - 0.02))
+    assert rate == pytest.approx(1.1 * gain * (V / G * (0.25 * gain * error + 0.01) - 0.02))
     assert pilot["missing_turn_rate"] == 0.0
 
 
@@ -251,14 +273,15 @@ def test_the_drift_found_has_a_limit():
     assert pilot["missing_turn_rate"] == 0.1
 
 
-def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated():
-    pilot = new_autopilot(BANK, roll_loss_share=0.5, missing_roll_rate=0.02)
+@BY_ENGINES
+def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated(jammed, alone, gain):
+    pilot = new_autopilot(BANK, roll_loss_share=jammed, missing_roll_rate=0.02, engines_alone_yaw_share=alone)
     pilot["command"][BANK] = 0.3
     rate = loops.bank_angle_rate(pilot, np.array([0.1, 0.0, 0.0]))
-    assert rate == pytest.approx(1.1 * 0.2 + 0.5 * 0.02)
-    assert pilot["missing_roll_rate"] == pytest.approx(0.02 + 0.5 * DT * 0.2 * 0.2)
+    assert rate == pytest.approx(gain * 1.1 * 0.2 + jammed * 0.02)
+    assert pilot["missing_roll_rate"] == pytest.approx(0.02 + jammed * DT * gain * 0.2 * 0.2)
     pilot["bank_limit"], pilot["missing_roll_rate"] = 0.05, 0.0
-    assert loops.bank_angle_rate(pilot, np.array([0.1, 0.0, 0.0])) == pytest.approx(1.1 * -0.05)
+    assert loops.bank_angle_rate(pilot, np.array([0.1, 0.0, 0.0])) == pytest.approx(gain * 1.1 * -0.05)
     pilot["rate_limit"], kept = 0.01, float(pilot["missing_roll_rate"])
     assert loops.bank_angle_rate(pilot, np.array([0.4, 0.0, 0.0])) == -0.01
     assert pilot["missing_roll_rate"] == kept

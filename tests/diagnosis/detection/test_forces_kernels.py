@@ -388,6 +388,15 @@ def test_constant_errors_are_tolerated_term_by_term():
     assert force["n_regressors"] == len(terms) + 1
 
 
+@pytest.mark.parametrize(("air", "tolerance"), [("none", 0.05), ("moderate", 0.2)])
+def test_the_rate_of_sideslip_is_known_within_a_twentieth_and_in_moving_air_a_fifth(air, tolerance):
+    """Of its term, beside the tolerance of the coefficients."""
+    given = Bounds(coefficients=0.07, turbulence=air)
+    force = felt(given)["statistical"]["forces"]["component"][SIDE_INDEX_AMONG_FORCES]
+    of_rate = len(forces.terms_of_one_force(AIRCRAFT, SIDE_INDEX_AMONG_FORCES))
+    assert force["regressor_tolerance"][of_rate] == pytest.approx(0.07 + tolerance)
+
+
 @pytest.mark.parametrize(
     ("bounds", "side", "up"),
     [

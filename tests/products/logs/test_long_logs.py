@@ -66,6 +66,14 @@ def test_parts_hold_every_row_once_and_a_tenth_again(tmp_path, parted, monkeypat
         np.testing.assert_array_equal(one.t_s[-50:], other.t_s[:50])
 
 
+@pytest.mark.parametrize(("n_rows", "parts"), [(120_000, [120_000]), (120_001, [100_000, 30_001])])
+def test_a_table_of_more_than_120_000_rows_has_parts_of_100_000(tmp_path, n_rows, parts):
+    """As docs/explanation/flight-logs.md has it; each begins with the last 10,000 of the one before."""
+    stamps = np.arange(n_rows) / 100.0
+    path = write(tmp_path / "long.parquet", {"t_s": stamps, "a": stamps})
+    assert [len(part.columns["a"].t_s) for part in read_parts(path)] == parts
+
+
 def test_a_short_log_is_no_part(tmp_path, parted):
     (one,) = read_parts(write(tmp_path / "short.csv", synthetic.fly(60.0)))
     assert one.name == "short"

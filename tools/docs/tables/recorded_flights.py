@@ -1,7 +1,9 @@
 """Tables of recorded-flights.md: ways to diagnose the flights in the folder `BEAVER_FTC_FLIGHTS`."""
 
 import os
+from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,6 +18,13 @@ from tools.docs.tables import shared
 Document = dict[str, Any]
 PICTURE = "images/recorded-flights.png"
 OWN_SEEDS = (209, 210, 211)
+AIRCRAFT_SEEDS = (9401, 9402)
+CLAIMED_SEEDS = (*OWN_SEEDS, *AIRCRAFT_SEEDS)
+AIRCRAFT_AND_AIR = (
+    ("jsbsim:737", "light"), ("jsbsim:737", "none"), ("jsbsim:c172p", "light"), ("jsbsim:c172p", "none"),
+    ("beaver", "none"),
+)  # fmt: skip
+AIR_TEXT = {"light": "light turbulence", "none": "still"}
 PROBED_S = 20.0  # of each training flight of the probe
 OWN = {  # column of benchmarks/own_logs.py: head on the page
     "fault": "fault",
@@ -61,16 +70,38 @@ def recorded_enac() -> str:
 
 def own_logs() -> str:
     """Simulated flights in light turbulence, diagnosed by identified models, beside a test that is told."""
-    of_it = [own.HEAD.index(name) for name in OWN]
-    results = [
-        one
-        for seed in OWN_SEEDS
-        for one in own.flown(own.Campaign(air="light", seed=seed), "table", ["identified"])
+    results = [one for seed in OWN_SEEDS for one in _by_identified(own.Campaign(air="light", seed=seed))]
+    return markdown_table(tuple(OWN.values()), _own_rows(results))
+
+
+def own_logs_of_aircraft() -> str:
+    """The same of other aircraft, in turbulence and in still air."""
+    campaigns = [
+        own.Campaign(aircraft=aircraft, air=air, seed=seed)
+        for aircraft, air in AIRCRAFT_AND_AIR
+        for seed in AIRCRAFT_SEEDS
     ]
-    rows = own.table(results)
-    return markdown_table(
-        tuple(OWN.values()), [[row[i].removeprefix(f"{own.LOSS} ") for i in of_it] for row in rows]
-    )
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        results_by_campaign = dict(zip(campaigns, pool.map(_by_identified, campaigns), strict=True))
+    rows = []
+    for aircraft, air in AIRCRAFT_AND_AIR:
+        results = [
+            one
+            for campaign, of_it in results_by_campaign.items()
+            if (campaign.aircraft, campaign.air) == (aircraft, air)
+            for one in of_it
+        ]
+        rows += [[aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row] for row in _own_rows(results)]
+    return markdown_table(("aircraft", "air", *OWN.values()), rows)
+
+
+def _by_identified(of: own.Campaign) -> list[Document]:
+    return own.flown(of, "table", ["identified"])
+
+
+def _own_rows(results: list[Document]) -> list[list[str]]:
+    of_it = [own.HEAD.index(name) for name in OWN]
+    return [[row[i].removeprefix(f"{own.LOSS} ") for i in of_it] for row in own.table(results)]
 
 
 def own_logs_probe() -> str:

@@ -11,14 +11,14 @@ that `identify` has of twelve healthy flights of a minute: two of the laws, othe
 read the log by the vehicle file that `run --as` writes, as it is.
 `--air light` flies in turbulence, declared to the aircraft's own model, and to `identify` by nothing.
 
-Prints a row for each model and size: flights, alarms before the fault, found, named rightly, named wrongly in
-any row (a group of surfaces that cannot be told apart is wrong where the surface at fault is not in it),
-share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at fault alone (1,
-of the others, is an end of the range), share of those of which more is said than 0 to 1, their width, the
-share of credible samples, and of how many losses a test that is told surface, size, instant, the aircraft's
-design model and the noise (a vector autoregression of what that model leaves of the training flights, with
-quiet and with noisy gyros) is sure enough for one false alarm an hour: its log likelihood ratio exceeds the
-logarithm of the samples in an hour [Lorden1971].
+Prints a row for each model and size: flights, refused logs, alarms before the fault, found, named rightly,
+named wrongly in any row (a group of surfaces that cannot be told apart is wrong where the surface at fault is
+not in it), share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at
+fault alone (1, of the others, is an end of the range), share of those of which more is said than 0 to 1,
+their width, the share of credible samples, and of how many losses a test that is told surface, size, instant,
+the aircraft's design model and the noise (a vector autoregression of what that model leaves of the training
+flights, with quiet and with noisy gyros) is sure enough for one false alarm an hour: its log likelihood ratio
+exceeds the logarithm of the samples in an hour [Lorden1971].
 """
 
 import argparse
@@ -34,6 +34,7 @@ from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
 from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
+from beaver_ftc.documents import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
@@ -61,8 +62,8 @@ HEALTHY = 5  # of each law and airspeed
 TRAINING, TRAINING_S = 12, 60.0
 NOISE = {"noise_std_deg_s": 0.05}
 HEAD = [
-    "by", "fault", "flights", "false alarms", "found", "named rightly", "named wrongly", "held by bounds",
-    "held at fault", "said of", "median width", "credible", "told",
+    "by", "fault", "flights", "refused", "false alarms", "found", "named rightly", "named wrongly",
+    "held by bounds", "held at fault", "said of", "median width", "credible", "told",
 ]  # fmt: skip
 
 
@@ -228,6 +229,16 @@ def by_model(log: Log, model: Model) -> Said:
     return rows, str(names[count.argmax()]) if len(names) else None
 
 
+def _tried(by: str, log: Log, way: Callable[[Log], Said]) -> Document:
+    """What was right; of a log that is refused nothing is said."""
+    try:
+        return judged(by, log, way(log)) | {"refused": False}
+    except BadInput:
+        nothing = dict.fromkeys((*_COUNTED, "held", "said", "held_lost", "lost", "samples"), 0)
+        what = {"by": by, "size": _size(log.flown.faults), "refused": True}
+        return nothing | what | {"width": np.empty(0), "credible": 0.0}
+
+
 def judged(by: str, log: Log, said_of: Said) -> Document:
     """What was right."""
     (rows, isolated), faults = said_of, log.flown.faults
@@ -304,7 +315,7 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.3f}" if whole else ""
 
 
-_COUNTED = ("false", "found", "right", "wrong")
+_COUNTED = ("refused", "false", "found", "right", "wrong")
 
 
 def main() -> None:
@@ -336,7 +347,7 @@ def flown(of: Campaign, kind: str, by: list[str]) -> list[Document]:
             log = recorded(document, kind, Path(folder))
             lost = of.type == LOSS and bool(log.flown.faults)
             certain = told(log, noise) if lost else None
-            results += [judged(name, log, ways[name](log)) | {"told": certain} for name in by]
+            results += [_tried(name, log, ways[name]) | {"told": certain} for name in by]
     return results
 
 

@@ -37,6 +37,7 @@ OWN = {  # column of benchmarks/own_logs.py: head on the page
     "held by bounds": "held by bounds",
     "held at fault": "held, faulty surface",
 }
+OWN_OF_AIRCRAFT = OWN | {"refused": "refused"}
 SHOWN = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 DELAYS = (
     '*Table 2. Delays on the failures of ALFA. "found": failures found, of all failures of this surface. '
@@ -71,7 +72,7 @@ def recorded_enac() -> str:
 def own_logs() -> str:
     """Simulated flights in light turbulence, diagnosed by identified models, beside a test that is told."""
     results = [one for seed in OWN_SEEDS for one in _by_identified(own.Campaign(air="light", seed=seed))]
-    return markdown_table(tuple(OWN.values()), _own_rows(results))
+    return markdown_table(tuple(OWN.values()), _own_rows(results, OWN))
 
 
 def own_logs_of_aircraft() -> str:
@@ -91,16 +92,19 @@ def own_logs_of_aircraft() -> str:
             if (campaign.aircraft, campaign.air) == (aircraft, air)
             for one in of_it
         ]
-        rows += [[aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row] for row in _own_rows(results)]
-    return markdown_table(("aircraft", "air", *OWN.values()), rows)
+        rows += [
+            [aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row]
+            for row in _own_rows(results, OWN_OF_AIRCRAFT)
+        ]
+    return markdown_table(("aircraft", "air", *OWN_OF_AIRCRAFT.values()), rows)
 
 
 def _by_identified(of: own.Campaign) -> list[Document]:
     return own.flown(of, "table", ["identified"])
 
 
-def _own_rows(results: list[Document]) -> list[list[str]]:
-    of_it = [own.HEAD.index(name) for name in OWN]
+def _own_rows(results: list[Document], head_of_column: dict[str, str]) -> list[list[str]]:
+    of_it = [own.HEAD.index(name) for name in head_of_column]
     return [[row[i].removeprefix(f"{own.LOSS} ") for i in of_it] for row in own.table(results)]
 
 

@@ -142,7 +142,7 @@ def _noise_model_log_likelihood(whitened_flight: Samples, model: Model, noise_mo
     )
     covariance = np.array(noise_model.residual_covariance)
     quick_variance_scale = quick_response_variance_scale(
-        np.nan_to_num(group_responses), covariance, model, noise_model.ma_coefficients
+        np.nan_to_num(group_responses), model, noise_model.ma_coefficients
     )
     squared_residual = np.einsum("na,ab,nb->n", residual, np.linalg.inv(covariance), residual)
     squared_residual /= quick_variance_scale
@@ -232,10 +232,7 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
     )
     noise_parameters = build_residual_noise(model, samples.noise_ma_coefficients)
     quick_variance_scales = quick_response_variance_scale(
-        group_responses,
-        model.covariance_of_noise_model(samples.noise_ma_coefficients),
-        model,
-        samples.noise_ma_coefficients,
+        group_responses, model, samples.noise_ma_coefficients
     )
     min_noise_variance_scales = np.zeros(len(is_predictable))
     if model.vehicle.other_laws:
@@ -261,15 +258,17 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
 
 
 def quick_response_variance_scale(
-    group_responses: Floats, noise_covariance: Floats, model: Model, ma_coefficients: Sequence[float]
+    group_responses: Floats, model: Model, ma_coefficients: Sequence[float]
 ) -> Floats:
-    """Return the variance of the residual over that of the noise, (n,), where responses (n, G, 3) are quicker
-    than usual in the fit: a share of the quick part may be missing, or be too much.
+    """Return the variance of the residual over that of the noise, (n,): above 1 where responses (n, G, 3) are
+    quicker than usual in the fit, since a share of the quick part may be missing, or be too much.
 
     Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
     noise: it has the same sign in many samples.
     """
-    power = quick_response_power(group_responses, noise_covariance, model.rate_hz)
+    power = quick_response_power(
+        group_responses, model.covariance_of_noise_model(ma_coefficients), model.rate_hz
+    )
     unusual_power = np.maximum(power - model.usual_quick_response_power(ma_coefficients), 0.0)
     return np.asarray(1.0 + model.settings.quick_response_error_share**2 * unusual_power)
 

@@ -478,9 +478,9 @@ def _squared_quick_response_error_share(fold_model: Model, held_out: FlightWithU
     if is_unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(covariance)).T
-    squares = (((residual - np.median(residual, axis=0)) @ whitening_matrix) ** 2).sum(axis=1)
-    noise_variance = max(float(np.median(squares)) / trust.MEDIAN_CHI_SQUARE_3_DOF, 1.0)
-    relative_squares = squares[is_unusual] / (3.0 * noise_variance)
+    squares = ((residual - np.median(residual, axis=0)) @ whitening_matrix) ** 2
+    noise_variance = max(trust.noise_variance_scale(squares), 1.0)
+    relative_squares = squares[is_unusual].mean(axis=1) / noise_variance
     return float(((relative_squares - 1.0) / power[is_unusual]).mean())
 
 
@@ -815,10 +815,9 @@ def _standardized_centred_responses_and_residual(
     both in sd of the noise, without means; where responses are quick, of the noise and their error."""
     _, residual, rate_responses = rows_whitened_residual_and_responses(model, held_out)
     ma_coefficients = held_out.samples.noise_ma_coefficients
-    covariance = model.covariance_of_noise_model(ma_coefficients)
-    sd_scale = np.sqrt(quick_response_variance_scale(rate_responses, covariance, model, ma_coefficients))
-    inflated_covariance = model.covariance_inflation_of_noise_model(ma_coefficients) * covariance
-    whitening_matrix = np.linalg.inv(np.linalg.cholesky(inflated_covariance)).T
+    sd_scale = np.sqrt(quick_response_variance_scale(rate_responses, model, ma_coefficients))
+    covariance = model.with_inflated_covariance_of_noise_model(ma_coefficients).residual_covariance
+    whitening_matrix = np.linalg.inv(np.linalg.cholesky(np.array(covariance))).T
     noise_whitened_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
     noise_whitened_residual = residual @ whitening_matrix
     return (

@@ -41,12 +41,13 @@ _MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RANGE_QUANTILES = (0.001, 0.999)
-MEDIAN_CHI_SQUARE_3_DOF = 2.366
+_MEDIAN_CHI_SQUARE_3_DOF = 2.366
 """The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
-_REVERSED_GAIN_LIMIT = -0.5
 """Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
 kind none was below 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
+_REVERSED_GAIN_LIMIT = -0.5
+"""Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0."""
 
 
 def compute_fitted_ranges(
@@ -569,7 +570,7 @@ def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tu
         for part_rows in rows_by_part
     ]
     noise_variance_scales = [
-        _noise_variance_scale(
+        noise_variance_scale(
             regression.coefficient_upper_bounds_and_squared_residuals(
                 regressors, targets, effective_sample_share
             )[1]
@@ -618,9 +619,9 @@ def _trim_and_gain_regression_data(
     ).ravel()
 
 
-def _noise_variance_scale(squared_residuals: Floats) -> float:
+def noise_variance_scale(squared_residuals: Floats) -> float:
     """The scale of the noise by the squares of what is left, (3 n,)."""
-    return float(np.median(squared_residuals.reshape(-1, 3).sum(axis=1)) / MEDIAN_CHI_SQUARE_3_DOF)
+    return float(np.median(squared_residuals.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3_DOF)
 
 
 def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:
@@ -651,7 +652,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         )
         gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
         gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
-        noise_variance_scales.append(_noise_variance_scale(squared_residuals))
+        noise_variance_scales.append(noise_variance_scale(squared_residuals))
     return _GainBoundsOverFlight(
         gain_upper_bounds.tolist(),
         gain_lower_bounds.tolist(),

@@ -182,6 +182,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         settings=settings,
         whitened_intercept=lambda average: sum(average) * constant,
         usual_quick_response_power=lambda average: usual,
+        covariance_of_noise_model=lambda average: sum(average) ** 2 * noise,
         rate_hz=8.0,
     )
     found, answers_by_hand = [], rng.normal(0.0, 0.05, (40, 2, 3))

@@ -488,7 +488,9 @@ def update_rate_limit_returning_consistent_interval(config, surface, type_index,
 @kernel
 def narrow_position_by_min_rate(config, surface, memory, side_of_command):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
-    its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
+    its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
+
+    side_of_command: 1 if the surface is above its command, -1 if it is below."""
     min_motion_in_frame = (
         config.n_substeps * config.frames_per_block * surface.actuator.min_rate_limited_motion_per_substep
     )

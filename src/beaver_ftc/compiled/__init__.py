@@ -51,17 +51,25 @@ def cache_folder() -> Path | None:
     return cache_of_version(digest_of_files(*sorted(_FOLDER.glob("*.py"))))
 
 
-def kernel(function):
-    """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`."""
-    return compile_into(cache_folder(), function)
+def kernel(function, for_size=False):
+    """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`.
+
+    for_size: whether its code is optimised for size. Between two frames JSBSim displaces code and data from
+    the processor's fast caches, so that short code whose loops are a few numbers long runs sooner. Long loops
+    take a quarter longer.
+    """
+    return compile_into(cache_folder(), function, for_size)
 
 
-def apart(function):
+def apart(function=None, *, long_loops=False):
     """A kernel that returns nothing and that only some flights want: compiled when one of them calls it.
 
     Give it records and numbers: shapes and strides of arrays are no longer constants beyond such a call.
+    long_loops: whether its loops are longer than a few numbers; else its code is optimised for size.
     """
-    called = kernel(function)
+    if function is None:
+        return functools.partial(apart, long_loops=long_loops)
+    called = kernel(function, for_size=not long_loops)
     if numba.config.DISABLE_JIT or not borrows():
         return called
     from beaver_ftc.compiled.target import stub
@@ -83,15 +91,15 @@ def plain(function):
     return getattr(function, "py_func", function)
 
 
-def compile_into(folder: Path | None, function):
-    """Compile a function when it is first called, and keep its code in `folder`.
+def compile_into(folder: Path | None, function, for_size=False):
+    """Compile a function when it is first called, and keep its code in `folder`; for_size: see `kernel`.
 
     With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
     """
     if numba.config.DISABLE_JIT:
         return _interpreted(function)
     target = _own_target()
-    return target.Kernel(folder, function) if target else numba.njit(error_model="numpy")(function)
+    return target.Kernel(folder, function, for_size) if target else numba.njit(error_model="numpy")(function)
 
 
 @lru_cache(maxsize=1)

@@ -210,14 +210,14 @@ def announced(size: float) -> Iterator[None]:
 class CodeCache:
     """The machine code of one kernel on the disk: a file a set of argument types, behind its digest."""
 
-    def __init__(self, folder: Path, function) -> None:
-        self._folder, self._function = folder, function
+    def __init__(self, folder: Path, function, for_size: bool = False) -> None:
+        self._folder, self._function, self._for_size = folder, function, for_size
         self._name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.cached_property
     def _of(self):
         """Found when code is first asked for: what is named in a kernel may be defined after it."""
-        return self._name, digest_of(self._function), sys.version_info, numba.__version__
+        return self._name, digest_of(self._function), self._for_size, sys.version_info, numba.__version__
 
     def _path(self, types, codegen) -> Path:
         key = repr((*self._of, types, codegen.magic_tuple()))

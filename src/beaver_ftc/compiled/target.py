@@ -413,7 +413,7 @@ def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
 # mypy: disable-error-code="attr-defined,misc"
 
 
-compiling: list[object] = []  # kernels being compiled, each called by the one before; under Numba's lock
+compiling: list["Kernel"] = []  # kernels being compiled, each called by the one before; under Numba's lock
 
 
 class Inner:
@@ -439,6 +439,9 @@ class Library(JITCodeLibrary):
         for function in _defined(self._final_module):
             if function.name not in own:
                 function.linkage = "internal"  # what is called in one place is then put there, however long
+        if compiling and compiling[0].for_size:
+            for function in _defined(self._final_module):
+                function.add_function_attribute("optsize")
         self._optimize_final_module()
         self._final_module.verify()
         with cache.held():
@@ -772,11 +775,15 @@ class Dispatcher(CPUDispatcher):
 
 
 class Kernel(Dispatcher):
-    """A kernel: kept by itself if Python calls it, and a part of the kernels that call it."""
+    """A kernel: kept by itself if Python calls it, and a part of the kernels that call it.
 
-    def __init__(self, folder: Path | None, function: Callable[..., Any]) -> None:
+    for_size: whether its code, with all that is a part of it, is optimised for size.
+    """
+
+    def __init__(self, folder: Path | None, function: Callable[..., Any], for_size: bool = False) -> None:
         super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
-        self.folder, self._cached = folder, folder and CodeCache(folder, function)
+        self.folder, self._cached = folder, folder and CodeCache(folder, function, for_size)
+        self.for_size = for_size
         self._inner: set[tuple[Any, ...]] = set()  # arguments for which it is only a part of others so far
 
     def compile(self, sig: Any) -> Any:

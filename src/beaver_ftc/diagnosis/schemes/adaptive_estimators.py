@@ -238,7 +238,7 @@ def isolate_loss_by_worst_case(fdi, measured, t, isolation_started_earlier):
     decide_isolated_loss(fdi, t)
 
 
-@apart
+@apart(long_loops=True)
 def isolate_loss_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
@@ -249,7 +249,7 @@ def isolate_loss_by_either_detector(fdi, measured, t, isolation_started_earlier)
     decide_isolated_loss(fdi, t)
 
 
-@apart
+@apart(long_loops=True)
 def isolate_loss_by_statistics(fdi, measured, t, isolation_started_earlier):
     """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
@@ -266,7 +266,7 @@ def isolate_fault_type_by_worst_case(fdi, measured, t, isolation_started_earlier
     judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier)
 
 
-@apart
+@apart(long_loops=True)
 def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
@@ -362,7 +362,7 @@ def isolation_variant_index(config: FdiConfig) -> int:
     return list(ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY).index((config.fault_class, isolation_authority))
 
 
-@apart
+@apart(long_loops=True)
 def update_statistical_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
     statistical_detector = fdi.statistical
@@ -441,7 +441,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     )
 
 
-@apart
+@apart(long_loops=True)
 def update_gusts_and_prepare_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     statistical_detector, dt = fdi.statistical, fdi.config.dt
@@ -467,7 +467,7 @@ def update_gusts_and_prepare_tests(fdi, prediction, measured, k):
     )
 
 
-@apart
+@apart(long_loops=True)
 def add_instant_to_gusts_and_tests(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
     statistical_detector = fdi.statistical

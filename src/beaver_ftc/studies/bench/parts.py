@@ -95,10 +95,11 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
     used: set[str] = set()
     folder = compiled.cache_folder()
 
-    def kernel(function):
+    def kernel(function, for_size=False):
         full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
         used.add(full_name)
-        return compiled.compile_into(folder and folder / name, stand_ins.get(full_name, function))
+        made_of = stand_ins.get(full_name, function)
+        return compiled.compile_into(folder and folder / name, made_of, for_size)
 
     with _fresh_kernel_modules(kernel):
         fly_on = import_module("beaver_ftc.loop.stepping").fly_on
@@ -108,7 +109,7 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
 
 
 @contextmanager
-def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
+def _fresh_kernel_modules(kernel: Callable[..., Kernel]) -> Iterator[None]:
     """Within this, importing a module of kernels makes a new one, decorated by `kernel`.
 
     The old ones come back afterwards.

@@ -6,7 +6,7 @@ import pytest
 
 from beaver_ftc.documents.document import Document
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.scenario.declared import Kind, Reader, Undeclared, undeclared
+from beaver_ftc.scenario.declared import Kind, Reader, Undeclared, declares_all, undeclared
 from beaver_ftc.scenario.schema import Scenario, load_text, validate_scenario
 
 TOLD = """
@@ -178,6 +178,18 @@ def test_a_mass_that_nothing_reads_takes_no_guarantee_away():
     assert right.guaranteed_delay_s is not None
     assert light.guaranteed_delay_s == pytest.approx(right.guaranteed_delay_s)
     assert light.detection_time_s == pytest.approx(right.detection_time_s)
+
+
+def test_flights_that_share_their_sections_are_told_apart_by_what_fails():
+    """A vertical wind is beyond what is declared only where an instrument fails: then the sensor monitor
+    reads the altimeter. The answer to the first flight is kept for the third, not for the second."""
+    biased = {"sensor": "p", "type": "bias", "magnitude": 1.0, "at_s": 1.0}
+    sound = Scenario.model_validate({"name": "x", "environment": {"wind_mps": [0, 0, 2.0]}})
+    failing = sound.with_({"faults": [biased]})
+    assert failing.environment is sound.environment
+    assert [declares_all(each) for each in (sound, failing, sound)] == [True, False, True]
+    other = sound.with_({"uncertainty.mass": 1.2, "fdi": {"bounds": {}, **ALL}})
+    assert not declares_all(other)
 
 
 def test_a_fact_says_what_by_how_much_and_who_reads_it():

@@ -42,11 +42,11 @@ from beaver_ftc.scenario.declared import (
     LATE,
     Span,
     as_altitudes,
+    declares_all,
     lies_outside,
     measured_spans,
     outside,
     quantities,
-    undeclared,
 )
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import of_a_sensor
@@ -446,7 +446,7 @@ def _is_off(scenario: Scenario, certain_s: float) -> bool:
     if any(of_a_sensor(fault) and fault.at_s <= certain_s for fault in scenario.faults):
         return True
     flown = [scenario, *(then for change, then in stages(scenario) if change.at_s <= certain_s)]
-    return any(fact for each in flown for fact in undeclared(each))
+    return not all(map(declares_all, flown))
 
 
 def landing_of(

@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from beaver_ftc.results import model
 from beaver_ftc.results.model import Document, Expectation, Metrics
-from beaver_ftc.scenario.declared import OF_DIAGNOSIS, in_words, undeclared
+from beaver_ftc.scenario.declared import OF_DIAGNOSIS, declares_all, in_words
 from beaver_ftc.scenario.diagnosis import failing, of_several
 from beaver_ftc.scenario.faults import DAMAGE, UNANTICIPATED, Damage, is_share, of_a_sensor
 from beaver_ftc.scenario.sensors import sensor_words
@@ -655,7 +655,7 @@ def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> s
 def _has_no_errors(scenario: "Scenario") -> bool:
     """Whether sensors and servos are ideal, the air is still and nothing is undeclared."""
     parts = scenario.sensors.is_ideal, scenario.actuators.is_ideal, scenario.environment.is_still
-    return all(parts) and next(undeclared(scenario), None) is None
+    return all(parts) and declares_all(scenario)
 
 
 def _hint_residual_near_threshold(flight: "Landing") -> str:

@@ -289,6 +289,24 @@ def undeclared(scenario: Any) -> Iterator[Undeclared]:
         yield from filter(_is_beyond, _forces(scenario, declared))
 
 
+_UNDECLARED_DEPENDS_ON = ("airframe", "fdi", "uncertainty", "sensors", "environment", "design_model")
+# Each entry holds the sections whose numbers it is found by.
+_declares_all: dict[tuple[int, ...], tuple[tuple[Any, ...], bool]] = {}
+
+
+def declares_all(scenario: Any) -> bool:
+    """Whether nothing of a scenario is undeclared. It is asked of each flight, and found once for the flights
+    of a sweep that share what it depends on."""
+    sections = tuple(getattr(scenario, name) for name in _UNDECLARED_DEPENDS_ON)
+    sensor_fails = any(of_a_sensor(fault) for fault in scenario.faults)
+    key = (*map(id, sections), scenario.substeps, sensor_fails)
+    if key not in _declares_all:
+        if len(_declares_all) >= _MOST:
+            _declares_all.clear()
+        _declares_all[key] = sections, next(undeclared(scenario), None) is None
+    return _declares_all[key][1]
+
+
 def _is_beyond(fact: Undeclared) -> bool:
     return fact.is_beyond
 

@@ -10,6 +10,7 @@ import sys
 from functools import cache
 
 import numba
+import numpy as np
 import pytest
 
 from beaver_ftc import compiled
@@ -204,3 +205,20 @@ def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path, compiler):
     assert said == ""
     kept = {path.name.partition("-")[0] for path in (tmp_path / "cache").glob("*-*")}
     assert kept == ({"step", "halve"} if borrows else {"step"})
+
+
+def test_code_for_size_is_shorter_gives_the_same_and_is_kept_apart(tmp_path):
+    def add_up(x, weights):
+        for i in range(x.size):
+            x[i] += weights[i] * x[i]
+        return x[0]
+
+    quick, short = (compiled.compile_into(tmp_path, add_up, for_size) for for_size in (False, True))
+    given = np.arange(1.0, 10.0), np.linspace(0.5, 1.0, 9)
+    x = given[0].copy()
+    assert short(x, given[1]) == add_up(given[0], given[1])
+    np.testing.assert_array_equal(x, given[0])
+    quick(x, given[1])
+    lines = [next(iter(each.overloads.values())).library.get_asm_str().count("\n") for each in (quick, short)]
+    assert lines[1] < 0.8 * lines[0]
+    assert len(list(tmp_path.glob("add_up-*"))) == 2

@@ -22,12 +22,14 @@ class CorrectedLog(NamedTuple):
 
     correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
     multiplies the rates. The likelihood of a log is that of the rates as they were logged: where a mend
-    multiplies these by a, the density is a times as large.
+    multiplies these by a, the density is a times as large. scaled_signal: the signal that the mend scales;
+    empty of another mend.
     """
 
     correction_text: str
     samples: Samples
     log_jacobian: float = 0.0
+    scaled_signal: str = ""
 
 
 def logs_with_one_mistake_corrected(
@@ -71,8 +73,16 @@ def logs_with_one_mistake_corrected(
     for name in [*doubtful_rate_column_names, *vehicle.signal_column_names]:
         for factor in SIGN_AND_UNIT_FACTORS:
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
-            log_jacobian = float(np.log(abs(factor))) if name in doubtful_rate_column_names else 0.0
-            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian)
+            is_rate = name in doubtful_rate_column_names
+            log_jacobian, scaled_signal = (float(np.log(abs(factor))), "") if is_rate else (0.0, name)
+            yield CorrectedLog(
+                f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian, scaled_signal
+            )
+
+
+def log_without_signal(samples: Samples, vehicle: Vehicle, signal: str) -> Samples:
+    """The log in which a signal, and what the airspeed makes of it, is always 0."""
+    return _with_exchanged_or_scaled_columns(samples, vehicle, {}, {signal: 0.0})
 
 
 def _with_exchanged_or_scaled_columns(

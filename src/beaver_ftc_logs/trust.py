@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
-from beaver_ftc_logs.column_mistakes import logs_with_one_mistake_corrected
+from beaver_ftc_logs.column_mistakes import log_without_signal, logs_with_one_mistake_corrected
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
@@ -519,31 +519,39 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
 
 def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
-    part of the flight where that is least; and as how many samples a part counts."""
-    corrected_logs = list(
-        logs_with_one_mistake_corrected(samples, model.vehicle, surfaces_of_unknown_effect(model))
-    )
+    part of the flight where that is least; and as how many samples a part counts.
+
+    A mended signal must be likelier than the signal as it was logged and than none at all. Where the model
+    errs in a signal's effect, a smaller or reversed effect may be likelier than the modelled one, while none
+    is likelier still.
+    """
     log_likelihoods_and_sample_count = _part_log_likelihoods_and_sample_count(samples, model)
     if log_likelihoods_and_sample_count is None:
         return {}, 0.0
-    sample_log_likelihood_by_part, n_effective_part_samples = log_likelihoods_and_sample_count
+    logged_log_likelihoods, n_effective_part_samples = log_likelihoods_and_sample_count
+    log_likelihoods_without_signal = {
+        signal: _part_log_likelihoods(log_without_signal(samples, model.vehicle, signal), model)
+        for signal in model.vehicle.signal_column_names
+    }
     min_sample_log_likelihood_gain_by_correction = {}
-    for log_with_one_mistake_corrected in corrected_logs:
-        corrected_log_likelihoods_and_count = _part_log_likelihoods_and_sample_count(
-            log_with_one_mistake_corrected.samples, model
+    for corrected_log in logs_with_one_mistake_corrected(
+        samples, model.vehicle, surfaces_of_unknown_effect(model)
+    ):
+        log_likelihoods_to_exceed = np.maximum(
+            logged_log_likelihoods,
+            log_likelihoods_without_signal.get(corrected_log.scaled_signal, -np.inf),
         )
-        min_sample_log_likelihood_gain_by_correction[log_with_one_mistake_corrected.correction_text] = (
-            -np.inf
-            if corrected_log_likelihoods_and_count is None
-            else float(
-                (
-                    corrected_log_likelihoods_and_count[0]
-                    + log_with_one_mistake_corrected.log_jacobian
-                    - sample_log_likelihood_by_part
-                ).min()
-            )
+        corrected_log_likelihoods = _part_log_likelihoods(corrected_log.samples, model)
+        min_sample_log_likelihood_gain_by_correction[corrected_log.correction_text] = float(
+            (corrected_log_likelihoods + corrected_log.log_jacobian - log_likelihoods_to_exceed).min()
         )
     return min_sample_log_likelihood_gain_by_correction, n_effective_part_samples
+
+
+def _part_log_likelihoods(samples: Samples, model: Model) -> Floats:
+    """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
+    found = _part_log_likelihoods_and_sample_count(samples, model)
+    return np.array(-np.inf) if found is None else found[0]
 
 
 def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tuple[Floats, float] | None:

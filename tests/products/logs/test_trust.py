@@ -453,6 +453,23 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     assert trust._likelier_column_mistake_text("as it is", small.model()) is None
 
 
+@pytest.mark.parametrize(("logged", "share", "factor", "likelier"), [
+    (-1.0, 1.0, "-1", True), (1000.0, 1.0, "0.001", True),
+    (1.0, -0.3, "-1", False), (1.0, 0.05, "0.001", False),
+])  # fmt: skip
+def test_a_mended_signal_must_be_likelier_than_none(logged, share, factor, likelier):
+    """logged: by how much the log has a signal multiplied; share: of the modelled effect that the signal has.
+    Where the model errs, the mend is nearer to the truth than the model, and no effect at all is nearest."""
+    past = np.array(small.model(small.TAIL).lagged_rate_and_signal_coefficients)
+    past[-1] = 0.2, 0.15, -0.1
+    model = small.model(small.TAIL, past=past.tolist())
+    past[-1] *= share
+    flown = small.flight(small.model(small.TAIL, past=past.tolist()), 800)
+    flown = replace(flown, signals=logged * flown.signals)
+    gains, _ = trust.min_log_likelihood_gains_and_part_size(flown, model)
+    assert (gains[f"`scale: {factor}` on airspeed_m_s"] > 0.05) == likelier
+
+
 @pytest.mark.parametrize(
     ("most", "least", "moved", "says"),
     [

@@ -18,7 +18,7 @@ from tools.docs.tables import shared
 Document = dict[str, Any]
 PICTURE = "images/recorded-flights.png"
 OWN_SEEDS = (209, 210, 211)
-AIRCRAFT_SEEDS = (9401, 9402)
+AIRCRAFT_SEEDS = (9403, 9404)
 CLAIMED_SEEDS = (*OWN_SEEDS, *AIRCRAFT_SEEDS)
 AIRCRAFT_AND_AIR = (
     ("jsbsim:737", "light"), ("jsbsim:737", "none"), ("jsbsim:c172p", "light"), ("jsbsim:c172p", "none"),

@@ -49,7 +49,7 @@ TABLE = (
         "beaver-ftc evidence --help",
     ),
     Exempt(
-        r"beaver-ftc mechanisms .*",
+        r"beaver-ftc mechanisms( .*)?",
         "flies for minutes; the study's own tests fly a few draws",
         "beaver-ftc mechanisms --help",
     ),

@@ -521,7 +521,7 @@ def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tu
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts.
 
-    A mended signal must be likelier than the signal as it was logged and than none at all. Where the model
+    A mended signal must also be likelier than no signal, by as much in all parts together. Where the model
     errs in a signal's effect, a smaller or reversed effect may be likelier than the modelled one, while none
     is likelier still.
     """
@@ -537,14 +537,14 @@ def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tu
     for corrected_log in logs_with_one_mistake_corrected(
         samples, model.vehicle, surfaces_of_unknown_effect(model)
     ):
-        log_likelihoods_to_exceed = np.maximum(
-            logged_log_likelihoods,
-            log_likelihoods_without_signal.get(corrected_log.scaled_signal, -np.inf),
+        corrected_log_likelihoods = (
+            _part_log_likelihoods(corrected_log.samples, model) + corrected_log.log_jacobian
         )
-        corrected_log_likelihoods = _part_log_likelihoods(corrected_log.samples, model)
-        min_sample_log_likelihood_gain_by_correction[corrected_log.correction_text] = float(
-            (corrected_log_likelihoods + corrected_log.log_jacobian - log_likelihoods_to_exceed).min()
-        )
+        gain = float((corrected_log_likelihoods - logged_log_likelihoods).min())
+        if signal := corrected_log.scaled_signal:
+            gain_over_no_signal = corrected_log_likelihoods - log_likelihoods_without_signal[signal]
+            gain = min(gain, float(gain_over_no_signal.sum()))
+        min_sample_log_likelihood_gain_by_correction[corrected_log.correction_text] = gain
     return min_sample_log_likelihood_gain_by_correction, n_effective_part_samples
 
 

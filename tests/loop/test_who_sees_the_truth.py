@@ -35,7 +35,7 @@ def address_of(given):
     # Not by the array interface, which would describe all fields of a record.
     return (given if isinstance(given, np.ndarray) else np.frombuffer(given, np.uint8)).ctypes.data
 
-def watched(function):
+def watched(function, for_size=False):
     call, name = plain(function), f"{function.__module__}.{function.__name__}"
     def spy(*arguments):
         for argument in arguments:

@@ -5,9 +5,9 @@ complete and flyable again, or by section, a key to what was computed.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import yaml
 from pydantic import BaseModel
@@ -107,9 +107,36 @@ def looks_like_a_path(given: str) -> bool:
     return any(mark in given for mark in "/\\.")
 
 
+Found = TypeVar("Found")
+
+
+class KeptBySections(Generic[Found]):
+    """What was found of sections, for further flights that have the same objects.
+
+    Each entry holds its sections, so that their ids stay their own. Of more than `most` entries all are
+    dropped.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._entries: dict[tuple[Hashable, ...], tuple[tuple[object, ...], Found]] = {}
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def get(self, sections: tuple[object, ...], find: Callable[[], Found], *besides: Hashable) -> Found:
+        """What `find` returns for these sections, and for these values besides; called if nothing is kept."""
+        key = (*map(id, sections), *besides)
+        if key not in self._entries:
+            if len(self._entries) >= self._most:
+                self._entries.clear()
+            self._entries[key] = sections, find()
+        return self._entries[key][1]
+
+
 _MOST = 256
 _SEPARATORS = re.compile("[\x85\u2028\u2029]")
-_texts: dict[int, tuple[BaseModel, str]] = {}  # a section is kept, so its id stays its own
+_texts: KeptBySections[str] = KeptBySections(_MOST)
 
 
 class _Dumper(yaml.SafeDumper):
@@ -158,9 +185,4 @@ def texts_of(scenario: BaseModel, sections: Iterable[str]) -> tuple[str, ...]:
 def _text_of(section: BaseModel | None) -> str:
     if section is None:
         return ""
-    known = _texts.get(id(section))
-    if known is None:
-        if len(_texts) >= _MOST:
-            _texts.clear()
-        known = _texts[id(section)] = section, section.model_dump_json()
-    return known[1]
+    return _texts.get((section,), section.model_dump_json)

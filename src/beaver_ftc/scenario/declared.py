@@ -24,6 +24,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design import Dryden, altitude_of
+from beaver_ftc.scenario.builtin import KeptBySections
 from beaver_ftc.scenario.diagnosis import FdiConfig, failing, of_several
 from beaver_ftc.scenario.faults import UNANTICIPATED, of_a_sensor
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, SIGNALS, Sensors
@@ -103,18 +104,13 @@ class CoefficientErrors:
         return np.array([self.of(term.name) for term in terms]) * np.abs(values[: len(terms)])
 
 
-_known: dict[int, SensorErrors] = {}  # each holds the section whose number it is found by
 _MOST = 64
+_sensor_errors: KeptBySections[SensorErrors] = KeptBySections(_MOST)
 
 
 def _errors_of(sensors: Sensors) -> SensorErrors:
     """Those of a section. A flight asks several times, and flights of a sweep share what does not vary."""
-    known = _known.get(id(sensors))
-    if known is None:
-        if len(_known) >= _MOST:
-            _known.clear()
-        known = _known[id(sensors)] = SensorErrors(sensors)
-    return known
+    return _sensor_errors.get((sensors,), lambda: SensorErrors(sensors))
 
 
 @dataclass(frozen=True)
@@ -290,8 +286,7 @@ def undeclared(scenario: Any) -> Iterator[Undeclared]:
 
 
 _UNDECLARED_DEPENDS_ON = ("airframe", "fdi", "uncertainty", "sensors", "environment", "design_model")
-# Each entry holds the sections whose numbers it is found by.
-_declares_all: dict[tuple[int, ...], tuple[tuple[Any, ...], bool]] = {}
+_declares_all: KeptBySections[bool] = KeptBySections(_MOST)
 
 
 def declares_all(scenario: Any) -> bool:
@@ -299,12 +294,9 @@ def declares_all(scenario: Any) -> bool:
     of a sweep that share what it depends on."""
     sections = tuple(getattr(scenario, name) for name in _UNDECLARED_DEPENDS_ON)
     sensor_fails = any(of_a_sensor(fault) for fault in scenario.faults)
-    key = (*map(id, sections), scenario.substeps, sensor_fails)
-    if key not in _declares_all:
-        if len(_declares_all) >= _MOST:
-            _declares_all.clear()
-        _declares_all[key] = sections, next(undeclared(scenario), None) is None
-    return _declares_all[key][1]
+    return _declares_all.get(
+        sections, lambda: next(undeclared(scenario), None) is None, scenario.substeps, sensor_fails
+    )
 
 
 def _is_beyond(fact: Undeclared) -> bool:

@@ -71,9 +71,9 @@ def logs_with_one_mistake_corrected(
             f"{first_rate_column_name} and {second_rate_column_name} exchanged", exchanged_samples
         )
     for name in [*doubtful_rate_column_names, *vehicle.signal_column_names]:
+        is_rate = name in doubtful_rate_column_names
         for factor in SIGN_AND_UNIT_FACTORS:
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
-            is_rate = name in doubtful_rate_column_names
             log_jacobian, scaled_signal = (float(np.log(abs(factor))), "") if is_rate else (0.0, name)
             yield CorrectedLog(
                 f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian, scaled_signal

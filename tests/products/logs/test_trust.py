@@ -470,6 +470,23 @@ def test_a_mended_signal_must_be_likelier_than_none(logged, share, factor, likel
     assert (gains[f"`scale: {factor}` on airspeed_m_s"] > 0.05) == likelier
 
 
+@pytest.mark.parametrize(("without", "gain"), [
+    ([0.2, 0.2, 0.6, 0.4], 0.3), ([0.4, 0.3, 0.5, 0.7], 0.1), ([0.5, 0.4, 0.5, 0.8], -0.2),
+])  # fmt: skip
+def test_with_no_signal_the_whole_flight_is_compared(monkeypatch, without, gain):
+    """The mend gains 0.3 in the part where it gains least. Of no signal all parts count together: a part in
+    which the signal hardly moves may be likelier without it."""
+    parts = {"as it is": [0.0, 0.0, 0.0, 0.0], "mended": [0.5, 0.3, 0.5, 0.7], "without": without}
+    monkeypatch.setattr(
+        trust, "_part_log_likelihoods_and_sample_count", lambda samples, _: (np.array(parts[samples]), 9.0)
+    )
+    mended = CorrectedLog("mended", "mended", scaled_signal="airspeed_m_s")
+    monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: [mended])
+    monkeypatch.setattr(trust, "log_without_signal", lambda *_: "without")
+    found, _ = trust.min_log_likelihood_gains_and_part_size("as it is", small.model(small.TAIL))
+    assert found["mended"] == pytest.approx(gain)
+
+
 @pytest.mark.parametrize(
     ("most", "least", "moved", "says"),
     [

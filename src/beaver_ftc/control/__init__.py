@@ -109,7 +109,7 @@ class CompiledLaw(NamedTuple):
 
     faults: the true faults, for laws whose row says `informed`. mode: the supervisor's; t s.
 
-    configure(law, control, prediction, scenario, y): fill the law's configuration at the trim; y: the signals
+    configure(law, control, prediction, declared, y): fill the law's configuration at the trim; y: the signals
     measured there.
     unexplained(control): acceleration (3,) rad/s2 that the law in charge attributes to no model.
     begin(control, before, unexplained, learnt): take over in flight from the law whose records are `before`,

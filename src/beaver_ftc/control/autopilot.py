@@ -30,7 +30,7 @@ with, makes up for the rest are those that can be held; the commanded airspeed i
 for which the elevator, or what is left of it, does not suffice cannot be held by any law.
 
 The autopilot's record keeps the profile to fly, its limits, its memory, and how far it was off;
-`set_up_autopilot` fills it from the scenario's `autopilot`.
+`set_up_autopilot` fills it from the declared `autopilot`.
 """
 
 from functools import lru_cache
@@ -53,7 +53,7 @@ from beaver_ftc.control.engines import (
 )
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S
 
 ALTITUDE, SPEED, HEADING, BANK = range(4)
@@ -622,18 +622,18 @@ LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is the
 _UNIT = dict(zip(CHANNELS, (1.0, 1.0, radians(1.0), radians(1.0)), strict=True))
 
 
-def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -> None:
+def set_up_autopilot(autopilot: np.void, control: np.void, declared: Declared) -> None:
     """Fill the record (dtype AUTOPILOT); control: the law's, already assembled."""
-    profile = scenario.autopilot
+    profile = declared.autopilot
     if profile is None or not profile.channels:
         return
-    autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
-    set_up_profile(autopilot, scenario)
+    autopilot["enabled"], autopilot["dt"] = 1, 1.0 / declared.rate_hz
+    set_up_profile(autopilot, declared)
     autopilot["changed_at_s"], autopilot["largest_deviation"] = -inf, NOT_JUDGED
-    autopilot["gain"] = tuple(_gains(scenario.airframe).values())
+    autopilot["gain"] = tuple(_gains(declared.aircraft).values())
     autopilot["gravity"] = GRAVITY_MPS2
-    _set_up_aircraft_values(autopilot, scenario)
-    less, more = (scenario.airframe.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
+    _set_up_aircraft_values(autopilot, declared)
+    less, more = (declared.aircraft.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
     autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
     autopilot["max_healthy_rate"], autopilot["max_healthy_bank"] = (
         np.radians(MOST_DEG_S),
@@ -643,7 +643,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
         autopilot[f"{name}_power"] = control["power"]["config"][name]
     autopilot["allowed_power"] = control["power"]["config"]["high"]
     control["reference"]["config"]["steered"] = 1
-    _set_up_level_flight_table(autopilot["holding"], control["layout"], scenario)
+    _set_up_level_flight_table(autopilot["holding"], control["layout"], declared)
 
 
 def _gains(aircraft: Aircraft) -> dict[str, float]:
@@ -653,10 +653,10 @@ def _gains(aircraft: Aircraft) -> dict[str, float]:
     return GAINS | {"speed": GAINS["speed"] / slower, "speed_i": GAINS["speed_i"] / slower**2}
 
 
-def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
+def set_up_profile(autopilot: np.void, declared: Declared) -> None:
     """Fill in the legs; in flight too, where those that have been begun are the same as before."""
     for c, (name, unit) in enumerate(_UNIT.items()):
-        legs = getattr(scenario.autopilot, name)
+        legs = getattr(declared.autopilot, name)
         autopilot["n_legs"][c] = len(legs)
         for j, leg in enumerate(legs):
             autopilot["leg_starts_at_s"][c, j] = leg.at_s
@@ -666,11 +666,11 @@ def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
             )
 
 
-def _set_up_aircraft_values(autopilot: np.void, scenario: Scenario) -> None:
+def _set_up_aircraft_values(autopilot: np.void, declared: Declared) -> None:
     """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
-    aircraft = scenario.airframe
+    aircraft = declared.aircraft
     terms = {name: term.value for name, term in aircraft.terms.items()}
-    mass_kg = aircraft.mass.mass_kg * scenario.design_model.mass
+    mass_kg = aircraft.mass.mass_kg * declared.design_model.mass
     per_mass = aircraft.geometry.wing_area_m2 / mass_kg
     autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
     autopilot["pitch_holds_airspeed"] = aircraft.airspeed_by == "pitch"
@@ -687,9 +687,9 @@ def _set_up_aircraft_values(autopilot: np.void, scenario: Scenario) -> None:
     autopilot["slowest_mps"] = slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest))
 
 
-def _set_up_level_flight_table(holding: np.void, layout: np.void, scenario: Scenario) -> None:
+def _set_up_level_flight_table(holding: np.void, layout: np.void, declared: Declared) -> None:
     """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
-    aircraft, flap = scenario.airframe, int(layout["stand_in"])
+    aircraft, flap = declared.aircraft, int(layout["stand_in"])
     holding["from_s"], holding["bank"], holding["fastest"] = -1.0, radians(MOST_BANK_DEG), inf
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
         return
@@ -697,7 +697,7 @@ def _set_up_level_flight_table(holding: np.void, layout: np.void, scenario: Scen
     holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
     holding["flap"] = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
-    model = scenario.design_model
+    model = declared.design_model
     mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
     qdyn_pa, flap_rad = tuple(holding["qdyn"]), tuple(holding["flap"])
     needed = elevator_needed(aircraft, surfaces, mass_kg, scale, qdyn_pa, flap_rad)

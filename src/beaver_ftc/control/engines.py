@@ -45,7 +45,7 @@ from beaver_ftc.control import allocation, row_of
 from beaver_ftc.control.allocation import problem_dtype, remaining
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN, engine_power_kw, inertia_coefficients, slipstream
 from beaver_ftc.diagnosis.state import PITCH, YAW
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 LEAST_RISE = 1e-4  # m/s2 from one setting to the next, so that each has its own
@@ -130,12 +130,12 @@ POWER_OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, 
 POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, output=POWER_OUTPUT)
 
 
-def is_at_hand(scenario: Scenario) -> bool:
-    """Whether the built-in law of a scenario may use the engine."""
-    law = row_of(scenario.control.law)
-    diagnoses_all_types = scenario.fdi.fault_class == "all" and law.pitch_by_power
-    wanted = scenario.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
-    return wanted and _has_piston_engine(scenario.airframe)
+def is_at_hand(declared: Declared) -> bool:
+    """Whether the declared built-in law may use the engine."""
+    law = row_of(declared.control.law)
+    diagnoses_all_types = declared.fdi.fault_class == "all" and law.pitch_by_power
+    wanted = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
+    return wanted and _has_piston_engine(declared.aircraft)
 
 
 def _has_piston_engine(aircraft: Aircraft) -> bool:
@@ -143,11 +143,11 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
     return aircraft.power_setting == "manifold_pressure_inhg" and aircraft.has_engine_instruments
 
 
-def configure_power(power: np.void, layout: np.void, scenario: Scenario) -> None:
+def configure_power(power: np.void, layout: np.void, declared: Declared) -> None:
     """Fill the record (dtype POWER); layout: of the surfaces."""
-    settings, dt, config = scenario.control.power, 1.0 / scenario.rate_hz, power["config"]
-    initial: Any = scenario.initial  # its engine's keys are the aircraft's
-    config["enabled"], power["output"]["from_s"] = is_at_hand(scenario), -1.0
+    settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
+    initial: Any = declared.initial  # its engine's keys are the aircraft's
+    config["enabled"], power["output"]["from_s"] = is_at_hand(declared), -1.0
     config["impatience"], config["forgiveness"] = dt / settings.patience_s, dt / settings.release_s
     config["speed_gain"] = settings.speed_gain_inhg_per_mps
     config["attitude_gain"] = settings.attitude_gain_inhg_per_deg / radians(1.0)
@@ -158,7 +158,7 @@ def configure_power(power: np.void, layout: np.void, scenario: Scenario) -> None
     }
     for name, lag_s in lags_s.items():
         config[name] = 1.0 - exp(-dt / lag_s)
-    named = scenario.airframe.file.power_setting
+    named = declared.aircraft.file.power_setting
     if named is None:
         return
     name, setting = named
@@ -167,18 +167,18 @@ def configure_power(power: np.void, layout: np.void, scenario: Scenario) -> None
     power["output"]["least"] = power["output"]["greatest"] = trim
     config["low"], config["high"] = low, high = setting.range
     per_s = (high - low) / WHOLE_RANGE_S
-    if _has_piston_engine(scenario.airframe):
+    if _has_piston_engine(declared.aircraft):
         config["low"], config["high"] = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
-        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(scenario, layout)
+        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(declared, layout)
         per_s = settings.rate_inhg_s
     config["step"] = per_s * dt
 
 
-def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, float]:
+def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:
     """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
     propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
-    initial: Any = scenario.initial
-    aircraft, rudder = scenario.airframe, layout["main"][YAW]
+    initial: Any = declared.initial
+    aircraft, rudder = declared.aircraft, layout["main"][YAW]
     rpm, terms = initial.engine_rpm, aircraft.terms.values()
     rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
     per_rad = sum(t.value for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders)
@@ -327,11 +327,11 @@ ENGINES_OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
 ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OUTPUT)
 
 
-def configure_engines(engines: np.void, scenario: Scenario) -> None:
+def configure_engines(engines: np.void, declared: Declared) -> None:
     """Fill the record (dtype ENGINES); it stays empty where no engine is an effector, or none may be used."""
-    aircraft, dt, config = scenario.airframe, 1.0 / scenario.rate_hz, engines["config"]
+    aircraft, dt, config = declared.aircraft, 1.0 / declared.rate_hz, engines["config"]
     named, thrust = aircraft.file.power_setting, aircraft.engine.thrust
-    may_use = row_of(scenario.control.law).uses_verdict and scenario.control.power.enabled
+    may_use = row_of(declared.control.law).uses_verdict and declared.control.power.enabled
     if not aircraft.effectors or not may_use or named is None:
         return
     config["n"] = len(aircraft.effectors)
@@ -348,10 +348,10 @@ def configure_engines(engines: np.void, scenario: Scenario) -> None:
         engines["memory"]["problem"]["weight"][e] = 1.0
 
 
-def effects_of(scenario: Scenario) -> np.ndarray:
+def effects_of(declared: Declared) -> np.ndarray:
     """B (3, engines): rad/s2 about each axis per m/s2 of each engine that is an effector; of none (3, 0)."""
     engines = np.zeros(1, ENGINES)[0]
-    configure_engines(engines, scenario)
+    configure_engines(engines, declared)
     return np.array(engines["config"]["B"][:, : engines["config"]["n"]])
 
 

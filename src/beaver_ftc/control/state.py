@@ -1,5 +1,5 @@
-"""The control stage: the records of its parts, how they are filled from a scenario, and what a change of law
-keeps of them.
+"""The control stage: the records of its parts, how they are filled from the declaration, and what a change of
+law keeps of them.
 
 The compiled laws are a table: the kernels that each row of plugins.yaml names. A new law is its own file and
 a row; nothing else names it.
@@ -15,7 +15,7 @@ from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import PROBE, allocation_dtype, axes_dtype, layout_dtype
 from beaver_ftc.control.engines import ENGINES, POWER
 from beaver_ftc.control.laws import REFERENCE
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 FILES: dict[str, CompiledLaw] = {file_of(module): import_module(module).LAW for module in MODULES}
 
@@ -44,24 +44,24 @@ def control_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the records that all laws share; travel (2, n) rad: the stops. The law's own: `configure_law`."""
-    config, dt, row = scenario.control, 1.0 / scenario.rate_hz, row_of(scenario.control.law)
+    config, dt, row = declared.control, 1.0 / declared.rate_hz, row_of(declared.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     laws.configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
-    allocation.configure(control, config, travel, scenario.airframe)
-    allocation.configure_probe(control["probe"], scenario.fdi.probing, dt)
-    engines.configure_power(control["power"], control["layout"], scenario)
-    engines.configure_engines(control["engines"], scenario)
+    allocation.configure(control, config, travel, declared.aircraft)
+    allocation.configure_probe(control["probe"], declared.fdi.probing, dt)
+    engines.configure_power(control["power"], control["layout"], declared)
+    engines.configure_engines(control["engines"], declared)
 
 
-def configure_law(control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure_law(control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Fill the record of the law in charge, which may derive its gains at the trim; y: the measured signals
     there."""
-    row = row_of(scenario.control.law)
+    row = row_of(declared.control.law)
     if (law := FILES[row.file]).configure is not None:
-        law.configure(control[row.file], control, prediction, scenario, y)
+        law.configure(control[row.file], control, prediction, declared, y)
 
 
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:

@@ -66,7 +66,6 @@ from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
 
 if TYPE_CHECKING:
     from beaver_ftc.design.context import DeclaredErrors
-    from beaver_ftc.scenario.schema import Scenario
 
 _FIRST_AIR_DATA_SIGNAL_INDEX = (
     3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
@@ -751,12 +750,10 @@ def max_inertia_coefficient_errors(
     return max_coefficient_changes
 
 
-def configure_uncertainty_bound(
-    bound_record: np.void, scenario: "Scenario", declared: Declared, design: np.void
-) -> None:
+def configure_uncertainty_bound(bound_record: np.void, declared: Declared, design: np.void) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. design: record of the design model."""
-    fdi_config, aircraft = scenario.fdi, declared.aircraft
+    fdi_config, aircraft = declared.fdi, declared.aircraft
     bound_record["inertia_coupling_error_share"], bound_record["earth_rate_rad_s"] = (
         declared.coupling,
         EARTH_RATE_RAD_S,
@@ -772,8 +769,8 @@ def configure_uncertainty_bound(
     if aircraft.file.model_error_map is None:
         bound_record["constant_error_bound"] += aircraft.model_error_rad_s2
     declared_errors = bound_record["declared_errors"]
-    fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
-    fill_declared_engine_instrument_errors(declared_errors, scenario, declared)
+    fill_declared_errors(declared_errors, declared, design, mass_of(declared.design_model, aircraft))
+    fill_declared_engine_instrument_errors(declared_errors, declared)
     bound_record["has_surface_term_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
 
 
@@ -788,7 +785,7 @@ def fill_declared_errors(
     declared_errors["inertia_coefficient_tolerance"] = max_inertia_coefficient_errors(
         declared.inertia, mass_properties
     )
-    declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
+    declared_errors["deflection_error_bound"] = declared.deflection_rad
     sensor_errors, turbulence, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * turbulence.rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * turbulence.low_rotation_limit_rad_s(
@@ -812,9 +809,7 @@ def fill_declared_errors(
     )
 
 
-def fill_declared_engine_instrument_errors(
-    declared_errors: np.void, scenario: "Scenario", declared: Declared
-) -> None:
+def fill_declared_engine_instrument_errors(declared_errors: np.void, declared: Declared) -> None:
     """Fill in the errors of dpt if errors are declared of an instrument from which dpt is computed.
 
     The engine may have any setting between the initial one and its highest manifold pressure.
@@ -825,7 +820,7 @@ def fill_declared_engine_instrument_errors(
     )
     if not (has_instrument_errors and declared.aircraft.has_engine_instruments):
         return
-    initial_condition: Any = scenario.initial
+    initial_condition: Any = declared.initial
     max_manifold_pressure = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
     max_readings = dict(zip(ENGINE, (initial_condition.engine_rpm, max_manifold_pressure), strict=True))
     reading_error_bounds = [
@@ -891,7 +886,7 @@ def declared_errors_for_plugin(
     air_data_error_std = np.sqrt(reading_noise_std**2 + reading_bias**2 + reading_resolution**2 / 12.0)[
         _FIRST_AIR_DATA_SIGNAL_INDEX:
     ]
-    deflection_error_rad = declared.actuators.deflection_rad
+    deflection_error_rad = declared.deflection_rad
     return DeclaredErrors(
         noise=reading_noise_std,
         bias=reading_bias,

@@ -62,8 +62,8 @@ from beaver_ftc.diagnosis.state import (
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
 )
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES
-from beaver_ftc.scenario.schema import Scenario
 
 EMPTY_THETA_INTERVAL = (1.0, -1.0)
 N_DEFLECTION_BOUND_ITERATIONS = (
@@ -361,12 +361,12 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 def configure_isolation(
     isolation: np.void,
-    scenario: Scenario,
+    declared: Declared,
     estimator_entries: tuple[EstimatorNameKindSurface, ...],
     travel: np.ndarray,
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
-    config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
+    config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     sharpening_switches = config.sharpen
     isolation["config"]["threshold_kind"] = _THRESHOLD_KIND_OF_NAME[config.thresholds]
     isolation["config"]["forgetting_factor"] = exp(-dt / config.forgetting_time_s)

@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.bounds import (
     changing_gyro_error_bound,
     fill_uncertainty_bound_now,
 )
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 
 @sized
@@ -67,15 +67,15 @@ def prediction_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-def configure_prediction(prediction: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def configure_prediction(prediction: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
-    prediction["frame_share_per_instant"] = 1.0 / scenario.substeps
-    prediction["design"] = design_of(scenario.design_model, scenario.airframe)[0]
-    actuators, instant_interval_s = prediction["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
-    actuators["real"] = not scenario.actuators.is_ideal
+    prediction["frame_share_per_instant"] = 1.0 / declared.substeps
+    prediction["design"] = design_of(declared.design_model, declared.aircraft)[0]
+    actuators, instant_interval_s = prediction["actuators"], 1.0 / declared.rate_hz / declared.substeps
+    actuators["real"] = not declared.servos.is_ideal
     actuators["low"], actuators["high"] = travel
-    for s, surface_name in enumerate(scenario.airframe.surfaces):
-        actuator = getattr(scenario.actuators, surface_name)
+    for s, surface_name in enumerate(declared.aircraft.surfaces):
+        actuator = getattr(declared.servos, surface_name)
         bandwidth_rad_s, rate_limit_rad_s = actuator.bandwidth_rad_s, radians(actuator.rate_limit_deg_s)
         actuators["approach"][s] = (
             1.0 - exp(-bandwidth_rad_s * instant_interval_s) if bandwidth_rad_s else 1.0

@@ -10,7 +10,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.plugins import DETECTORS, compiled_rows
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 DAMAGE_MAY_HAVE_EXCLUDED_OTHERS = (
@@ -56,10 +56,10 @@ SHARED_CONFIG_RECORD = record(
 )  # fmt: skip
 
 
-def configure_shared_config(shared_config: np.void, scenario: Scenario) -> None:
+def configure_shared_config(shared_config: np.void, declared: Declared) -> None:
     """Fill the shared configuration (SHARED_CONFIG_RECORD)."""
-    fdi_config = scenario.fdi
-    shared_config["enabled"], shared_config["dt"] = fdi_config.diagnoses, 1.0 / scenario.rate_hz
+    fdi_config = declared.fdi
+    shared_config["enabled"], shared_config["dt"] = fdi_config.diagnoses, 1.0 / declared.rate_hz
     shared_config["scheme_number"] = scheme_number(fdi_config.scheme)
     shared_config["alarm_authority"], shared_config["diagnoses_all_types"] = (
         _ALARM_AUTHORITY_CODE_OF_NAME[fdi_config.authority],
@@ -67,7 +67,7 @@ def configure_shared_config(shared_config: np.void, scenario: Scenario) -> None:
     )
     shared_config["abrupt"], shared_config["n_substeps"] = (
         fdi_config.fault_profile == "abrupt",
-        scenario.substeps,
+        declared.substeps,
     )
 
 

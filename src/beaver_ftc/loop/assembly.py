@@ -123,9 +123,8 @@ def are_ever_monitored(scenario: Scenario) -> bool:
 
 
 def columns_of_the_monitor(scenario: Scenario) -> int:
-    """How many the log has: none, share and test, and of flights in which readings go missing, which."""
-    lost = any(fault.type == "lost" for fault in scenario.faults)
-    return are_ever_monitored(scenario) * (3 if lost else 2)
+    """How many the log has: none, or share, test, and which reading is missing."""
+    return 3 * are_ever_monitored(scenario)
 
 
 def has_real_engine(scenario: Scenario) -> bool:
@@ -137,16 +136,17 @@ def has_real_engine(scenario: Scenario) -> bool:
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
-    return (*usual, *ch.further_channels(scenario.airframe)) if reads_further(scenario) else usual
+    further = breaks_instruments(scenario) or records_further(scenario)
+    return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
-def reads_further(scenario: Scenario) -> bool:
-    """Whether accelerometers, the engine's instruments and what the monitor alone compares are read."""
+def records_further(scenario: Scenario) -> bool:
+    """Whether accelerometers, the engine's instruments and what the monitor alone compares are recorded. A
+    fault to come has no say in it."""
     declared = Declared.of(scenario)
     accelerometers = declared.uses_accelerometers or declared.follows_gusts_by_accelerometers
-    fails = breaks_instruments(scenario) or has_real_engine(scenario)
     sampled = any(not getattr(scenario.sensors, row.name).is_ideal for row in ROWS[N_IN_EQUATIONS:])
-    return declared.monitors_sensors or accelerometers or fails or sampled
+    return declared.monitors_sensors or accelerometers or has_real_engine(scenario) or sampled
 
 
 def configure(instruments: np.void, scenario: Scenario, dt: float) -> None:
@@ -236,9 +236,9 @@ def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
 def configure_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """A record in which every stage that needs no trim is configured: a copy of that of its design."""
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
-    rates, failing = (scenario.rate_hz, scenario.substeps), breaks_instruments(scenario)
+    rates, further = (scenario.rate_hz, scenario.substeps), truth_read(scenario)
     line = line_for(scenario)
-    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, line, initial, travel.tobytes()
+    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, further, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
@@ -253,7 +253,7 @@ def configure_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
     configure_diagnosis_at_trim(frame, scenario, trim)
     stage = frame["control"]
     stage["allocation"]["output"]["command"] = trim.u
-    control.configure_law(stage, frame["prediction"], scenario, trim.y)
+    control.configure_law(stage, frame["prediction"], Declared.of(scenario), trim.y)
 
 
 def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
@@ -262,12 +262,10 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     design = prediction["design"]
     prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.u
     anchor(design, *trim)
-    redundancy.configure_sensor_monitor(
-        fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors
-    )
-    mass = mass_of(scenario.design_model, scenario.airframe)
+    redundancy.configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
+    mass = mass_of(declared.design_model, declared.aircraft)
     statistical.configure_statistical_detector(
-        fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz
+        fdi, declared.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz
     )
 
 
@@ -281,10 +279,11 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     configure(frame["instruments"], scenario, instant_s)
-    model_prediction.configure_prediction(frame["prediction"], scenario, travel)
-    schemes.configure_diagnosis(frame["fdi"], frame["prediction"], scenario, travel)
-    control.configure(frame["control"], scenario, travel)
-    set_up_autopilot(frame["autopilot"], frame["control"], scenario)
+    declared = Declared.of(scenario)
+    model_prediction.configure_prediction(frame["prediction"], declared, travel)
+    schemes.configure_diagnosis(frame["fdi"], frame["prediction"], declared, travel)
+    control.configure(frame["control"], declared, travel)
+    set_up_autopilot(frame["autopilot"], frame["control"], declared)
     return frames
 
 
@@ -301,7 +300,7 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["config"]["n_estimators"] if diagnoses_itself else 0
     watched = logged["sensor_monitor"] = columns_of_the_monitor(scenario)
-    sampled = reads_further(scenario)
+    sampled = records_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0
     moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")
     moved |= bool(frame["control"]["engines"]["config"]["n"])

@@ -84,8 +84,6 @@ class Changing:
         if change.law is not None:
             take_law(frame, new["control"])
         if stage.renews:
-            if loop.sensor_schedule.any:  # broken in flight, as the scenario had not said
-                loop.enable_sensor_monitor(new["fdi"], stage.scenario)
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])

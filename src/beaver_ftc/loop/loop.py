@@ -14,10 +14,8 @@ import numpy as np
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import direct
 from beaver_ftc.compiled.cache import expect
-from beaver_ftc.diagnosis.gusts import stop_using_accelerometers
-from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import assembly, stepping
+from beaver_ftc.loop import assembly
 from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, sense_inside
@@ -27,7 +25,6 @@ from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address
 from beaver_ftc.plant.channels import NodeBank
 from beaver_ftc.plant.conditions import give_back, ready
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
-from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, N_SAMPLED
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plant.trim import GustSchedule, take_off
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
@@ -311,32 +308,11 @@ class Loop:
         return min(part.next_change(k) for part in parts)
 
     def declare(self, faults: Sequence[Any]) -> None:
-        """Take these faults for the flight's, between two frames; from the first of an instrument's on, all
-        instruments are watched."""
+        """Take these faults for the flight's, between two frames."""
         self.schedule.declare(faults)
         self.sensor_schedule.declare(faults)
-        if not self.sensor_schedule.any:
-            return
-        frame = self.frames[0]
-        self.read_more()
-        if self.enable_sensor_monitor(frame["fdi"], self.scenario) and frame["k"] > 0:
-            if not frame["measured"]["inertial"]:
-                self._read_further(frame["measured"])
-            direct(stepping.begin_sensor_monitor, self.frames)(self.frames)
-
-    def enable_sensor_monitor(self, fdi: np.void, scenario: Scenario) -> bool:
-        """Have the sensors monitored as `scenario` declares them, if that is allowed and was not so before.
-        Accelerometers no longer count as sound. Returns whether the monitor has just been enabled."""
-        wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
-        if not wanted or fdi["sensor_monitor"]["config"]["enabled"]:
-            return False
-        design = self.frames[0]["prediction"]["design"]
-        redundancy.configure_sensor_monitor(
-            fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True
-        )
-        stop_using_accelerometers(fdi["statistical"]["gust"])
-        fdi["statistical"]["inertial_gust"]["output"]["accounts_for_gusts"] = 0
-        return True
+        if self.sensor_schedule.any:
+            self.read_more()
 
     def read_more(self) -> None:
         """Have the further instruments read from the next frame on."""
@@ -346,15 +322,6 @@ class Loop:
             truth["n"] = len(channels)
             truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
             self.cockpit = Cockpit(self.plant, self.frames)
-
-    def _read_further(self, measured: np.void) -> None:
-        """Put among the readings what further instruments would say of this frame, without errors."""
-        further = ch.further_channels(self.aircraft)
-        values = [self.plant.read(name) * factor for _, name, factor in further]
-        measured["signal"][AX : AX + 3] = np.array(values[:3]) / values[3]
-        measured["signal"][AX + 3 :] = values[4 : 4 + N_SAMPLED]
-        if len(values) > 4 + N_SAMPLED:
-            measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4 + N_SAMPLED :]
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""

@@ -22,6 +22,7 @@ from beaver_ftc.plant.faults import is_there
 from beaver_ftc.plant.trim import GustSchedule
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import DAMAGE, MOST_FAULTS, UNANTICIPATED, fault_name, place_of
 from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
@@ -306,7 +307,7 @@ class Stepping:
         """
         self._begin()
         self._scenario = interventions.with_targets(self._scenario, targets, self._now_s)
-        set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
+        set_up_profile(self._loop.frames["autopilot"][0], Declared.of(self._scenario))
         self._note_asked("aim", targets=dict(targets))
 
     def read(self, name: str) -> float:

@@ -22,23 +22,12 @@ from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
 from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
 from beaver_ftc.diagnosis.model_prediction import redo_last_move_to_command
-from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import built_in_detection_threshold_ratio as largest_statistic
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
-from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_forces
-
-
-@kernel
-def begin_sensor_monitor(frames):
-    """Begin to watch the instruments, with the readings there are. Where accelerometers were not read, their
-    truth stands there."""
-    frame = frames[0]
-    if not frame.measured.inertial:
-        sample_forces(frame.instruments, frame.measured)
-    sensor_monitor.begin_monitor(frame.fdi.sensor_monitor, frame.measured, frame.t)
+from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over
 
 
 @kernel

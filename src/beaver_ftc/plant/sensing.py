@@ -24,7 +24,6 @@ from beaver_ftc.plant.instruments import (
     read_forces,
     read_sampled,
     set_inertial,
-    share_force,
     share_out,
 )
 
@@ -117,15 +116,6 @@ def read_further(value, first, n, measured):
     if n > engine:
         measured.engine = 1
         measured.signal[ENGINE_SPEED], measured.signal[MANIFOLD] = value[engine], value[engine + 1]
-
-
-@kernel
-def sample_forces(instruments, measured):
-    """Read the accelerometers, whose truth stands among the readings, for the first time."""
-    set_inertial(measured, 1)
-    if instruments.real:
-        read_forces(instruments, measured.signal)
-    share_force(measured)
 
 
 @kernel

@@ -41,9 +41,16 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from beaver_ftc.results import model
 from beaver_ftc.results.model import Document, Expectation, Metrics
-from beaver_ftc.scenario.declared import OF_DIAGNOSIS, declares_all, in_words
+from beaver_ftc.scenario.declared import OF_DIAGNOSIS, declares_all, in_words, outside_class
 from beaver_ftc.scenario.diagnosis import failing, of_several
-from beaver_ftc.scenario.faults import DAMAGE, UNANTICIPATED, Damage, is_share, of_a_sensor
+from beaver_ftc.scenario.faults import (
+    DAMAGE,
+    LOSS_OF_EFFECTIVENESS,
+    UNANTICIPATED,
+    Damage,
+    is_share,
+    of_a_sensor,
+)
 from beaver_ftc.scenario.sensors import sensor_words
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before
 
@@ -52,7 +59,6 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 
-LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 _FIELDS_THAT_ARE_NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 _TIME_DECIMALS = 9  # of a second: without the rounding of frame times
 
@@ -341,6 +347,8 @@ def _metrics_before_expectations(flight: "Landing", truth: Truth) -> Metrics:
         flight=_condition_record(flight),
         fault=_first_fault_record(truth),
         faults=tuple(map(_declared_fault_record, truth.faults)),
+        assumes=("sensors-sound",) if scenario.fdi.assumes_sound_sensors else (),
+        outside_class=outside_class(scenario),
         detection=_detection_record(flight, truth),
         isolation=_isolation_record(flight, truth),
         # the alarm is latched: there is one a diagnosis
@@ -595,7 +603,7 @@ def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
     """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (
-        (_hint_alarm_in_one_frame, _hint_outside_fault_class, _hint_several_faults, _hint_fault_too_small)
+        (_hint_alarm_in_one_frame, _hint_several_faults, _hint_fault_too_small)
         if scenario.fdi.diagnoses
         else ()
     )
@@ -606,23 +614,6 @@ def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
     ]
     said.append(_hint_drift(flight))
     return [sentence for sentence in said if sentence]
-
-
-def _hint_outside_fault_class(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    on_surfaces = [(getattr(fault, "actuator", None), fault.type) for fault in scenario.faults]
-    strange = [
-        f"{surface} {kind.replace('_', ' ')}"
-        for surface, kind in on_surfaces
-        if surface  # what is on no surface is meant to be outside
-        and (kind != LOSS_OF_EFFECTIVENESS or surface not in scenario.airframe.class_of_losses)
-    ]
-    if scenario.fdi.fault_class == "all" or not strange:
-        return ""
-    *first, last = scenario.airframe.class_of_losses
-    return (
-        f"{' and '.join(strange)}: outside the fault class of the diagnosis (loss of effectiveness of "
-        f"{', '.join(first)} or {last}), so that it cannot be named; set fdi.fault_class: all"
-    )
 
 
 def _hint_several_faults(scenario: "Scenario", flight_metrics: Metrics) -> str:

@@ -521,8 +521,10 @@ class Link(Part):
 
 @dataclass(frozen=True)
 class Metrics(Part):
-    """The document metrics.json. Under an autopilot: link, and interrupted_s of a flight ended before its
-    time. certificate: of a flight whose certificate was asked for."""
+    """The document metrics.json. assumes: what the diagnosis assumes of the truth (`sensors-sound`).
+    outside_class: faults of surfaces and sensors that the declared class does not have. Under an autopilot:
+    link, and interrupted_s of a flight ended before its time. certificate: of a flight whose
+    certificate was asked for."""
 
     scenario: str
     seed: int
@@ -530,6 +532,8 @@ class Metrics(Part):
     flight: FlightCondition
     fault: Fault | None
     faults: tuple[DeclaredFault, ...]
+    assumes: tuple[str, ...]
+    outside_class: tuple[str, ...]
     detection: Detection
     isolation: Isolation
     false_alarm: bool

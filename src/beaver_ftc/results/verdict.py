@@ -50,6 +50,8 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     said = (
         ("flight", _condition_text(metrics)),
         *(("" if i else "fault", _fault_text(fault)) for i, fault in enumerate(declared)),
+        ("assumed", _assumptions_text(metrics)),
+        ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
         ("inconclusive", _inconclusive_text(metrics)),
         ("statistical", _statistical_text(metrics)),
@@ -286,6 +288,20 @@ def _condition_text(metrics: Metrics) -> str:
     condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_seconds_text(flown.flown_s)}"
     kind = ", every fault type" if flown.fault_class == "all" else ""
     return f"{condition}; diagnosis {flown.scheme}{kind}; law {flown.law}"
+
+
+_ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
+
+
+def _assumptions_text(metrics: Metrics) -> str:
+    """What the diagnosis assumes of the truth; older documents do not say."""
+    return ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes or ())
+
+
+def _outside_class_text(metrics: Metrics) -> str:
+    """The faults that the diagnosis cannot name, as its class does not have them."""
+    outside = " and ".join(metrics.outside_class or ())
+    return f"{outside}: outside the declared class, so that it cannot be named" if outside else ""
 
 
 def _fault_text(fault: Fault | None) -> str:

@@ -1,8 +1,8 @@
-"""What a scenario declares in `fdi.bounds`, which parts of the diagnosis use it, and which errors of the
-truth it does not cover.
+"""The declared half of a scenario, which parts of the diagnosis use it, and which errors of the truth it does
+not cover.
 
-Detectors, warnings, studies and products ask `Declared`, which is made once; none reads `fdi.bounds` for
-itself. Errors that are not declared are facts, of which warnings are views.
+Diagnosis, laws, warnings, studies and products ask `Declared`; none reads `fdi.bounds` for itself. Errors
+that are not declared are facts, of which warnings are views: these judge, and see both halves.
 
 Warnings say what a scenario may do although it is unwise, and where the design model's error was measured:
 they never refuse it. Elsewhere the diagnosis concludes nothing. Quantities are those of the map in the
@@ -17,18 +17,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from math import degrees, inf, pi, radians
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design import Dryden, altitude_of
+from beaver_ftc.scenario.airframe import Actuators, Initial
 from beaver_ftc.scenario.builtin import KeptBySections
-from beaver_ftc.scenario.diagnosis import FdiConfig, failing, of_several
-from beaver_ftc.scenario.faults import UNANTICIPATED, of_a_sensor
-from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, SIGNALS, Sensors
+from beaver_ftc.scenario.diagnosis import ControlConfig, FdiConfig, failing, of_several
+from beaver_ftc.scenario.faults import LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor, place_of
+from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, SIGNALS, Sensors, sensor_words
 from beaver_ftc.scenario.signals import Chirp
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import DesignModel, Scenario
+    from beaver_ftc.scenario.signals import Autopilot
 
 # Of the mass, where accelerometers are compared with the designer's forces: fuel and load, which no key of
 # `fdi.bounds` declares.
@@ -114,59 +119,97 @@ def _errors_of(sensors: Sensors) -> SensorErrors:
 
 
 @dataclass(frozen=True)
-class ActuatorErrors:
-    """How far a surface may be from its actuator's model, rad."""
-
-    deflection_rad: float
-
-
-@dataclass(frozen=True)
 class Declared:
-    """What `fdi.bounds` declares of an aircraft, and who takes part in the diagnosis that relies on it.
+    """The declared half of a scenario: all that diagnosis, laws, supervisor and autopilots are configured
+    from. The other half is the truth, of which they receive readings.
 
-    inertia: tolerance of each moment of inertia as a share. coupling: relative errors of Pqr, Qpr, Rpq;
-    constant_rad_s2: unstructured angular acceleration by axis; both as published. vertical_wind_mps: the
-    strongest steady one. uses_statistics: whether the statistical detector runs. compares_across: whether
-    motion across a surface's column excludes it. monitors_sensors: whether the sensor monitor runs.
+    initial: what a pilot reads at the start. servos, instruments: the actuators and sensors as the designer
+    knows them. name: of the scenario, for messages.
     """
 
+    name: str
     aircraft: Aircraft
-    air: Dryden
-    sensors: SensorErrors
-    coefficients: CoefficientErrors
-    actuators: ActuatorErrors
-    inertia: float
-    coupling: PerAxis
-    constant_rad_s2: PerAxis
-    vertical_wind_mps: float
-    uses_statistics: bool = False
-    compares_across: bool = False
-    monitors_sensors: bool = False
+    rate_hz: float
+    substeps: int
+    initial: Initial
+    autopilot: "Autopilot | None"
+    fdi: FdiConfig
+    control: ControlConfig
+    design_model: "DesignModel"
+    servos: Actuators
+    instruments: Sensors
 
     @classmethod
-    def of(cls, scenario: Any) -> Self:
-        """As a scenario (a `schema.Scenario`, which imports what imports this) declares it."""
-        fdi, broken = scenario.fdi, any(of_a_sensor(fault) for fault in scenario.faults)
-        return cls.by(fdi, scenario.airframe, scenario.substeps, broken)
-
-    @classmethod
-    def by(cls, fdi: FdiConfig, aircraft: Aircraft, substeps: int = 1, sensor_fails: bool = False) -> Self:
-        """As a diagnosis declares it; sensor_fails: whether the scenario breaks an instrument."""
-        bounds = fdi.bounds
+    def of(cls, scenario: "Scenario") -> Self:
+        """That of a scenario."""
         return cls(
-            aircraft,
-            Dryden(bounds.turbulence),
-            _errors_of(bounds.sensors),
-            CoefficientErrors(bounds.coefficients),
-            ActuatorErrors(radians(bounds.deflection_deg)),
-            bounds.inertia,
-            bounds.inertia_coupling.as_tuple(),
-            bounds.constant_rad_s2.as_tuple(),
-            bounds.vertical_wind_mps,
-            uses_statistics=fdi.weighs_chance,
-            compares_across=fdi.compares_across(substeps),
-            monitors_sensors=fdi.monitors_sensors(sensor_fails),
+            scenario.name,
+            scenario.airframe,
+            scenario.rate_hz,
+            scenario.substeps,
+            scenario.initial,
+            scenario.autopilot,
+            scenario.fdi,
+            scenario.control,
+            scenario.design_model,
+            scenario.actuators,
+            scenario.sensors,
         )
+
+    @property
+    def air(self) -> Dryden:
+        """The strongest turbulence."""
+        return Dryden(self.fdi.bounds.turbulence)
+
+    @property
+    def sensors(self) -> SensorErrors:
+        """The largest errors of the instruments."""
+        return _errors_of(self.fdi.bounds.sensors)
+
+    @property
+    def coefficients(self) -> CoefficientErrors:
+        """Tolerance of the moment coefficients."""
+        return CoefficientErrors(self.fdi.bounds.coefficients)
+
+    @property
+    def deflection_rad(self) -> float:
+        """How far a surface may be from its actuator's model."""
+        return radians(self.fdi.bounds.deflection_deg)
+
+    @property
+    def inertia(self) -> float:
+        """Tolerance of each moment of inertia, as a share."""
+        return self.fdi.bounds.inertia
+
+    @property
+    def coupling(self) -> PerAxis:
+        """Largest relative errors of Pqr, Qpr, Rpq, as published."""
+        return self.fdi.bounds.inertia_coupling.as_tuple()
+
+    @property
+    def constant_rad_s2(self) -> PerAxis:
+        """Largest unstructured angular acceleration by axis, as published."""
+        return self.fdi.bounds.constant_rad_s2.as_tuple()
+
+    @property
+    def vertical_wind_mps(self) -> float:
+        """The strongest steady vertical wind."""
+        return self.fdi.bounds.vertical_wind_mps
+
+    @property
+    def uses_statistics(self) -> bool:
+        """Whether the statistical detector runs."""
+        return self.fdi.weighs_chance
+
+    @property
+    def compares_across(self) -> bool:
+        """Whether motion across a surface's column excludes it."""
+        return self.fdi.compares_across(self.substeps)
+
+    @property
+    def monitors_sensors(self) -> bool:
+        """Whether the sensor monitor runs."""
+        return self.fdi.monitors_sensors
 
     @property
     def is_noise_free(self) -> bool:
@@ -293,10 +336,7 @@ def declares_all(scenario: Any) -> bool:
     """Whether nothing of a scenario is undeclared. It is asked of each flight, and found once for the flights
     of a sweep that share what it depends on."""
     sections = tuple(getattr(scenario, name) for name in _UNDECLARED_DEPENDS_ON)
-    sensor_fails = any(of_a_sensor(fault) for fault in scenario.faults)
-    return _declares_all.get(
-        sections, lambda: next(undeclared(scenario), None) is None, scenario.substeps, sensor_fails
-    )
+    return _declares_all.get(sections, lambda: next(undeclared(scenario), None) is None, scenario.substeps)
 
 
 def _is_beyond(fact: Undeclared) -> bool:
@@ -502,17 +542,59 @@ def warnings_of(scenario: Any) -> tuple[str, ...]:
         *map(str, undeclared(scenario)),
         *_inconclusive(scenario),
         *_in_sequence(scenario),
+        *_outside_class(scenario),
+        *_former(scenario),
     )
+
+
+def outside_class(scenario: Any) -> tuple[str, ...]:
+    """The faults of surfaces and sensors that the declared class does not have, `elevator stuck at 12 s`."""
+    return tuple(
+        f"{_place_in_words(fault)} {fault.type.replace('_', ' ')} at {fault.at_s:g} s"
+        for fault in scenario.faults
+        if scenario.fdi.diagnoses and not _is_in_class(fault, scenario.fdi, scenario.airframe)
+    )
+
+
+def _place_in_words(fault: Any) -> str:
+    return sensor_words(fault.sensor) if of_a_sensor(fault) else place_of(fault)
+
+
+def _is_in_class(fault: Any, fdi: FdiConfig, aircraft: Aircraft) -> bool:
+    """Whether the class has a fault; what is on no surface is meant to be outside of every class."""
+    if of_a_sensor(fault):
+        return fdi.monitors_sensors
+    surface = getattr(fault, "actuator", None)
+    if surface is None or fdi.fault_class == "all":
+        return True
+    return fault.type == LOSS_OF_EFFECTIVENESS and surface in aircraft.class_of_losses
+
+
+def _outside_class(scenario: Any) -> Iterator[str]:
+    """Faults that cannot be named, but where that is what is expected."""
+    outside = outside_class(scenario)
+    if outside and not _expects_unanticipated(scenario):
+        cure = "set fdi.fault_class: all" if scenario.fdi.sensor_monitor is None else "see fdi.sensor_monitor"
+        yield f"faults: {' and '.join(outside)}: outside the declared class; {cure}"
+
+
+def _former(scenario: Any) -> Iterator[str]:
+    if scenario.fdi.sensor_monitor == "auto":
+        yield "fdi.sensor_monitor: auto is a former value and means the same as no value, by fdi.fault_class"
+
+
+def _expects_unanticipated(scenario: Any) -> bool:
+    expected = scenario.expect.isolated_as or ()
+    return UNANTICIPATED in ((expected,) if isinstance(expected, str) else expected)
 
 
 def _in_sequence(scenario: Any) -> Iterator[str]:
     """Surfaces that fail one after the other, of which the diagnosis names the first and takes it back; not
     where that is what is expected."""
-    expected = scenario.expect.isolated_as or ()
     in_turn = len(set(failing(scenario).values())) > 1
-    told = UNANTICIPATED in ((expected,) if isinstance(expected, str) else expected)
     looks_for_one = scenario.fdi.is_ours and not scenario.fdi.pairs
-    if looks_for_one and in_turn and not told and (says := of_several(scenario)):
+    unforeseen = looks_for_one and in_turn and not _expects_unanticipated(scenario)
+    if unforeseen and (says := of_several(scenario)):
         yield f"faults: {says.removeprefix('faults ')}"
 
 

@@ -226,11 +226,13 @@ class FdiConfig(Section, strict=True):
     scheme: name of the diagnosis scheme. `beaver-ftc list schemes` prints all names. `none`: no diagnosis
     options: parameters of the scheme, by name
     fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
-    elevator or rudder. `all`: all fault types on all surfaces
+    elevator or rudder; sensors are assumed to be sound (A11). `all`: all fault types on all surfaces, and
+    faults of sensors
     pairs: true: also look for simultaneous faults of two surfaces. On the Beaver, the pairs are elevator with
     flap, and aileron with rudder. This requires `fault_class: all`
-    sensor_monitor: when the sensor monitor compares the instruments with each other. `auto`: only if a sensor
-    fails in the scenario
+    sensor_monitor: whether the sensor monitor compares the instruments with each other. `never`: sensors are
+    assumed to be sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a
+    former value and means the same as left out
     slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface in the fault class `all`,
     rad/s
     slowest_rate_deg_s: lowest rate limit of a slow surface in the fault class `all`. A slower surface counts
@@ -260,7 +262,7 @@ class FdiConfig(Section, strict=True):
     )
     fault_class: Literal["published", "all"] = "published"
     pairs: bool = entry(False, needs={"fault_class": "all"}, examples=[True])
-    sensor_monitor: Literal["auto", "always", "never"] = "auto"
+    sensor_monitor: Literal["always", "never", "auto"] | None = entry(None, examples=["always"])
     slowest_oscillation_rad_s: float = entry(1.0, gt=0, le=100)
     slowest_rate_deg_s: float = entry(0.5, gt=0, le=100)
     probing: Probing | None = entry(None, examples=[{}])
@@ -313,11 +315,17 @@ class FdiConfig(Section, strict=True):
         a column turns with the incidence while the surface moves, and shows across its mean."""
         return self.looks_across and substeps <= 1
 
-    def monitors_sensors(self, sensor_fails: bool) -> bool:
-        """Whether the sensor monitor runs. A flight in which no instrument fails does without it: sound
-        instruments never raise its alarm."""
-        needed = {"always": True, "auto": sensor_fails, "never": False}
-        return needed[self.sensor_monitor] and self.is_ours
+    @property
+    def monitors_sensors(self) -> bool:
+        """Whether the sensor monitor runs: as said, otherwise if the class has faults of sensors."""
+        by_class = "always" if self.fault_class == "all" else "never"
+        said = None if self.sensor_monitor == "auto" else self.sensor_monitor
+        return (said or by_class) == "always" and self.is_ours
+
+    @property
+    def assumes_sound_sensors(self) -> bool:
+        """Whether a scheme that is compiled in diagnoses, and no sensor is in doubt."""
+        return self.diagnoses and not self.monitors_sensors
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -329,7 +337,8 @@ class FdiConfig(Section, strict=True):
             deny("statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case", "authority")
         refuse(wrong_options(DETECTORS, self.scheme, self.options))
         if self.is_published:
-            beyond = [key for key, value in _AS_PUBLISHED.items() if getattr(self, key) != value]
+            as_published = _AS_PUBLISHED.items()
+            beyond = [key for key, value in as_published if getattr(self, key) not in (value, None, "auto")]
             refuse(((key,), f"zhang2005 is the paper's alone, allowed: {_AS_SAID[key]}") for key in beyond)
         return self
 
@@ -345,12 +354,12 @@ class FdiConfig(Section, strict=True):
 
 # What `scheme: zhang2005` goes with, as values and as a scenario says them.
 _AS_PUBLISHED = {
-    "fault_class": "published", "pairs": False, "sensor_monitor": "auto", "probing": None,
+    "fault_class": "published", "pairs": False, "sensor_monitor": "never", "probing": None,
     "statistical": None, "authority": "either", "thresholds": "published",
     "sharpen": Sharpen(pole_bank=False, memory=False, shared_effectiveness=False, set_membership=False),
 }  # fmt: skip
 _AS_SAID = {
-    "fault_class": "published", "pairs": "false", "sensor_monitor": "auto", "probing": "null",
+    "fault_class": "published", "pairs": "false", "sensor_monitor": "never", "probing": "null",
     "statistical": "null", "authority": "either", "thresholds": "published", "sharpen": "none",
 }  # fmt: skip
 

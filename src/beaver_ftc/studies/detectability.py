@@ -35,6 +35,7 @@ from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies import isolability
 from beaver_ftc.studies.engine.statistics import quantile
@@ -255,7 +256,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     aircraft = scenario.airframe
     thrust, power = aircraft.engine.thrust, aircraft.file.power_setting
     short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
-    effects = effects_of_engines(short)
+    effects = effects_of_engines(Declared.of(short))
     if thrust is None or power is None or not effects.size:
         return []
     loop, bound = Loop(short), excitation(short).bound[0]

@@ -14,7 +14,6 @@ from beaver_ftc.loop import (
     Instruments,
     Loop,
     command_power,
-    diagnosis_record,
     end_outer_loops,
     hold_from_start,
     set_ground,
@@ -179,10 +178,7 @@ class Flown(Simulation):
             self._begin_diagnosis()
 
     def _begin_diagnosis(self) -> None:
-        loop, fresh = self._loop, self._fresh[0]  # type: ignore[index]
-        if loop.sensor_schedule.any:  # broken meanwhile
-            loop.enable_sensor_monitor(diagnosis_record(fresh), loop.scenario)
-        take_diagnosis(self._frame, fresh, self._next)
+        take_diagnosis(self._frame, self._fresh[0], self._next)  # type: ignore[index]
         self._diagnoses = True
         if self.listens_from_s is None:
             self.listens_from_s = self._now_s

@@ -10,7 +10,7 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import CompiledLaw, laws
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 CONFIG = record(Kp=float, Ki=float)  # gains 1/s, 1/s2
 MEMORY = record(integral=3)  # of the error, rad
@@ -24,9 +24,9 @@ def published_dtype(n: int) -> np.dtype:
     return FEEDBACK
 
 
-def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Fill the gains (control.CompiledLaw)."""
-    config = scenario.control
+    config = declared.control
     law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2
 
 

@@ -61,7 +61,7 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, own_damping
 from beaver_ftc.design.model import effectiveness as control_effectiveness
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import GIVE_UP
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import RateGyro
 
 N_POINTS = 5  # of the schedule over dynamic pressure
@@ -248,13 +248,13 @@ def set_up(
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * s, dt_s)
 
 
-def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Derive the gains of a scenario into the law's configuration (control.CompiledLaw).
+def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
+    """Derive the gains of a declaration into the law's configuration (control.CompiledLaw).
 
     y: the measured signals in trim.
     """
-    config, dt, layout = scenario.control, 1.0 / scenario.rate_hz, control["layout"]
-    speeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
+    config, dt, layout = declared.control, 1.0 / declared.rate_hz, control["layout"]
+    speeds_mps = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
     signals = np.tile(y, (N_POINTS, 1))
     signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
     carriers = [(axis, int(s)) for axis, s in enumerate(layout["main"])]
@@ -263,10 +263,10 @@ def configure(law: np.void, control: np.void, prediction: np.void, scenario: Sce
     set_up(
         law["config"],
         dt_s=dt,
-        substeps=scenario.substeps,
+        substeps=declared.substeps,
         approach=prediction["actuators"]["approach"],
-        speed_rad_s=config.noise_share * _shares(prediction["design"], y, carriers) * _rate_limits(scenario),
-        gyros=[_gyro(getattr(scenario.sensors, axis), dt) for axis in GYROS],
+        speed_rad_s=config.noise_share * _shares(prediction["design"], y, carriers) * _rate_limits(declared),
+        gyros=[_gyro(getattr(declared.instruments, axis), dt) for axis in GYROS],
         margin=(config.gain_margin_db, config.phase_margin_deg),
         qdyn=signals[:, QDYN],
         G=np.stack([control_effectiveness(prediction["design"], each) for each in signals]),
@@ -284,10 +284,10 @@ def _shares(design: np.void, y: np.ndarray, carriers: list[tuple[int, int]]) -> 
     return shares
 
 
-def _rate_limits(scenario: Scenario) -> np.ndarray:
+def _rate_limits(declared: Declared) -> np.ndarray:
     """Declared rate limits (n,) rad/s, the aircraft's default where none is."""
-    surfaces = scenario.airframe.surfaces
-    limits_deg_s = [getattr(scenario.actuators, surface).rate_limit_deg_s for surface in surfaces]
+    surfaces = declared.aircraft.surfaces
+    limits_deg_s = [getattr(declared.servos, surface).rate_limit_deg_s for surface in surfaces]
     return np.array([radians(limit) or DEFAULT_RATE_RAD_S for limit in limits_deg_s])
 
 

@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.schemes.published import (
     train_state_network,
 )
 from beaver_ftc.plugins import LAWS, settings
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 # adapts: whether anything does; networks: and a network. gain: of effectiveness, s2/rad2. integral_weight: c.
 # least, most: of an effectiveness, projection P, or infinite.
@@ -42,11 +42,11 @@ def zhang2005_dtype(n: int) -> np.dtype:
     return record(config=CONFIG, memory=MEMORY, feedback=FEEDBACK, network=STATE_NETWORK_RECORD)
 
 
-def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
+def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Fill the law's configuration (control.CompiledLaw)."""
-    settled, config = scenario.control, law["config"]
+    settled, config = declared.control, law["config"]
     option = settings(LAWS, settled.law, settled.options)
-    published.configure(law["feedback"], control, prediction, scenario, y)
+    published.configure(law["feedback"], control, prediction, declared, y)
     if not option["hand_over"]:
         control["config"]["reallocates"] = 0
     config["adapts"], config["networks"] = option["adaptation"], option["network"]

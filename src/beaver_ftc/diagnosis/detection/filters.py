@@ -39,7 +39,6 @@ from beaver_ftc.diagnosis.bounds import detection_poles_for_delays
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
-from beaver_ftc.scenario.schema import Scenario
 
 
 @kernel
@@ -362,11 +361,11 @@ _FIRST_BETA_CENTRE_RAD = BETA_CENTRES_RAD[0]
 _BETA_CENTRE_SPACING_RAD = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 
-def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
+def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control_config, network = scenario.control, fdae["network"]
-    fdae["config"]["pole_per_s"] = scenario.fdi.detection_pole_per_s
-    fdae["config"]["decay_factor"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
+    control_config, network = declared.control, fdae["network"]
+    fdae["config"]["pole_per_s"] = declared.fdi.detection_pole_per_s
+    fdae["config"]["decay_factor"] = exp(-declared.fdi.detection_pole_per_s * (1.0 / declared.rate_hz))
     network["config"]["learning_gain"] = control_config.network_gain_per_s2
     network["config"]["leak_per_s"] = control_config.network_leak_per_s
     network["config"]["weight_limit"] = control_config.network_weight_limit_rad_s2

@@ -354,7 +354,7 @@ def _configure_force(
         abs(term.value) for term in terms if term.surface
     )
     force_record["deflection_error_effect_bound"] = (
-        max_specific_force_over_chord_per_deflection_rad * declared.actuators.deflection_rad
+        max_specific_force_over_chord_per_deflection_rad * declared.deflection_rad
     )
     force_record["flow_angle_drift_bound"] = _flow_angle_drift_rate_bound(
         sensor_errors, gust_config["gravity"], y[AIRSPEED], force_index

@@ -450,9 +450,7 @@ def _configure_drift_and_model_noise(
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
     )
-    statistical["noise"]["deflection_error_effect_bound"] = (
-        np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
-    )
+    statistical["noise"]["deflection_error_effect_bound"] = np.abs(G).sum(axis=1) * declared.deflection_rad
 
 
 def derive_drift_intensity_over_squared_bound(

@@ -39,7 +39,6 @@ from beaver_ftc.plant.instruments import (
     wrapped,
 )
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
 FIRST_TURN_TEST = 0
@@ -230,43 +229,42 @@ SENSOR_MONITOR_RECORD = record(
 
 
 def configure_sensor_monitor(
-    monitor: np.void, scenario: Scenario, design_model_record: np.void, y: np.ndarray, enabled: bool
+    monitor: np.void, declared: Declared, design_model_record: np.void, y: np.ndarray
 ) -> None:
     """Fill the monitor's record at the trim: y, the measured signals there; design_model_record: of the
     designer.
 
-    A monitor that is not `enabled` has found nothing, and its record holds no more than that.
+    A monitor that is not declared has found nothing, and its record holds no more than that.
     """
     output, config = monitor["output"], monitor["config"]
     output["isolated_sensor"], output["alarmed_at_s"], output["isolated_at_s"] = NO_SENSOR, -1.0, -1.0
-    config["enabled"] = enabled
-    if not enabled:
+    config["enabled"] = declared.monitors_sensors
+    if not declared.monitors_sensors:
         return
-    declared = Declared.of(scenario)
-    initial_state = cast("Any", scenario.initial)  # whose keys the aircraft names
+    initial_state = cast("Any", declared.initial)  # whose keys the aircraft names
     config["substeps"], config["has_engine_sensors"] = (
-        scenario.substeps,
-        scenario.airframe.has_engine_instruments,
+        declared.substeps,
+        declared.aircraft.has_engine_instruments,
     )
     config["trim_reading"][3:7] = y[:4]
     config["rate_damping_per_s"] = acceleration_per_air_rotation(
         DesignFunctions(np.array([design_model_record])), y
     )
-    monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine_sensors"]:
         monitor["redundancy"]["memory"]["commanded_engine_readings"] = (
             initial_state.engine_rpm,
             initial_state.manifold_pressure_inhg,
         )
-    configure_redundancy_tests(monitor["redundancy"]["config"], declared, scenario)
+    configure_redundancy_tests(monitor["redundancy"]["config"], declared)
     configure_error_bounds_and_frozen_limits(
         monitor, declared, monitor["redundancy"]["config"]["sample_time_s"]
     )
 
 
-def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Scenario) -> None:
+def configure_redundancy_tests(config: np.void, declared: Declared) -> None:
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
-    initial_state, sample_time_s = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
+    initial_state, sample_time_s = declared.initial, 1.0 / declared.rate_hz / declared.substeps
     config["sample_time_s"] = sample_time_s
     config["filter_decay_by_pole"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
     config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial_state.altitude_m / EARTH_RADIUS_M) ** -2

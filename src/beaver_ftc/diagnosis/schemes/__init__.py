@@ -27,7 +27,6 @@ from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import pairs_refused
-from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
@@ -49,24 +48,23 @@ def fdi_dtype(n_surfaces: int, statistical_capacities: StatisticalRecordSize = U
     )  # fmt: skip
 
 
-def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def configure_diagnosis(fdi: np.void, prediction: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill in the stages of the diagnosis; prediction: already filled in. travel (2, n) rad: the stops."""
-    config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
+    config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     estimator_entries = isolation.list_isolation_estimators(config.fault_class, aircraft)
-    state.configure_shared_config(fdi["config"], scenario)
+    state.configure_shared_config(fdi["config"], declared)
     fdi["config"]["isolation_variant"] = adaptive_estimators.isolation_variant_index(config)
     state.configure_layout(fdi["layout"], estimator_entries, aircraft)
-    isolation.configure_isolation(fdi["isolation"], scenario, estimator_entries, travel)
+    isolation.configure_isolation(fdi["isolation"], declared, estimator_entries, travel)
     if config.pairs:
-        _refuse_unavailable_fault_pairs(scenario)
-    declared = Declared.of(scenario)
-    bounds.configure_uncertainty_bound(fdi["bound"], scenario, declared, prediction["design"])
+        _refuse_unavailable_fault_pairs(declared)
+    bounds.configure_uncertainty_bound(fdi["bound"], declared, prediction["design"])
     filters.fill_bank_decay_factors(fdi["bank"], config, declared, dt)
-    filters.configure_fdae(fdi["fdae"], scenario)
+    filters.configure_fdae(fdi["fdae"], declared)
     monitors.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
-        published.reconfigure_diagnosis_as_published(fdi, scenario, travel)
-    registry.configure_fault_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
+        published.reconfigure_diagnosis_as_published(fdi, declared, travel)
+    registry.configure_fault_types(fdi["types"], fdi["layout"], prediction["actuators"], declared, travel)
     fdi["types"]["config"]["has_surface_term_errors"] = fdi["bound"]["has_surface_term_errors"]
     conclusions.reset_conclusion(fdi["verdict"])
 
@@ -90,10 +88,10 @@ def prepare_takeover_with_previous_maxima(fdi: np.void, previous_fdi: np.void, i
     fdi["sensor_monitor"]["memory"]["substep"] = 0
 
 
-def _refuse_unavailable_fault_pairs(scenario: Scenario) -> None:
+def _refuse_unavailable_fault_pairs(declared: Declared) -> None:
     """Raises BadInput where a change in flight declares errors with which pairs are not available."""
-    if refusal := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):
-        raise BadInput(f"{scenario.name}: fdi.pairs: {refusal}, allowed: false")
+    if refusal := pairs_refused(declared.sensors.declared, declared.aircraft):
+        raise BadInput(f"{declared.name}: fdi.pairs: {refusal}, allowed: false")
 
 
 @kernel

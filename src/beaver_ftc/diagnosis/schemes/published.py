@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin_scheme
 from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.declared import Declared
 
 # Centres of the network's basis functions on each axis of the aircraft: alpha (pitch) or beta, rad; the rate
 # of the axis, rad/s; the deflection of the surface that leads it, as a share of its travel.
@@ -74,10 +74,10 @@ def configure_state_network(network: np.void, gain: float, weight_limit: float, 
             )
 
 
-def reconfigure_diagnosis_as_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+def reconfigure_diagnosis_as_published(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n)
     rad: the stops."""
-    config, dt, isolation_record = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
+    config, dt, isolation_record = declared.fdi, 1.0 / declared.rate_hz, fdi["isolation"]
     options, published_record = settings(DETECTORS, config.scheme, config.options), fdi["published"]
     published_record["config"]["uses_dead_zone"] = options["dead_zone"]
     weight_limit = options["network_limit_rad_s2"] if options["projection"] else np.inf

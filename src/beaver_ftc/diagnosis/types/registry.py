@@ -50,7 +50,6 @@ from beaver_ftc.diagnosis.types import (
     table,
 )
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
@@ -349,31 +348,31 @@ def configure_fault_types(
     types: np.void,
     layout: np.void,
     prediction_actuators: np.void,
-    scenario: Scenario,
+    declared: Declared,
     travel_low_and_high: np.ndarray,
 ) -> None:
     """Fill the configuration of the types and the actuator of each surface; travel_low_and_high (2, n): the
     stops, rad."""
-    config, types_config, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
+    config, types_config, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
     types_config["frames_per_block"] = frames_per_block = (
-        ceil(BLOCK_DURATION_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
+        ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     )
-    types_config["frame_shows_single_instant"] = scenario.substeps == 1 and frames_per_block == 1
+    types_config["frame_shows_single_instant"] = declared.substeps == 1 and frames_per_block == 1
     types_config["block_duration_s"] = frames_per_block * dt
     half_cycle_frames = pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
     types_config["slowest_half_cycle_frames"] = ceil(min(half_cycle_frames, 1e9))  # longer than any flight
     types_config["n_substeps"], types_config["released_surface_returns_via_actuator"], types_config["dt"] = (
-        scenario.substeps,
+        declared.substeps,
         prediction_actuators["real"],
         dt,
     )
     types_config["abrupt"] = config.fault_profile == "abrupt"
     types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
-    surface_names, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
+    surface_names, substep_s = declared.aircraft.surfaces, dt / declared.substeps
     for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
         zip(surface_names, types["surface"], *travel_low_and_high, strict=True)
     ):
-        rate_limit_deg_s = getattr(scenario.actuators, surface_name).rate_limit_deg_s
+        rate_limit_deg_s = getattr(declared.servos, surface_name).rate_limit_deg_s
         actuator_record = surface_record["actuator"]
         actuator_record["travel_low"], actuator_record["travel_high"] = travel_low, travel_high
         actuator_record["reachable_low"], actuator_record["reachable_high"] = (

@@ -374,6 +374,7 @@ __all__ = [
 ]  # fmt: skip
 
 UNANTICIPATED, DAMAGE = "unanticipated", "damage"
+LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 MOST_FAULTS = 1000  # of one flight: an hour of breaking and repairing by hand has room
 
 

@@ -11,7 +11,6 @@ from beaver_ftc.diagnosis.bounds import (
     declared_errors_for_plugin,
     model_error_std,
 )
-from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
@@ -70,9 +69,7 @@ def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
 
 
 def declared(design, **bounds):
-    return declared_errors_for_plugin(
-        declared_in(Bounds.model_validate(bounds), AIRCRAFT), Actuators(), design, Y, U
-    )
+    return declared_errors_for_plugin(declared_in(Bounds.model_validate(bounds), AIRCRAFT), design, Y, U)
 
 
 def test_of_an_air_datum_noise_bias_and_rounding_count(design):
@@ -103,7 +100,7 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
 
 def test_a_tolerance_is_a_share_of_each_coefficient(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = declared_errors_for_plugin(declared_in(bounds, AIRCRAFT), Actuators(), design, Y, U)
+    told = declared_errors_for_plugin(declared_in(bounds, AIRCRAFT), design, Y, U)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 

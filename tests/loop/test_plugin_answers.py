@@ -137,7 +137,7 @@ def test_each_is_told_of_its_own_options_once_and_one_that_goes_on_not_again():
     ]
     begun = loop.plugin_frame
     assert begun._names == ("augmented-ekf", "lqr")
-    given = loop.frames, loop.scenario, loop.start
+    given = loop.frames, loop.scenario, loop.trimmed
     PluginFrame(*given, detector, law, begun)
     assert (len(detector.contexts), len(law.contexts)) == (1, 1)
     PluginFrame(*given, Answers(Verdict()), law, begun)
@@ -145,7 +145,7 @@ def test_each_is_told_of_its_own_options_once_and_one_that_goes_on_not_again():
     assert (len(detector.contexts), len(law.contexts)) == (1, 1)
     PluginFrame(*given, detector, law, None)
     assert (len(detector.contexts), len(law.contexts)) == (2, 2)
-    unnamed = PluginFrame(loop.frames, _scenario(), loop.start, detector, law, begun)
+    unnamed = PluginFrame(loop.frames, _scenario(), loop.trimmed, detector, law, begun)
     assert unnamed._names == ("Answers", "Answers")
 
 

@@ -53,6 +53,12 @@ def _scenario(**keys):
     return Scenario.model_validate({"name": "x", "duration_s": 5, **keys})
 
 
+def start_of(loop):
+    """The truth's channels at the start, SI."""
+    truth = loop.frames["truth"]
+    return truth["value"][0] * truth["factor"][0]
+
+
 @pytest.fixture(scope="module", params=CASES)
 def loop(request):
     flying = Loop(_scenario(**CASES[request.param]))
@@ -71,14 +77,14 @@ def test_what_is_read_logged_and_told_of_the_start(loop, changed):
     fixed = ("n", "declared", "latitude_0", "longitude_0", "ground_m", "radius_m", "parallel_radius_m")
     assert not changed({
         "truth": {name: truth[name].item() for name in fixed}, "factor": truth["factor"][: truth["n"]],
-        "start": loop.start[:40], "logged": of_record(frame["logged"]), "columns": loop.columns,
+        "start": start_of(loop)[:40], "logged": of_record(frame["logged"]), "columns": loop.columns,
         "places": y_places(frame), "frames": loop.n_frames, "rows": len(loop.log),
-        "travel": cockpit.travel_rad(loop.plant),
+        "travel": Declared.of(loop.scenario).travel_rad,
     })  # fmt: skip
 
 
 def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
-    context = context_of(loop.frames, loop.scenario, loop.start, {"alarm": 3.0})
+    context = context_of(loop.frames, loop.scenario, loop.trimmed, {"alarm": 3.0})
     told = {name: value for name, value in vars(context).items() if name not in ("model", "declared")}
     loop.fly_chunk(0, 3)
     measured = measured_of(loop.frames[0])
@@ -228,7 +234,7 @@ def test_the_command_and_the_engine_are_handed_over_through_python():
     frame["control"]["power"]["output"]["in_use"] = 1
     loop.cockpit.write()
     assert loop.plant.read(loop.aircraft.trim.throttle) == pytest.approx(12.5)
-    truth, fresh = frame["truth"], loop.start.copy()
+    truth, fresh = frame["truth"], start_of(loop)
     truth["value"] = 0.0
     loop.cockpit.read()
     assert truth["value"] * truth["factor"] == pytest.approx(fresh)

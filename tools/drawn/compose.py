@@ -138,7 +138,7 @@ class Composer:
             )
         except Undrawable:
             return
-        if path == "actuators" and isinstance(value, dict):
+        if path.endswith("actuators") and isinstance(value, dict):
             value = self._of_its_surfaces(value)
         put(words, path, value)
 

@@ -119,7 +119,7 @@ def _steepest_mps2(gust: Words) -> float:
 
 def _declare_faults(words: Words, fdi: Words) -> None:
     """A servo slower than what is declared counts as a jam, an oscillation slower as a bias."""
-    actuators = words.get("actuators", {})
+    actuators = words.get("design_model", {}).get("actuators") or words.get("actuators", {})
     for fault in words.get("faults", ()):
         if fault["type"] == "rate_limit":
             own = actuators if isinstance(actuators, dict) else {}

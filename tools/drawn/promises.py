@@ -237,7 +237,7 @@ def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
     """Whether a bias grows so fast that at its stop it counts as a runaway (fault-types.md)."""
     if fault.type != "bias" or fault.profile == "abrupt":
         return False
-    limit_deg_s = getattr(scenario.actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
+    limit_deg_s = getattr(scenario.known_actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
     return abs(fault.bias_deg) * fault.kappa_per_s > 0.9 * limit_deg_s
 
 

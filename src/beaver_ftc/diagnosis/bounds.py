@@ -60,7 +60,6 @@ from beaver_ftc.design.model import (
     signals,
 )
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
-from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
 
@@ -869,13 +868,13 @@ _GYRO_NAME_BY_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
 def declared_errors_for_plugin(
-    declared: Declared, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray
+    declared: Declared, design: np.ndarray, y: np.ndarray, u: np.ndarray
 ) -> "DeclaredErrors":
     """Return the declared errors for a plug-in, at the trim y and u rad; design: record of the design model,
     (1,)."""
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
-    aircraft, sensor_errors = declared.aircraft, declared.sensors
+    aircraft, sensor_errors, servos = declared.aircraft, declared.sensors, declared.servos
     reading_noise_std, reading_bias, reading_resolution = (
         sensor_errors.each(error_attribute_name) for error_attribute_name in ("noise", "steady", "resolution")
     )
@@ -901,8 +900,8 @@ def declared_errors_for_plugin(
         model_rad_s2=model_error_std(
             design, y, u, air_data_error_std, coefficient_errors, deflection_error_rad
         ),
-        bandwidth_rad_s=np.array([getattr(actuators, s).bandwidth_rad_s for s in aircraft.surfaces]),
-        rate_limit_rad_s=np.radians([getattr(actuators, s).rate_limit_deg_s for s in aircraft.surfaces]),
+        bandwidth_rad_s=np.array([getattr(servos, s).bandwidth_rad_s for s in aircraft.surfaces]),
+        rate_limit_rad_s=np.radians([getattr(servos, s).rate_limit_deg_s for s in aircraft.surfaces]),
     )
 
 

@@ -218,11 +218,17 @@ _designs: dict[tuple[object, ...], np.ndarray] = {}
 
 
 class Trim(NamedTuple):
-    """The state in trim. x (3,): rates, rad/s; y: the measured signals beside them; u (n,) rad: surfaces."""
+    """What is known of the trim before the first reading.
+
+    x (3,) rad/s, y, u (n,) rad: rates, measured signals beside them and surfaces in the designer's trim,
+    about which everything is linearised. command (n,) rad: the one in force at the start. It holds the true
+    aircraft in its own trim, and a healthy surface stands there.
+    """
 
     x: np.ndarray
     y: np.ndarray
     u: np.ndarray
+    command: np.ndarray
 
 
 def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
@@ -252,7 +258,7 @@ def configure_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
     """Configure the stages that depend on the trim, in a record of `configure_design`."""
     configure_diagnosis_at_trim(frame, scenario, trim)
     stage = frame["control"]
-    stage["allocation"]["output"]["command"] = trim.u
+    stage["allocation"]["output"]["command"] = trim.command
     control.configure_law(stage, frame["prediction"], Declared.of(scenario), trim.y)
 
 
@@ -260,8 +266,8 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     """The same of a diagnosis without a law: prediction, sensor monitor, statistical detector."""
     prediction, fdi, declared = frame["prediction"], frame["fdi"], Declared.of(scenario)
     design = prediction["design"]
-    prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.u
-    anchor(design, *trim)
+    prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.command
+    anchor(design, trim.x, trim.y, trim.u)
     redundancy.configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
     mass = mass_of(declared.design_model, declared.aircraft)
     statistical.configure_statistical_detector(
@@ -289,8 +295,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
 
 def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
-    first = ch.POS + 3 * frame["prediction"]["u"].size
-    return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *range(first, first + int(frame["truth"]["declared"]))]
+    return ch.signal_places(frame["prediction"]["u"].size, int(frame["truth"]["declared"]))
 
 
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:

@@ -63,8 +63,8 @@ class Changing:
         if renews:
             detector = named_detector(then)
         if change.law is not None:
-            law = named_law(frames, then, loop.start)
-        plugins = plugged(frames, then, loop.start, detector, law, before)
+            law = named_law(frames, then, loop.trimmed)
+        plugins = plugged(frames, then, loop.trimmed, detector, law, before)
         return Stage(frame, change, then, renews, frames, plugins)
 
     def next_change(self, k: int) -> int:

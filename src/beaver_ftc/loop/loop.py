@@ -16,18 +16,19 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.compiled.cache import expect
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import assembly
-from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out, y_places
+from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, sense_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address
 from beaver_ftc.plant.channels import NodeBank
-from beaver_ftc.plant.conditions import give_back, ready
+from beaver_ftc.plant.conditions import give_back, known_trim, ready
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plant.trim import GustSchedule, take_off
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import HOLDING
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
@@ -105,12 +106,6 @@ def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
     )
 
 
-def travel_rad(plant: Plant) -> np.ndarray:
-    """Lower and upper stops of the surfaces, (2, 4) rad."""
-    surfaces, ends = plant.aircraft.surfaces, ("min", "max")
-    return np.array([[plant.read(f"actuators/{s}/position-{end}-rad") for s in surfaces] for end in ends])
-
-
 def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:
     """Where the flight starts, and where the ground is."""
     truth["latitude_0"] = plant.read(ch.FIXED[ch.LATITUDE][1])
@@ -177,12 +172,11 @@ class Loop:
             prepare(self.plant)
             self.plant.executive = 0  # whatever was done to its `run` is to be called
         take_off(self.plant, scenario, self.trim)
-        self.frames = configure_design(scenario, travel_rad(self.plant))
+        self.frames = configure_design(scenario, Declared.of(scenario).travel_rad)
         self.cockpit = Cockpit(self.plant, self.frames)
         self.cockpit.read()
-        truth, surfaces = self.frames["truth"], np.array(list(self.trim.surfaces_rad.values()))
-        self.start: np.ndarray = truth["value"][0] * truth["factor"][0]
-        self.trimmed = Trim(self.start[:3], self.start[y_places(self.frames[0])], surfaces)
+        command = np.array(list(self.trim.surfaces_rad.values()))
+        self.trimmed = Trim(*known_trim(scenario), command)
         configure_at_trim(self.frames[0], scenario, self.trimmed)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
@@ -233,8 +227,8 @@ class Loop:
         if detector is None:
             detector = named_detector(self.scenario)
         if law is None:
-            law = named_law(self.frames, self.scenario, self.start)
-        return plugged(self.frames, self.scenario, self.start, detector, law)
+            law = named_law(self.frames, self.scenario, self.trimmed)
+        return plugged(self.frames, self.scenario, self.trimmed, detector, law)
 
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""

@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CAS
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
-from beaver_ftc.loop.assembly import y_places
+from beaver_ftc.loop.assembly import Trim, y_places
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
@@ -64,7 +64,7 @@ _ALLOWED: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
 class PluginFrame:
     """One frame of the loop with a detector or a law that is not compiled in, called as `stepping.fly_frame`.
 
-    detector, law: the plug-ins, None where the built-in one is in place. start: as in `context_of`.
+    detector, law: the plug-ins, None where the built-in one is in place. trim: as in `context_of`.
     begun: the frame that this one follows in flight, whose plug-ins are not restarted.
     """
 
@@ -72,7 +72,7 @@ class PluginFrame:
         self,
         frames: np.ndarray,
         scenario: Scenario,
-        start: np.ndarray,
+        trim: Trim,
         detector: Detector | None,
         law: Law | None,
         begun: "PluginFrame | None",
@@ -88,10 +88,10 @@ class PluginFrame:
             type(law).__name__ if is_compiled(LAWS, other) else other,
         )
         if detector is not None and not (begun and begun.detector is detector):
-            context = context_of(frames, scenario, start, scenario.fdi.options)
+            context = context_of(frames, scenario, trim, scenario.fdi.options)
             self._ask(self._names[0], detector.reset, context)
         if law is not None and not (begun and begun.law is law):
-            context = context_of(frames, scenario, start, scenario.control.options)
+            context = context_of(frames, scenario, trim, scenario.control.options)
             self._ask(self._names[1], law.reset, context)
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
@@ -192,14 +192,10 @@ def measured_of(frame: np.void) -> Measured:
     )
 
 
-def context_of(
-    frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
-) -> Context:
-    """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
+def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapping[str, float]) -> Context:
+    """What a plug-in is given before the flight; trim: what is known of it."""
     frame, aircraft = frames[0], scenario.airframe
     layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["prediction"]["design"]
-    trim_y = start[y_places(frame)]
-    trim_rad = layout["trim"].copy()
     constant = bound["constant_error_bound"].copy()
     if bound["error_map"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
@@ -207,9 +203,9 @@ def context_of(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,
         model=DesignFunctions(design.copy()),
-        trim_x=start[:3].copy(),
-        trim_y=trim_y,
-        trim_rad=trim_rad,
+        trim_x=trim.x.copy(),
+        trim_y=trim.y.copy(),
+        trim_rad=trim.command.copy(),
         travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=constant,
         inertia_coupling=bound["inertia_coupling_error_share"].copy(),
@@ -217,9 +213,7 @@ def context_of(
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=declared_errors_for_plugin(
-            Declared.of(scenario), scenario.actuators, design, trim_y, trim_rad
-        ),
+        declared=declared_errors_for_plugin(Declared.of(scenario), design, trim.y, trim.command),
     )
 
 
@@ -232,16 +226,16 @@ def named_detector(scenario: Scenario) -> Detector | None:
     return None if is_compiled(DETECTORS, scheme) else made(DETECTORS, scheme)
 
 
-def named_law(frames: np.ndarray, scenario: Scenario, start: np.ndarray) -> Law | None:
+def named_law(frames: np.ndarray, scenario: Scenario, trim: Trim) -> Law | None:
     """The plug-in a scenario names for its law; None if it is compiled in, or has a compiled form, which is
-    put into the record then. start: as in `context_of`. Raises as `named_detector` does."""
+    put into the record then. trim: as in `context_of`. Raises as `named_detector` does."""
     if is_compiled(LAWS, scenario.control.law):
         return None
     law = made(LAWS, scenario.control.law)
     compile_into = getattr(law, "compile_into", None)
     if compile_into is None or not has_kernels(scenario.control.law):
         return law
-    law.reset(context_of(frames, scenario, start, scenario.control.options))
+    law.reset(context_of(frames, scenario, trim, scenario.control.options))
     control = frames["control"][0]
     control["power"]["config"]["enabled"] = 0
     compile_into(control[row_of(scenario.control.law).file])
@@ -251,7 +245,7 @@ def named_law(frames: np.ndarray, scenario: Scenario, start: np.ndarray) -> Law 
 def plugged(
     frames: np.ndarray,
     scenario: Scenario,
-    start: np.ndarray,
+    trim: Trim,
     detector: Detector | None,
     law: Law | None,
     begun: PluginFrame | None = None,
@@ -280,4 +274,4 @@ def plugged(
         config = control["config"]
         config["uses_verdict"], config["reallocates"] = getattr(law, "fault_tolerant", False), 0
         config["informed"] = 0
-    return PluginFrame(frames, scenario, start, detector, law, begun)
+    return PluginFrame(frames, scenario, trim, detector, law, begun)

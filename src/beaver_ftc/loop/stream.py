@@ -80,8 +80,7 @@ class Diagnosis:
 
     def reset(self) -> None:
         """Delete the memory of the diagnosis. The next sample then counts as the first sample of a flight."""
-        stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
-        travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
+        travel = self.declared.travel_rad
         self._frames = configure_design(self._scenario, travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
@@ -198,7 +197,7 @@ class Diagnosis:
                 _put(what, np.asarray(given), place)
         if not all(np.isfinite(part).all() for part in (x, y, u)):
             return
-        configure_diagnosis_at_trim(self._frame, self._scenario, Trim(x, y, u))
+        configure_diagnosis_at_trim(self._frame, self._scenario, Trim(x, y, u, u))
         self._fresh = False
 
 

@@ -85,6 +85,13 @@ def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     )
 
 
+def signal_places(n: int, declared: int) -> list[int]:
+    """Places in `truth_channels` of the measured signals beside the rates, of an aircraft with n surfaces and
+    so many declared signals: (4 + declared,)."""
+    first = POS + 3 * n
+    return [ALPHA, BETA, AIRSPEED, QDYN, *range(first, first + declared)]
+
+
 # Read where a flight needs more than the usual sensors: m/s2 times slug, slug; then the sensors that the
 # monitor alone uses; then the engine's.
 _INERTIAL: tuple[Channel, ...] = (

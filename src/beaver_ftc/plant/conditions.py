@@ -18,15 +18,19 @@ import os
 from functools import lru_cache
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
-from beaver_ftc.plant.trim import TrimPoint, configure, trim_of
+from beaver_ftc.plant.channels import signal_places, truth_channels
+from beaver_ftc.plant.trim import TrimPoint, configure, take_off, trim_of
+from beaver_ftc.scenario.airframe import Environment
 from beaver_ftc.scenario.builtin import texts_of
-from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
+from beaver_ftc.scenario.schema import Scenario, ScenarioLike, Uncertainty, load
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel
@@ -45,7 +49,7 @@ def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
 
     Loaded again, within a second, when one of its files has changed.
     """
-    origin = aircraft, _last_written_ns(aircraft.jsbsim, int(monotonic()))
+    origin = _origin(aircraft)
     try:
         plant = _free.get(origin, []).pop()
     except IndexError:
@@ -55,6 +59,11 @@ def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
             plant.executive = executive_address(plant.fdm)
     renew(plant, rate_hz, substeps)
     return plant
+
+
+def _origin(aircraft: Aircraft) -> object:
+    """The aircraft and when its files were last written."""
+    return aircraft, _last_written_ns(aircraft.jsbsim, int(monotonic()))
 
 
 def give_back(plant: Plant) -> None:
@@ -124,6 +133,43 @@ def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "Linear
     from beaver_ftc.plant.linear import differences
 
     return differences(*trimmed(_condition(scenario, initial)))
+
+
+_MOST_KNOWN_TRIMS = 256
+_known_trims: dict[object, "KnownTrim"] = {}
+
+
+class KnownTrim(NamedTuple):
+    """The trim that the designer knows: rates x (3,) rad/s, the measured signals y beside them, without
+    errors, and the surfaces u (n,) rad."""
+
+    x: np.ndarray
+    y: np.ndarray
+    u: np.ndarray
+
+
+def known_trim(scenario: Scenario) -> KnownTrim:
+    """The trim of the aircraft in its file, at the start of the scenario and in still air. The designer finds
+    it without the truth: neither its errors nor its air are in it. Raises BadInput if there is none.
+    """
+    nominal = scenario.model_copy(
+        update={
+            "uncertainty": Uncertainty(), "environment": Environment(), "actuators": scenario.known_actuators,
+        }
+    )  # fmt: skip
+    aircraft, rates = scenario.airframe, (scenario.rate_hz, scenario.substeps)
+    key = _origin(aircraft), texts_of(nominal, ("initial", "actuators")), rates
+    if key not in _known_trims:
+        if len(_known_trims) >= _MOST_KNOWN_TRIMS:
+            _known_trims.clear()
+        plant, point = ready(nominal)
+        take_off(plant, nominal, point)
+        channels = truth_channels(aircraft)
+        readings = np.array([plant.read(name) * factor for _, name, factor in channels])
+        give_back(plant)
+        y = readings[signal_places(aircraft.n, len(aircraft.signals))]
+        _known_trims[key] = KnownTrim(readings[:3], y, np.array(list(point.surfaces_rad.values())))
+    return _known_trims[key]
 
 
 _TRIM_DEPENDS_ON = ("initial", "uncertainty", "actuators")

@@ -152,9 +152,19 @@ class Declared:
             scenario.fdi,
             scenario.control,
             scenario.design_model,
-            scenario.actuators,
-            scenario.sensors,
+            scenario.known_actuators,
+            scenario.known_sensors,
         )
+
+    @property
+    def travel_rad(self) -> np.ndarray:
+        """Lower and upper stop of each surface, (2, surfaces) rad, as the designer knows them."""
+        of_file = self.aircraft.file.surfaces
+        stops = (
+            of_file[surface].travel_rad if servo.travel_deg is None else map(radians, servo.travel_deg)
+            for surface, servo in ((name, getattr(self.servos, name)) for name in self.aircraft.surfaces)
+        )
+        return np.array([tuple(each) for each in stops]).T.copy()
 
     @property
     def air(self) -> Dryden:

@@ -253,6 +253,9 @@ class DesignModel(Section):
     same factor, 1
     inertia: inertia of the design model
     coefficients: factors on aerodynamic terms of the design model, by name of the term. 1: no error
+    actuators: actuators as the diagnosis and the laws know them, in the forms of `actuators`. Left out: as
+    `actuators`
+    sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`
     """
 
     engine_terms: Flag = True
@@ -261,6 +264,8 @@ class DesignModel(Section):
     mass: Scale = number(1.0, "1")
     inertia: InertiaScale = entry(InertiaScale)
     coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 0.9}])
+    actuators: Actuators | None = entry(None, examples=["servo"])
+    sensors: Sensors | None = entry(None, examples=["tactical-grade"])
 
 
 class Change(Section):
@@ -428,6 +433,16 @@ class Scenario(Section, title="beaver-ftc scenario"):
     def airframe(self) -> Aircraft:
         """The aircraft, as data."""
         return self._airframe or find_aircraft(self.aircraft)
+
+    @property
+    def known_actuators(self) -> Actuators:
+        """The actuators as the designer knows them: the nominal ones, unless the design model has its own."""
+        return self.actuators if self.design_model.actuators is None else self.design_model.actuators
+
+    @property
+    def known_sensors(self) -> Sensors:
+        """The sensors as the designer knows them, likewise."""
+        return self.sensors if self.design_model.sensors is None else self.design_model.sensors
 
     @model_validator(mode="wrap")
     @classmethod

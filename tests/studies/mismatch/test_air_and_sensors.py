@@ -47,7 +47,7 @@ def row(plant, t_s):
 def test_turbulence_is_its_own_source_and_leaves_nothing():
     states = flight_in_turbulence()
     assert np.abs(states.x_air - states.x).max() > 1e-3
-    case = Models(CALM, states[:1])
+    case = Models(CALM)
     contributions, _ = instantaneous(case, states)
     designed = case.design_model.acceleration(states.x_measured, states.y_measured, states.u)
     rest = states.xdot - designed - sum(contributions.values())
@@ -73,7 +73,7 @@ def test_an_erring_sensor_shows_as_the_model_at_the_true_state_less_that_at_the_
     plain, _ = split(CALM, [columns])
     off = columns | {measured_name(column): columns[column] + error}
     states = states_of(off)
-    designed = Models(CALM, states[:1]).design_model
+    designed = Models(CALM).design_model
     made_of_it = designed.acceleration(states.x_measured, states.y_measured, states.u)
     for i, axis in enumerate("pqr"):  # what the diagnosis would have logged, one row later
         off[f"{axis}_design_rad_s2"] = np.concatenate([[0.0], made_of_it[:-1, i]])

@@ -180,7 +180,7 @@ def test_a_term_is_what_jsbsim_makes_of_it(name):
     y = np.array([[0.17, 0.09, 41.0, qdyn, dpt]])
     x, u, none = np.array([[0.3, -0.2, 0.25]]), np.array([[0.2, -0.1, 0.1, 0.3]]), np.zeros((1, 3))
     states = States(np.zeros(1), x, x, x, y, y, u, u, u, none, none, np.zeros(1), np.zeros(1), none, none)
-    found = coefficient_errors(Models(case, states), states)
+    found = coefficient_errors(Models(case), states)
     assert list(found) == [name]
     assert found[name][0] == pytest.approx(np.subtract(*accelerations), rel=1e-6, abs=1e-9)
 

@@ -169,7 +169,7 @@ def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> 
 
 def grade_of(scenario: Scenario) -> str:
     """Which grade of flights a scenario belongs to."""
-    return flight_grade(not Declared.of(scenario).is_noise_free, scenario.actuators.is_ideal)
+    return flight_grade(not Declared.of(scenario).is_noise_free, scenario.known_actuators.is_ideal)
 
 
 def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:

@@ -66,8 +66,8 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
 
     loop = Loop(scenario)
     exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
-    coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
-    context = context_of(loop.frames, exact, loop.start, {})
+    coefficients = context_of(loop.frames, scenario, loop.trimmed, {}).declared.coefficients
+    context = context_of(loop.frames, exact, loop.trimmed, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.gust.subtracts_measured_gust:
         context = context_with_measured_gust(

@@ -24,6 +24,7 @@ from beaver_ftc.design.model import (
     inertial,
     mass_of,
 )
+from beaver_ftc.plant.conditions import known_trim
 from beaver_ftc.scenario.schema import Scenario
 
 MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}
@@ -168,7 +169,7 @@ def _scaled(ratio: Mapping[str, float]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class DesignModelOfFlight:
-    """The design model in use: nonlinear, frozen or linearised at the trim of the first frame."""
+    """The design model in use: nonlinear, frozen or linearised at the designer's trim."""
 
     moments: MomentModel
     design: Anchored
@@ -192,8 +193,8 @@ class DesignModelOfFlight:
         return np.stack([self.acceleration(still, y, u) - neutral for u in deflected], axis=-1)
 
 
-def design_model_of_flight(scenario: Scenario, trim: States) -> DesignModelOfFlight:
-    """The scenario's design model; `trim` is the flight's first frame, where it was linearised."""
+def design_model_of_flight(scenario: Scenario) -> DesignModelOfFlight:
+    """The scenario's design model, linearised or frozen where the designer knows the trim."""
     design = design_of(scenario.design_model)[0]
-    anchor(design, trim.x[0], trim.y[0], trim.u[0])
+    anchor(design, *known_trim(scenario))
     return DesignModelOfFlight(designed_moments(scenario), anchored(design))

@@ -138,11 +138,11 @@ def earth_rotation(
 
 
 class Models:
-    """Of a flight that starts with these states: the design model in use, the truth, and the actuators."""
+    """Of a flight: the design model in use, the truth, and the actuators."""
 
-    def __init__(self, scenario: Scenario, trim: States) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         self.scenario, self.actuators = scenario, HealthyActuators(scenario)
-        self.design_model, self.truth = design_model_of_flight(scenario, trim), true_moments(scenario)
+        self.design_model, self.truth = design_model_of_flight(scenario), true_moments(scenario)
 
 
 def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:

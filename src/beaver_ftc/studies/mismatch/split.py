@@ -79,7 +79,7 @@ def split(scenario: Scenario, chunks: Iterable[Columns]) -> Iterator[Stretch]:
         log = {name: np.concatenate([held.get(name, ()), values]) for name, values in chunk.items()}
         held = {name: values[-1:] for name, values in log.items()}
         states = states_of(log)
-        models = models or Models(scenario, states[:1])
+        models = models or Models(scenario)
         if states.t_s.size > 1:
             yield _over_frames(models, states)
     if models is not None:

@@ -1,5 +1,7 @@
 """Helpers for tests that fly: scenarios from a few words, logs kept in memory."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from beaver_ftc.aircraft import load
@@ -25,7 +27,8 @@ SINES = {
 
 def declared_in(bounds, aircraft=None):
     """What these `fdi.bounds` declare of an aircraft."""
-    return Declared.by(FdiConfig(bounds=bounds), aircraft or load())
+    declared = Declared.of(Scenario(name="x"))
+    return replace(declared, fdi=FdiConfig(bounds=bounds), aircraft=aircraft or load())
 
 
 class Memory:

@@ -11,6 +11,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.control import autopilot as profile
 from beaver_ftc.control.autopilot import AUTOPILOT, GAIN, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 AIRCRAFT = load()
@@ -30,7 +31,7 @@ def set_up(stand_in=3, autopilot=LEGS, **keys):
     control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
     control["power"]["config"]["trim"], control["power"]["config"]["low"] = 20.0, 12.0
     control["power"]["config"]["high"], control["power"]["config"]["step"] = 28.0, 0.5
-    profile.set_up_autopilot(pilot, control, Scenario.model_validate(given))
+    profile.set_up_autopilot(pilot, control, Declared.of(Scenario.model_validate(given)))
     return pilot, control
 
 
@@ -202,7 +203,7 @@ def made_up(terms, **autopilot):
     )
     legs = SimpleNamespace(**({"airspeed_mps": ()} | autopilot))
     return SimpleNamespace(
-        name="aloft", airframe=aircraft, autopilot=legs, design_model=SimpleNamespace(mass=1.0)
+        name="aloft", aircraft=aircraft, autopilot=legs, design_model=SimpleNamespace(mass=1.0)
     )
 
 
@@ -237,7 +238,7 @@ def test_the_table_of_thrust_serves_where_power_holds_the_airspeed_and_no_slipst
 ):
     """At 1.2 times the mass of 500 kg; with 1e-4 m/s2 a setting, so that each has its own."""
     scenario = made_up(terms)
-    scenario.airframe.airspeed_by, scenario.airframe.engine = by, SimpleNamespace(thrust=THRUST)
+    scenario.aircraft.airspeed_by, scenario.aircraft.engine = by, SimpleNamespace(thrust=THRUST)
     scenario.design_model.mass = 1.2
     pilot = np.zeros(1, AUTOPILOT)[0]
     profile._set_up_aircraft_values(pilot, scenario)
@@ -254,7 +255,7 @@ def test_the_table_of_thrust_serves_where_power_holds_the_airspeed_and_no_slipst
 @pytest.mark.parametrize(("fastest", "slowest"), [(50.0, 27.0), (30.0, 26.0)])
 def test_a_fifth_of_a_narrow_envelope_is_kept_above_its_slowest_airspeed(fastest, slowest):
     scenario = made_up({})
-    scenario.airframe.envelope.airspeed_mps = (25.0, fastest)
+    scenario.aircraft.envelope.airspeed_mps = (25.0, fastest)
     pilot = np.zeros(1, AUTOPILOT)[0]
     profile._set_up_aircraft_values(pilot, scenario)
     assert pilot["slowest_mps"] == pytest.approx(slowest)

@@ -99,7 +99,7 @@ RATE_HZ = 50
 
 
 def flight(law="fault-tolerant", fault_class="all", setting="throttle", rpm=None, enabled=True, **changes):
-    """A scenario of an aircraft with three engines, and a setting of its power from 0.15 to 0.9."""
+    """A declaration of an aircraft with three engines, and a setting of its power from 0.15 to 0.9."""
     effectors = {
         name: SimpleNamespace(share=share, down_m=down, right_m=right)
         for name, (share, down, right) in ARMS.items()
@@ -114,7 +114,7 @@ def flight(law="fault-tolerant", fault_class="all", setting="throttle", rpm=None
     control = SimpleNamespace(law=law, power=EnginePower(**POWER_KEYS, enabled=enabled))
     initial = SimpleNamespace(engine_rpm=rpm, **({setting: 0.4} if setting else {}))
     fdi = SimpleNamespace(fault_class=fault_class)
-    return SimpleNamespace(rate_hz=RATE_HZ, airframe=airframe, control=control, initial=initial, fdi=fdi)
+    return SimpleNamespace(rate_hz=RATE_HZ, aircraft=airframe, control=control, initial=initial, fdi=fdi)
 
 
 POWER_KEYS = {

@@ -19,7 +19,7 @@ from law_records import fields, put
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 X = np.array([0.02, -0.01, 0.015])
-TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4))
+TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4), np.zeros(4))
 G = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])
 
 

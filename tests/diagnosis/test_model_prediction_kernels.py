@@ -5,6 +5,7 @@ import pytest
 
 from beaver_ftc.diagnosis import model_prediction
 from beaver_ftc.diagnosis.bounds import bound_dtype
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
 
@@ -47,12 +48,12 @@ def test_actuators_are_believed_an_instant_at_a_time():
     travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
     apart(travel=travel)
     record = np.zeros(1, model_prediction.prediction_dtype(4))[0]
-    model_prediction.configure_prediction(record, scenario, travel)
+    model_prediction.configure_prediction(record, Declared.of(scenario), travel)
     actuators = record["actuators"]
     assert (record["frame_share_per_instant"], bool(actuators["real"])) == (0.25, True)
     assert (actuators["low"].tolist(), actuators["high"].tolist()) == tuple(travel.tolist())
     assert actuators["approach"] == pytest.approx([1 - np.exp(-0.1), 1 - np.exp(-0.175), 1.0, 1.0])
     assert actuators["step"] == pytest.approx([np.radians(0.3), np.inf, np.radians(0.2), np.inf])
     ideal = np.zeros(1, model_prediction.prediction_dtype(4))[0]
-    model_prediction.configure_prediction(ideal, Scenario.model_validate({"name": "x"}), travel)
+    model_prediction.configure_prediction(ideal, Declared.of(Scenario(name="x")), travel)
     assert (ideal["frame_share_per_instant"], bool(ideal["actuators"]["real"])) == (1.0, False)

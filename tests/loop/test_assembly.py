@@ -46,7 +46,7 @@ GIVEN = {
 
 
 def assembled(**keys):
-    return assemble(Scenario.model_validate(GIVEN | keys), Trim(np.zeros(3), Y, TRIM), TRAVEL)[0]
+    return assemble(Scenario.model_validate(GIVEN | keys), Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)[0]
 
 
 def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it_needs():
@@ -214,7 +214,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     """An estimator a surface for its verdicts; nothing built in diagnoses, watches, weighs chance or acts."""
     given = {**GIVEN, "fdi": {"fault_class": "all", "statistical": {}, "sensor_monitor": "always"}}
     scenario = Scenario.model_validate(given)
-    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
     before = frames["fdi"][0]
     switches = (
         before["config"]["enabled"],
@@ -236,7 +236,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None
     pairs = {**given, "fdi": given["fdi"] | {"pairs": True, "authority": "worst-case"}, "substeps": 1}
     scenario = Scenario.model_validate(pairs)
-    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
     assert frames["fdi"]["types"]["pair"]["enabled"][0] == 1
     plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
     assert frames["fdi"]["types"]["pair"]["enabled"][0] == 0

@@ -13,8 +13,9 @@ MOVING = {
 ANEW = [{"at_s": 1.3, "scheme": "adaptive-estimators"}]
 
 
-def last_name(sensor, kind, magnitude, at_s=0.0, **more):
+def last_name(sensor, kind, magnitude, at_s=0.0, fdi=None, **more):
     """Who is named as the flight ends."""
+    more["fdi"] = {"sensor_monitor": "always", **(fdi or {})}
     fault = {"sensor": sensor, "type": kind, "at_s": at_s, "magnitude": magnitude}
     flown = bf.fly(load({"name": "x", "duration_s": 4, "faults": [fault], **more}), log=False)
     return flown.isolation.fault

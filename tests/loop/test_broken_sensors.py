@@ -15,8 +15,11 @@ MOVING = {
 SIZE = {"V": 4.0, "qdyn": 100.0, "altitude": 20.0, "engine_rpm": 100.0, "manifold_pressure": 2.0}
 
 
-def flight(*faults, **more):
-    return load({"name": "x", "duration_s": 9, "reference": MOVING, "faults": list(faults), **more})
+def flight(*faults, fdi=None, **more):
+    fdi = {"sensor_monitor": "always", **(fdi or {})}
+    return load(
+        {"name": "x", "duration_s": 9, "reference": MOVING, "faults": list(faults), "fdi": fdi, **more}
+    )
 
 
 def fault(sensor, kind, at_s=5.0):
@@ -62,7 +65,7 @@ def test_a_gyro_that_is_replaced_no_longer_misleads_the_law():
 def test_the_flight_goes_on_without_a_vane_or_the_airspeed(sensor):
     scenario = load(
         {
-            "name": "x", "duration_s": 60, "faults": [fault(sensor, "lost")],
+            "name": "x", "duration_s": 60, "faults": [fault(sensor, "lost")], "fdi": {"fault_class": "all"},
             "autopilot": {"altitude_m": [{"hold": True}],
                           "heading_deg": [{"hold": True}, {"at_s": 10, "value": 20}],
                           "airspeed_mps": [{"value": 45}]},
@@ -89,7 +92,7 @@ def test_sound_instruments_are_never_suspected(more):
 def test_a_surface_fault_is_no_instruments_fault_and_named_a_frame_later_at_most():
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 4.0}
     plain, watched = (
-        bf.fly(flight(loss, fdi={"sensor_monitor": watch}), log=False) for watch in ("auto", "always")
+        bf.fly(flight(loss, fdi={"sensor_monitor": watch}), log=False) for watch in ("never", "always")
     )
     assert plain.isolation.fault == watched.isolation.fault == "elevator"
     assert plain.detection.delay_s == watched.detection.delay_s

@@ -108,7 +108,7 @@ def test_sensors_changed_and_declared():
 
 def test_every_part_of_the_log_stays_in_its_column():
     """What is not there any more is not a number."""
-    given = {"statistical": {}, "fault_class": "all"}
+    given = {"statistical": {}, "fault_class": "all", "sensor_monitor": "never"}
     sim = flown((2.0, {"scheme": "augmented-ekf"}), fdi=given)
     log, plain = sim.log, bf.fly(scenario(duration_s=6.0, fdi=given)).log
     assert list(log.columns) == list(plain.columns)

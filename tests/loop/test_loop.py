@@ -264,38 +264,6 @@ def test_a_flight_is_plain_data():
     assert dataclasses.replace(flight, frames=1).frames == 1
 
 
-@pytest.mark.parametrize(
-    ("of_sensors", "enabled", "k", "inertial", "done"),
-    [
-        (False, True, 5, False, []),
-        (True, False, 5, False, ["read more"]),
-        (True, True, 0, False, ["read more"]),
-        (True, True, 5, False, ["read more", "read further", "begin"]),
-        (True, True, 5, True, ["read more", "begin"]),
-    ],
-)
-def test_from_the_first_fault_of_an_instrument_on_all_of_them_are_read(
-    monkeypatch, of_sensors, enabled, k, inertial, done
-):
-    """At once if the flight goes on already; what is measured already is not measured again."""
-    calls, declared = [], []
-    measured = {"inertial": inertial}
-    flight = object.__new__(loop.Loop)
-    flight.scenario = "scenario"
-    flight.schedule = SimpleNamespace(declare=lambda of: declared.append(("effectors", of)))
-    flight.sensor_schedule = SimpleNamespace(
-        declare=lambda of: declared.append(("sensors", of)), any=of_sensors
-    )
-    flight.frames = [{"fdi": "fdi", "k": k, "measured": measured}]
-    flight.read_more = lambda: calls.append("read more")
-    flight.enable_sensor_monitor = lambda fdi, of: (fdi, of) == ("fdi", "scenario") and enabled
-    flight._read_further = lambda of: calls.append("read further") if of is measured else None
-    monkeypatch.setattr(loop, "direct", lambda kernel, frames: lambda of: calls.append("begin"))
-    flight.declare(["fault"])
-    assert declared == [("effectors", ["fault"]), ("sensors", ["fault"])]
-    assert calls == done
-
-
 @pytest.mark.parametrize("turbulent", [True, False])
 def test_the_air_is_turned_before_each_of_jsbsims_frames(turbulent):
     done = []

@@ -127,7 +127,7 @@ def _put(frame, values):
 
 def _record(keys, values):
     scenario = Scenario.model_validate({"name": "x", **keys})
-    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM), TRAVEL)
+    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
     frames["autopilot"]["holding"]["from_s"] = -1.0
     _put(frames[0], values)
     return scenario, frames[0]

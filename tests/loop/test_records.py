@@ -43,6 +43,7 @@ CASES = {
     "with-errors": {"sensors": ERRORS, "substeps": 2, "rate_hz": 50, "seed": 3, **WATCHED},
     "broken": {
         "faults": [{"sensor": "V", "type": "bias", "magnitude": 3, "at_s": 1.0}],
+        "fdi": {"sensor_monitor": "always"},
         "initial": {"airspeed_mps": 50, "altitude_m": 1000}, "control": {"law": "lqr"}, "seed": 9,
     },
     "autopilot": {"autopilot": {"altitude_m": [{"hold": True}]}, "fdi": {"scheme": "augmented-ekf"}},
@@ -116,19 +117,20 @@ def test_gusts_that_the_watch_reckons_with():
 
 
 @pytest.mark.parametrize(
-    ("monitor", "scheme", "breaks", "watched"),
+    ("fdi", "scheme", "watched"),
     [
-        ("always", "adaptive-estimators", False, True), ("auto", "adaptive-estimators", False, False),
-        ("auto", "adaptive-estimators", True, True), ("never", "adaptive-estimators", True, False),
-        ("always", "augmented-ekf", True, False), ("always", "none", True, False),
+        ({"sensor_monitor": "always"}, "adaptive-estimators", True), ({}, "adaptive-estimators", False),
+        ({"fault_class": "all"}, "adaptive-estimators", True),
+        ({"fault_class": "all", "sensor_monitor": "never"}, "adaptive-estimators", False),
+        ({"sensor_monitor": "always"}, "augmented-ekf", False), ({"fault_class": "all"}, "none", False),
     ],
 )  # fmt: skip
-def test_when_the_instruments_are_watched(monitor, scheme, breaks, watched):
+@pytest.mark.parametrize("breaks", [True, False])
+def test_when_the_instruments_are_watched(fdi, scheme, breaks, watched):
     fault = {"sensor": "q", "type": "bias", "magnitude": 3, "at_s": 1.0}
-    fdi = {"scheme": scheme, "sensor_monitor": monitor}
+    fdi = {"scheme": scheme, **fdi}
     flown = _scenario(fdi=fdi, faults=[fault] if breaks else [])
     assert Declared.of(flown).monitors_sensors is watched
-    assert assembly.breaks_instruments(flown) is breaks
     assert assembly.are_ever_monitored(flown) is watched
     later = _scenario(
         fdi={**fdi, "scheme": "none"}, faults=flown.faults, changes=[{"at_s": 2, "scheme": scheme}]

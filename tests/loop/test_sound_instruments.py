@@ -80,7 +80,7 @@ def test_a_heading_that_leaps_past_north_is_sound_while_a_blurred_bank_swings():
 def test_a_broken_instrument_is_found_when_it_breaks_in_verdict_and_log(sensor, kind, tests, substeps):
     size = {} if kind == "lost" else {"magnitude": 50.0 if sensor == "engine_rpm" else 2.0}
     broken = {"sensor": sensor, "type": kind, "at_s": 1.5, **size}
-    found = flown(faults=[broken], substeps=substeps, fdi={"sensor_monitor": "auto"})
+    found = flown(faults=[broken], substeps=substeps, fdi={"fault_class": "all"})
     assert not found.metrics["false_alarm"]
     assert found.metrics["detection"]["time_s"] == 1.5
     assert found.isolation.fault == f"sensor {sensor}"
@@ -95,7 +95,7 @@ def test_a_broken_instrument_is_found_when_it_breaks_in_verdict_and_log(sensor, 
 
 def test_a_gyro_that_the_rates_see_first_leaves_its_alarm_in_the_log():
     broken = {"sensor": "p", "type": "bias", "magnitude": 4, "at_s": 1.0}
-    found = flown(faults=[broken], duration_s=2, fdi={"sensor_monitor": "auto"})
+    found = flown(faults=[broken], duration_s=2, fdi={"fault_class": "all"})
     log = found.log
     assert found.isolation.fault == "sensor p"
     assert (log["detected"] == (log["t_s"] >= found.metrics["detection"]["time_s"] - 1e-9)).all()

@@ -54,7 +54,8 @@ class Fault:
 
 
 FDI = SimpleNamespace(
-    scheme="adaptive-estimators", diagnoses=True, is_ours=True, fault_class="published", pairs=False,
+    scheme="adaptive-estimators", diagnoses=True, assumes_sound_sensors=True, is_ours=True,
+    fault_class="published", pairs=False,
     bounds=SimpleNamespace(sensors=SimpleNamespace(gyros_vary=False)),
 )  # fmt: skip
 CONTROL = SimpleNamespace(law="fault-tolerant")

@@ -19,6 +19,7 @@ from trainer import trainer
 ALL = {"fault_class": "all", "statistical": {}}
 # They make other bounds of those given, and ask nothing of them.
 WRITE = {"beaver_ftc:studies.mismatch.bound", "beaver_ftc:scenario.interventions"}
+DECLARED = "beaver_ftc:scenario.declared"
 
 
 def test_nobody_but_declared_reads_the_bounds():
@@ -27,7 +28,7 @@ def test_nobody_but_declared_reads_the_bounds():
         f"{package}:{name}: {node.attr}"
         for package in ("beaver_ftc", *PRODUCTS)
         for name, file in modules(package).items()
-        if f"{package}:{name}" not in WRITE and ".bounds." in file.read_text(encoding="utf-8")
+        if f"{package}:{name}" not in WRITE | {DECLARED} and ".bounds." in file.read_text(encoding="utf-8")
         for node in ast.walk(tree(name, package))
         if isinstance(node, ast.Attribute) and node.attr in Bounds.model_fields
         if isinstance(node.value, ast.Attribute) and node.value.attr == "bounds"
@@ -105,19 +106,18 @@ def test_each_bound_is_declared_as_what_it_is():
         "constant_rad_s2": {"p": 0.21, "q": 0.22, "r": 0.23}, "deflection_deg": 9.0, "turbulence": "moderate",
         "vertical_wind_mps": 4.0, "sensors": {"q": {"bias_deg_s": 18.0}},
     }  # fmt: skip
-    fdi = {"bounds": given, "fault_class": "all", "statistical": {}, "sensor_monitor": "auto"}
-    sensor_fails = {"faults": [{"sensor": "p", "type": "freeze", "at_s": 1}]}
-    for keys, compares, monitors in (({}, True, False), ({"substeps": 2} | sensor_fails, False, True)):
-        declared = Declared.of(load({"fdi": fdi} | keys))
+    fdi = {"bounds": given, "fault_class": "all", "statistical": {}}
+    for substeps, compares in ((1, True), (2, False)):
+        declared = Declared.of(load({"fdi": fdi, "substeps": substeps}))
         assert declared.air == Dryden("moderate")
         assert declared.sensors["q"].steady == pytest.approx(np.radians(18.0))
         assert declared.coefficients.share == 0.05
-        assert declared.actuators.deflection_rad == pytest.approx(np.radians(9.0))
+        assert declared.deflection_rad == pytest.approx(np.radians(9.0))
         assert (declared.inertia, declared.vertical_wind_mps) == (0.06, 4.0)
         assert declared.coupling == (0.11, 0.12, 0.13)
         assert declared.constant_rad_s2 == (0.21, 0.22, 0.23)
         assert declared.uses_statistics
-        assert (declared.compares_across, declared.monitors_sensors) == (compares, monitors)
+        assert (declared.compares_across, declared.monitors_sensors) == (compares, True)
         assert not declared.is_noise_free
     for alone in ({"turbulence": "light"}, {"sensors": {"q": {"bias_deg_s": 1}}}):
         assert not declared_in(alone).is_noise_free
@@ -128,20 +128,19 @@ def test_each_bound_is_declared_as_what_it_is():
     ("keys", "forces", "takes", "by_forces", "by_accelerometers"),
     [
         ({}, ("CY",), True, True, False), ({}, ("CY",), False, True, False), ({}, (), True, False, True),
-        ({}, (), False, False, False), ({"monitors_sensors": True}, (), True, False, False),
-        ({"monitors_sensors": True}, ("CZ",), True, True, False),
-        ({"uses_statistics": False}, ("CZ",), True, False, False),
-        ({"uses_statistics": False}, (), True, False, False),
-        ({"air": Dryden("none")}, ("CZ",), True, False, False),
-        ({"air": Dryden("none")}, (), True, False, False),
+        ({}, (), False, False, False), ({"sensor_monitor": "always"}, (), True, False, False),
+        ({"sensor_monitor": "always"}, ("CZ",), True, True, False),
+        ({"statistical": None}, ("CZ",), True, False, False), ({"statistical": None}, (), True, False, False),
+        ({"bounds": {"turbulence": "none"}}, ("CZ",), True, False, False),
+        ({"bounds": {"turbulence": "none"}}, (), True, False, False),
     ],
 )  # fmt: skip
 def test_who_follows_gusts(keys, forces, takes, by_forces, by_accelerometers):
     """By forces that the design model has; else by accelerometers, of an aircraft whose damage takes
     surfaces and whose instruments nobody doubts."""
     aircraft = SimpleNamespace(measurable_forces=forces, loses_surfaces=takes)
-    given = {"aircraft": aircraft, "air": Dryden("light"), "uses_statistics": True} | keys
-    declared = replace(declared_in({}), **given)
+    fdi = {"bounds": {"turbulence": "light"}, "statistical": {}} | keys
+    declared = replace(Declared.of(load({"fdi": fdi})), aircraft=aircraft)
     assert declared.follows_gusts_by_forces is by_forces
     assert declared.follows_gusts_by_accelerometers is by_accelerometers
 
@@ -151,24 +150,23 @@ def test_who_follows_gusts(keys, forces, takes, by_forces, by_accelerometers):
     [
         ({"scheme": "rls-monitor"}, {"weighs_chance": False, "monitors_sensors": False}),
         ({"statistical": None}, {"weighs_chance": False}),
-        ({"fault_class": "published"}, {"looks_across": False}),
+        ({"fault_class": "published"}, {"looks_across": False, "monitors_sensors": False}),
+        ({"fault_class": "published", "sensor_monitor": "always"}, {"looks_across": False}),
         ({"pairs": True}, {"looks_across": False}),
         ({"authority": "worst-case"}, {"looks_across": False}),
         ({"authority": "statistical"}, {}),
         ({"sensor_monitor": "never"}, {"monitors_sensors": False}),
-        ({"sensor_monitor": "auto"}, {"monitors_sensors": None}),
+        ({"sensor_monitor": "auto"}, {}),
     ],
 )  # fmt: skip
 def test_what_a_diagnosis_takes_part_in(given, changes):
-    """monitors_sensors: None: where an instrument fails."""
-    fdi = load({"fdi": {**ALL, "sensor_monitor": "always", **given}}).fdi
+    fdi = load({"fdi": {**ALL, **given}}).fdi
     expected = {"weighs_chance": True, "looks_across": True, "monitors_sensors": True} | changes
     assert fdi.weighs_chance is expected["weighs_chance"]
     assert fdi.looks_across is expected["looks_across"]
     assert [fdi.compares_across(substeps) for substeps in (1, 2)] == [expected["looks_across"], False]
-    for fails in (False, True):
-        wanted = expected["monitors_sensors"]
-        assert fdi.monitors_sensors(fails) is (fails if wanted is None else wanted)
+    assert fdi.monitors_sensors is expected["monitors_sensors"]
+    assert fdi.assumes_sound_sensors is (fdi.diagnoses and not expected["monitors_sensors"])
 
 
 def test_another_scheme_keeps_what_is_said_but_the_published_one_is_the_papers():
@@ -179,7 +177,8 @@ def test_another_scheme_keeps_what_is_said_but_the_published_one_is_the_papers()
     other = fdi.with_scheme("rls-monitor", {"gain": 2.0})
     assert other == fdi.model_copy(update={"scheme": "rls-monitor", "options": {"gain": 2.0}})
     published = fdi.with_scheme("zhang2005", {})
-    assert published == load({"fdi": {"scheme": "zhang2005", "forgetting_time_s": 7.0}}).fdi
+    said = {"scheme": "zhang2005", "forgetting_time_s": 7.0, "sensor_monitor": "never"}
+    assert published == load({"fdi": said}).fdi
     assert (published.is_published, published.is_ours, published.diagnoses) == (True, False, True)
     assert (other.is_published, other.is_ours, other.diagnoses) == (False, False, False)
     assert set(published.sharpen.model_dump().values()) == {False}

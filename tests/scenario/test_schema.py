@@ -172,9 +172,19 @@ def test_whole_numbers_may_be_written_as_people_do():
             "uncertainty.sinusoid.r: 111",
         ),
         (
-            "faults: [{type: oscillatory, actuator: flap, at_s: 1, amplitude_deg: 1, frequency_rad_s: 400}]",
+            "faults: [{type: oscillatory, actuator: flap, at_s: 1, amplitude_deg: 1, frequency_rad_s: 400}]\n"
+            "fdi: {fault_class: all}",
             "faults[0].frequency_rad_s: 63.662 Hz",
         ),
+        (
+            "faults: [{sensor: q, type: bias, magnitude: 1, at_s: 20}]",
+            "faults: sensor q bias at 20 s: outside the declared class; set fdi.fault_class: all",
+        ),
+        (
+            "faults: [{actuator: flap, type: stuck, at_s: 2}]",
+            "faults: flap stuck at 2 s: outside the declared",
+        ),
+        ("fdi: {sensor_monitor: auto}", "fdi.sensor_monitor: auto is a former value"),
     ],
 )
 def test_what_is_unwise_is_a_warning(text, says):

@@ -180,14 +180,13 @@ def test_a_mass_that_nothing_reads_takes_no_guarantee_away():
     assert light.detection_time_s == pytest.approx(right.detection_time_s)
 
 
-def test_flights_that_share_their_sections_are_told_apart_by_what_fails():
-    """A vertical wind is beyond what is declared only where an instrument fails: then the sensor monitor
+def test_flights_that_share_their_sections_are_told_apart_by_their_class():
+    """A vertical wind is beyond what is declared only where sensors are in doubt: then the sensor monitor
     reads the altimeter. The answer to the first flight is kept for the third, not for the second."""
-    biased = {"sensor": "p", "type": "bias", "magnitude": 1.0, "at_s": 1.0}
     sound = Scenario.model_validate({"name": "x", "environment": {"wind_mps": [0, 0, 2.0]}})
-    failing = sound.with_({"faults": [biased]})
-    assert failing.environment is sound.environment
-    assert [declares_all(each) for each in (sound, failing, sound)] == [True, False, True]
+    doubted = sound.with_({"fdi.fault_class": "all"})
+    assert doubted.environment is sound.environment
+    assert [declares_all(each) for each in (sound, doubted, sound)] == [True, False, True]
     other = sound.with_({"uncertainty.mass": 1.2, "fdi": {"bounds": {}, **ALL}})
     assert not declares_all(other)
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         FrameReadout,
         Instruments,
         command_power,
-        diagnosis_record,
         end_outer_loops,
         hold_from_start,
         recorded_always,

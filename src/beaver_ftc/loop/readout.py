@@ -167,11 +167,6 @@ def surface_and_sensor_alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:
     return of_diagnosis.surface_and_sensor_alarm_flags(frame["fdi"])
 
 
-def diagnosis_record(frame: np.void) -> np.void:
-    """The diagnosis' record, not a copy, for who hands it on to a function of the loop."""
-    return frame["fdi"]
-
-
 def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
     acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as

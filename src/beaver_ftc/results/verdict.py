@@ -301,7 +301,9 @@ def _assumptions_text(metrics: Metrics) -> str:
 def _outside_class_text(metrics: Metrics) -> str:
     """The faults that the diagnosis cannot name, as its class does not have them."""
     outside = " and ".join(metrics.outside_class or ())
-    return f"{outside}: outside the declared class, so that it cannot be named" if outside else ""
+    wider = "fault_class: all" if metrics.flight.fault_class != "all" else "sensor_monitor: always"
+    says = f"outside the declared class, so that it cannot be named; set fdi.{wider}"
+    return f"{outside}: {says}" if outside else ""
 
 
 def _fault_text(fault: Fault | None) -> str:

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from math import degrees, inf, pi, radians
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -29,11 +29,7 @@ from beaver_ftc.scenario.builtin import KeptBySections
 from beaver_ftc.scenario.diagnosis import ControlConfig, FdiConfig, failing, of_several
 from beaver_ftc.scenario.faults import LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor, place_of
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, SIGNALS, Sensors, sensor_words
-from beaver_ftc.scenario.signals import Chirp
-
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import DesignModel, Scenario
-    from beaver_ftc.scenario.signals import Autopilot
+from beaver_ftc.scenario.signals import Autopilot, Chirp
 
 # Of the mass, where accelerometers are compared with the designer's forces: fuel and load, which no key of
 # `fdi.bounds` declares.
@@ -132,16 +128,16 @@ class Declared:
     rate_hz: float
     substeps: int
     initial: Initial
-    autopilot: "Autopilot | None"
+    autopilot: Autopilot | None
     fdi: FdiConfig
     control: ControlConfig
-    design_model: "DesignModel"
+    design_model: Any  # a `schema.DesignModel`
     servos: Actuators
     instruments: Sensors
 
     @classmethod
-    def of(cls, scenario: "Scenario") -> Self:
-        """That of a scenario."""
+    def of(cls, scenario: Any) -> Self:
+        """That of a `schema.Scenario`."""
         return cls(
             scenario.name,
             scenario.airframe,

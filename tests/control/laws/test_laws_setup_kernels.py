@@ -8,6 +8,7 @@ from beaver_ftc.control.laws import rejecting, zhang2005
 from beaver_ftc.control.laws.rejecting import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record, response
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from law_records import fields, new_control
 from telling import apart
@@ -39,7 +40,7 @@ def asked(monkeypatch):
         prediction = np.zeros(1, prediction_dtype(4))[0]
         prediction["design"] = design_record()[0]
         prediction["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
-        state.configure_law(control, prediction, scenario, Y)
+        state.configure_law(control, prediction, Declared.of(scenario), Y)
         return found
 
     return ask
@@ -110,8 +111,8 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     apart(travel=travel, control=[*control.values()][1:], probing=list(probing.values()))
     scenario = given(control, substeps=3, fdi={"fault_class": "all", "probing": probing})
     record = np.zeros(1, state.control_dtype(4))[0]
-    state.configure(record, scenario, travel)
-    state.configure_law(record, None, scenario, None)
+    state.configure(record, Declared.of(scenario), travel)
+    state.configure_law(record, None, Declared.of(scenario), None)
     law, reach = fields(record["published"]), fields(record["layout"])
     assert (law["Kp"], law["Ki"]) == (3.1, 0.7)
     assert (reach["low"].tolist(), reach["high"].tolist()) == tuple(travel.tolist())

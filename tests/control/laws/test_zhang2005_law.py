@@ -8,6 +8,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from beaver_ftc.control.laws import zhang2005
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce.choices import scenario as published
 from flying import Memory, flown, loss
@@ -27,7 +28,7 @@ def configured(control, **keys):
     """The law's record filled from a scenario with these keys of `control`."""
     scenario = Scenario.model_validate({"name": "x", "control": {"law": "zhang2005", **keys}})
     control["layout"]["low"], control["layout"]["high"] = TRAVEL
-    zhang2005.configure(control["zhang2005"], control, None, scenario, None)
+    zhang2005.configure(control["zhang2005"], control, None, Declared.of(scenario), None)
     return control
 
 

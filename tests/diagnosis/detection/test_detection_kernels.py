@@ -13,6 +13,7 @@ from beaver_ftc.diagnosis.detection.filters import (
     N_ALPHA_PLUS_BETA_CENTRES,
 )
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -245,7 +246,7 @@ def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps
     control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
     asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
     record = new_fdi()["fdae"]
-    detection_filters.configure_fdae(record, Scenario.model_validate({"name": "x", **asked}))
+    detection_filters.configure_fdae(record, Declared.of(Scenario.model_validate({"name": "x", **asked})))
     assert np.unique(record["config"]["pole_per_s"]).tolist() == [2.2]
     assert np.unique(record["config"]["decay_factor"]) == pytest.approx([np.exp(-2.2 / 40.0)])
     network = record["network"]

@@ -1,5 +1,6 @@
 """The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
 
+from dataclasses import replace
 from math import exp, pi, radians, sqrt
 from types import SimpleNamespace
 
@@ -301,14 +302,19 @@ NOISY = {
 UNEVEN = {"sensors": NOISY, "constant_rad_s2": {"p": 0.02, "q": 0.01, "r": 0.05}, "deflection_deg": 0.5}
 
 
+def set_up(alone, given):
+    """Configure a detector by what a scenario declares."""
+    declared = replace(Declared.of(Scenario.model_validate(given)), aircraft=AIRCRAFT)
+    design = alone.frames[0]["prediction"]["design"]
+    statistical.configure_statistical_detector(
+        alone.fdi, declared.fdi, declared, design, MASS, LEVEL_FLIGHT, 50.0
+    )
+
+
 def as_set_up(bounds):
     """The detector before it is made ready for its first frame."""
     alone = Detector(50.0)
-    given = {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}}
-    design, config = alone.frames[0]["prediction"]["design"], Scenario.model_validate(given).fdi
-    statistical.configure_statistical_detector(
-        alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
-    )
+    set_up(alone, {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}})
     return alone.detector
 
 
@@ -351,12 +357,9 @@ def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
 
 @pytest.mark.parametrize(("instants", "share"), [(0, 1.0), (1, 1.0), (4, 0.25)])
 def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
-    alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
+    alone = Detector(50.0)
     alone.fdi["config"]["n_substeps"] = instants
-    design = alone.frames[0]["prediction"]["design"]
-    statistical.configure_statistical_detector(
-        alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
-    )
+    set_up(alone, GIVEN)
     assert alone.detector["test_config"]["frame_share_per_instant"] == share
 
 

@@ -28,6 +28,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     UNREACHABLE_FROZEN_SAMPLES,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, SENSORS
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from telling import not_zero
 
@@ -551,11 +552,12 @@ def test_all_that_a_monitor_is_set_up_with_and_no_more(noise_deg, share):
     sensors = ERRORS | {"theta": {"noise_std_deg": noise_deg}}
     bounds = {"sensors": sensors, "turbulence": "moderate", "vertical_wind_mps": 1.5}
     given = {
-        "name": "x", "rate_hz": 20, "substeps": 3, "fdi": {"statistical": {}, "bounds": bounds},
+        "name": "x", "rate_hz": 20, "substeps": 3,
+        "fdi": {"statistical": {}, "bounds": bounds, "sensor_monitor": "always"},
         "initial": {"airspeed_mps": 48, "altitude_m": 1000, "engine_rpm": 2000, "manifold_pressure_inhg": 21},
     }  # fmt: skip
     design, monitor = design_record()[0], np.zeros(1, SENSOR_MONITOR_RECORD)[0]
-    redundancy.configure_sensor_monitor(monitor, Scenario.model_validate(given), design, Y, True)
+    redundancy.configure_sensor_monitor(monitor, Declared.of(Scenario.model_validate(given)), design, Y)
     deg, h, sigma = np.pi / 180.0, 1.0 / 60.0, 10.6 * 0.3048
     walk = 6.0 * sigma * np.sqrt(3.0 * 1.4 * 48.0 / (1750.0 * 0.3048))
     fading = 1.0 - np.exp(-2.0 * h * np.array([1e6, 10.0, 1.0]))

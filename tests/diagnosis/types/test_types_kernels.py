@@ -12,6 +12,7 @@ from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROU
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import (
     BIAS,
@@ -964,7 +965,9 @@ def test_all_that_types_are_set_up_with_by_scenario_surface_and_actuator(keys, f
     actuators["real"], actuators["approach"] = 1, (0.2, 0.3, 0.4, 0.5)
     actuators["step"] = np.inf, np.radians(90.0) * instant_s, np.radians(2.5) * instant_s, np.inf
     travel = np.array([[0.05, -0.4, -0.3, -0.2], [0.5, 0.45, 0.35, -0.02]])
-    registry.configure_fault_types(types, layout, actuators, Scenario.model_validate(given), travel)
+    registry.configure_fault_types(
+        types, layout, actuators, Declared.of(Scenario.model_validate(given)), travel
+    )
     config, pairs = types["config"], fdi.get("pairs", False)
     found = {name: config[name].item() for name in config.dtype.names if np.any(config[name])}
     expected = {

@@ -20,6 +20,7 @@ from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.studies.detectability import engine_failures, of_engines
 from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive import sample as sampling
@@ -60,7 +61,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
     """As JSBSim turns: the thrust of each engine is read at its place, not from our signals."""
     aircraft = read(jet / "aircraft" / "737")
     plant, record = Plant(100, aircraft=aircraft), np.zeros(1, engines.ENGINES)[0]
-    engines.configure_engines(record, scenario(jet))
+    engines.configure_engines(record, Declared.of(scenario(jet)))
     point = trim(aircraft.usual_airspeed_mps, 1500.0, plant=plant, throttle=0.6)
     seen = []
     for difference in (0.0, 0.15):
@@ -81,7 +82,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
 def records(jet, lag_s):
     """What the law of the jet keeps, its rudder given up; the engines' table is a straight line."""
     control = np.zeros(1, control_dtype(3)).view(np.recarray)[0]
-    engines.configure_engines(control["engines"], scenario(jet, rate_hz=100))
+    engines.configure_engines(control["engines"], Declared.of(scenario(jet, rate_hz=100)))
     control["engines"]["config"]["part"] = DT / (2.0 * lag_s)
     control["power"] = np.zeros(1, POWER)[0]
     control["power"]["output"]["command"][0] = 0.5

@@ -1,0 +1,196 @@
+"""Relations that need no expected value: the diagnosis and the law do not depend on what they are not told.
+
+- No function of theirs takes a scenario or a section of the truth.
+- Their records are equal to the byte when only the truth changes.
+- A flight is equal to the bit up to the instant at which it begins to differ from another.
+"""
+
+import ast
+from dataclasses import fields
+from functools import cache
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import load
+from flying import SINES
+from samples import AT_NIGHT
+from test_architecture import modules, tree
+
+TOLD_NOTHING = ("diagnosis", "control", "design")
+# Names of scenarios and of the truth's sections, as parameters and as types.
+OF_THE_TRUTH = {"scenario", "truth", "faults", "environment", "uncertainty", "seed"}
+TYPES_OF_THE_TRUTH = {"Scenario", "ScenarioLike", "Environment", "Uncertainty", "Fault", "SurfaceFault"}
+# The record of the faults that the oracle law receives has the name of what it holds: see control/laws.
+OF_THE_ORACLE = "faults"
+HAS_THE_SECTIONS = {
+    "beaver_ftc.scenario.schema", "beaver_ftc.scenario.faults", "beaver_ftc.scenario.builtin",
+    "beaver_ftc.plant.conditions", "beaver_ftc.plant.trim", "beaver_ftc.plant.adapter",
+}  # fmt: skip
+
+
+def told_nothing():
+    return [name for name in modules() if name.partition(".")[0] in TOLD_NOTHING]
+
+
+def given(function):
+    """(name, annotation) of each parameter."""
+    of = function.args
+    for one in (*of.posonlyargs, *of.args, *of.kwonlyargs, *filter(None, (of.vararg, of.kwarg))):
+        yield one.arg, "" if one.annotation is None else ast.unparse(one.annotation)
+
+
+def is_kernel(function):
+    return any(ast.unparse(each).startswith(("kernel", "apart", "lazy")) for each in function.decorator_list)
+
+
+@pytest.mark.parametrize("name", told_nothing())
+def test_no_function_takes_a_scenario_or_a_section_of_the_truth(name):
+    for node in ast.walk(tree(name)):
+        if isinstance(node, ast.FunctionDef):
+            for parameter, annotation in given(node):
+                oracle = parameter == OF_THE_ORACLE and is_kernel(node)
+                assert parameter not in OF_THE_TRUTH or oracle, node.name
+                words = set(ast.unparse(ast.parse(annotation.strip("\"'"))).replace("|", " ").split())
+                assert not words & TYPES_OF_THE_TRUTH, node.name
+        if isinstance(node, ast.ImportFrom):
+            assert node.module not in HAS_THE_SECTIONS, node.module
+
+
+def test_the_declaration_has_no_section_of_the_truth():
+    assert not {field.name for field in fields(Declared)} & OF_THE_TRUTH
+
+
+LATE = 1.0  # s: until then the two flights of a pair are the same
+SURFACE_FAULTS = (
+    {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6},
+    {"actuator": "rudder", "type": "stuck"}, {"actuator": "aileron", "type": "hardover", "direction": 1},
+    {"actuator": "flap", "type": "oscillatory", "amplitude_deg": 3, "frequency_rad_s": 6},
+    {"actuator": "elevator", "type": "float"}, {"type": "unanticipated", "Cm_alpha3": 10},
+)  # fmt: skip
+SENSOR_FAULTS = (
+    {"sensor": "q", "type": "bias", "magnitude": 2}, {"sensor": "alpha", "type": "lost"},
+    {"sensor": "altitude", "type": "freeze"}, {"sensor": "az", "type": "scale", "magnitude": 0.3},
+    {"sensor": "engine_rpm", "type": "bias", "magnitude": 80},
+    {"sensor": "V", "type": "noise", "magnitude": 2},
+)  # fmt: skip
+LATER = {
+    **{f"{fault.get('actuator', fault['type'])} {fault['type']}": {"faults": [fault | {"at_s": LATE}]}
+       for fault in SURFACE_FAULTS},
+    **{f"{fault['sensor']} {fault['type']}": {"faults": [fault | {"at_s": LATE}]} for fault in SENSOR_FAULTS},
+    "gust": {"environment.gust": [{"at_s": LATE, "velocity_mps": [0, 0, 5]}]},
+    "law": {"changes": [{"at_s": LATE, "law": "nominal"}]},
+    "sensors": {"changes": [{"at_s": LATE, "sensors": {"q": {"bias_deg_s": 1}}}]},
+    "longer": {"duration_s": 2.0},
+    "expected": {"expect": {"stays_in_envelope": True}},
+}  # fmt: skip
+NOISY = {
+    "sensors": "tactical-grade", "environment": {"turbulence": "dryden", "severity": "light"},
+    "fdi.bounds.sensors": "tactical-grade", "fdi.bounds.turbulence": "light",
+}  # fmt: skip
+DECLARED = {
+    "published": {},
+    "all": {"fdi.fault_class": "all", "fdi.statistical": {}},
+    "all, sound": {"fdi.fault_class": "all", "fdi.statistical": {}, "fdi.sensor_monitor": "never"},
+    "all, noisy": {"fdi.fault_class": "all", "fdi.statistical": {}, **NOISY},
+    "statistical, noisy": {"fdi.statistical": {}, **NOISY, "substeps": 2},
+    "rival": {"fdi.scheme": "multiple-models", "control.law": "lqr", **NOISY},
+    "oracle": {"control.law": "oracle", "autopilot": {"altitude_m": [{"hold": True}]}},
+    "split": {"aircraft": "beaver-split", "fdi.fault_class": "all"},
+    "pairs": {"fdi.fault_class": "all", "fdi.pairs": True, "fdi.sensor_monitor": "always"},
+    "paper": {"fdi.scheme": "zhang2005", "control.law": "zhang2005"},
+}  # fmt: skip
+
+
+def declared(name):
+    base = {"name": "x", "duration_s": 1.4, "rate_hz": 50, "seed": 5, "reference": SINES}
+    return load(base | {"aircraft": DECLARED[name].get("aircraft", "beaver")}).with_(DECLARED[name])
+
+
+def of_the_day(cases, every):
+    """All at night; by day one in `every`, those of each row in turn."""
+    return cases if AT_NIGHT else cases[::every]
+
+
+PAIRS = [(name, later) for name in DECLARED for later in LATER]
+
+
+def changed(scenario, later):
+    """The scenario with what begins later; surfaces as the aircraft has them."""
+    names = scenario.airframe.surfaces
+    for fault in later.get("faults", ()):
+        if fault.get("actuator", names[0]) not in names:
+            return None
+    return scenario.with_(later)
+
+
+@cache
+def log_of(name):
+    return bf.fly(declared(name)).log
+
+
+@pytest.mark.parametrize(("name", "later"), of_the_day(PAIRS, 3), ids=str)
+def test_the_past_does_not_depend_on_the_future(name, later):
+    other = changed(declared(name), LATER[later])
+    if other is None:
+        pytest.skip(f"{name}: has no such surface")
+    log, otherwise = log_of(name), bf.fly(other).log
+    before = round((LATE if later != "longer" else 1.4) * 50)
+    if later != "law":  # a law to come has columns, which the declaration says
+        assert list(otherwise.columns) == list(log.columns)
+    for column in log.columns:
+        assert np.array_equal(log[column][:before], otherwise[column][:before], equal_nan=True), column
+
+
+TRUTHS = {
+    "surface": {"faults": [{"actuator": "aileron", "type": "hardover", "direction": 1, "at_s": 0.2}]},
+    "sensor": {"faults": [{"sensor": "altitude", "type": "freeze", "at_s": 0.0}]},
+    "seed": {"seed": 987654321},
+    "air": {"environment": {"turbulence": "dryden", "severity": "severe", "wind_mps": [9, -4, 1]}},
+    "sensors": {"sensors": "consumer-grade"},
+    "actuators": {"actuators": {"bandwidth_rad_s": 9, "travel_deg": [-5, 20]}},
+    "mass": {"uncertainty": {"mass": 1.05, "inertia": {"Iy": 1.1}, "cg_m": [0.05, 0, 0]}},
+    "coefficients": {"uncertainty": {"coefficients": {"Cm_alpha": 1.1, "Cl_p": 0.8}}},
+}  # fmt: skip
+OF_THE_COMMAND = {
+    "prediction.u", "prediction.commanded", "control.layout.trim", "control.allocation.output.command",
+}  # fmt: skip
+CONFIGURED = ("prediction", "fdi", "assessment", "supervisor", "control", "autopilot")
+
+
+def configured(scenario):
+    """What the diagnosis and the law are configured with, as bytes by field."""
+    loop = Loop(scenario)
+    records = {stage: leaves(loop.frames[stage][0]) for stage in CONFIGURED}
+    found = {f"{stage}.{name}": value for stage, leaf in records.items() for name, value in leaf}
+    loop.release()
+    return found
+
+
+def leaves(record):
+    """(name, bytes) of each field, fields of fields included."""
+    for name in record.dtype.names:
+        inner = record[name]
+        if inner.dtype.names is None:
+            yield name, inner.tobytes()
+            continue
+        for place in np.ndindex(inner.shape):
+            within = ".".join((name, *map(str, place)))
+            yield from ((f"{within}.{field}", value) for field, value in leaves(inner[place]))
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+@pytest.mark.parametrize("name", DECLARED)
+def test_nothing_is_configured_by_the_truth(name, truth):
+    """Another truth may be trimmed by another command, which is known."""
+    scenario = declared(name)
+    known = {"actuators": "ideal", "sensors": scenario.sensors.model_dump()}
+    scenario = scenario.with_({f"design_model.{key}": value for key, value in known.items()})
+    other = changed(scenario, TRUTHS[truth])
+    if other is None:
+        pytest.skip(f"{name}: has no such surface")
+    found, otherwise = configured(scenario), configured(other)
+    assert {field for field in found if found[field] != otherwise[field]} <= OF_THE_COMMAND

@@ -70,6 +70,36 @@ def _of_losses(rows: Rows) -> Iterator[str]:
     yield str(sum(bool(row["false_alarm"]) for row in rows))
 
 
+DOUBT_HEAD = (
+    "surface",
+    "sensors",
+    "detected",
+    "rightly named",
+    "wrongly named",
+    "median time to the name, s",
+)
+DOUBTED, OF_DOUBT = ("elevator", "rudder", "aileron"), {"sound": "never", "in doubt": "always"}
+
+
+def robustness_doubt() -> str:
+    """Losses with all errors together: sensors assumed sound, and sensors in doubt."""
+    rows = [_of_doubt(surface, sensors, 60) for surface in DOUBTED for sensors in OF_DOUBT]
+    return markdown_table(DOUBT_HEAD, rows)
+
+
+def _of_doubt(surface: str, sensors: str, count: int) -> tuple[str, ...]:
+    sweep, more = load_sweep("robust-elevator-all"), {"fdi.sensor_monitor": OF_DOUBT[sensors]}
+    more |= {"faults[0].actuator": surface, "duration_s": 20.0}
+    drawn = Plan(sweep).assignments(range(count))
+    rows = fly_all(partial(fly_one, sweep), [one._replace(values=one.values | more) for one in drawn], 2)
+    right = [row for row in rows if row["isolation.correct"]]
+    named = [row for row in rows if row["isolation.isolated"]]
+    median_s = f"{np.median([row['isolation.delay_s'] for row in right]):.2f}" if right else "-"
+    found = sum(row["detection.delay_s"] is not None for row in rows)
+    counts = (found, len(right), len(named) - len(right))
+    return (surface, sensors, *(f"{count_of} of {count}" for count_of in counts), median_s)
+
+
 def _closely(name: str, count: int) -> str:
     """Of a few flights of a sweep the delay, and how near the residual came to its threshold."""
     rows = _flown(name, count, workers=1)

@@ -1,0 +1,216 @@
+"""The design model and what it predicts of a frame. Pages: detection.md (the innovation), SPEC section 3.
+
+    xdot = f(x, y) + G(y) u        x (3,) rates rad/s; y = (alpha, beta, V, qdyn, signals); u surfaces, rad
+
+Arrays have one row for each instant (a JSBSim step), the last axis is that of the components.
+"""
+
+from itertools import product
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+
+from reference.declaration import AircraftFile, Declaration, Term
+
+RATE_PRODUCTS = (
+    ((0, 1, "Ppq"), (1, 2, "Pqr")),
+    ((0, 0, "Qpp"), (0, 2, "Qpr"), (2, 2, "Qrr")),
+    ((0, 1, "Rpq"), (1, 2, "Rqr")),
+)
+MOMENT_FACTORS = ((0, "Pl"), (2, "Pn")), ((1, "Qm"),), ((0, "Rl"), (2, "Rn"))
+MAIN_PRODUCT = ((1, 2, "Pqr"), (0, 2, "Qpr"), (0, 1, "Rpq"))  # detection.md: C_i x_j x_l
+
+
+def inertia_coefficients(Ix: float, Iy: float, Iz: float, Jxz: float) -> dict[str, float]:
+    """SPEC section 3: what multiplies rate products and moments."""
+    Ir = Ix * Iz - Jxz**2
+    return {
+        "Ppq": (Ix - Iy + Iz) * Jxz / Ir, "Pqr": ((Iy - Iz) * Iz - Jxz**2) / Ir,
+        "Pl": Iz / Ir, "Pn": Jxz / Ir,
+        "Qpp": -Jxz / Iy, "Qpr": (Iz - Ix) / Iy, "Qrr": Jxz / Iy, "Qm": 1.0 / Iy,
+        "Rpq": ((Ix - Iy) * Ix + Jxz**2) / Ir, "Rqr": (Iy - Iz - Ix) * Jxz / Ir,
+        "Rl": Jxz / Ir, "Rn": Ix / Ir,
+    }  # fmt: skip
+
+
+def powers(term: Term, signal: dict[str, np.ndarray]) -> np.ndarray:
+    """The product of powers of signals that a term multiplies."""
+    found = np.ones_like(signal["alpha"])
+    for name, power in term.powers:
+        found = found * signal[name] ** power
+    return found
+
+
+def signals_of(aircraft: AircraftFile, x: np.ndarray, y: np.ndarray) -> dict[str, np.ndarray]:
+    """ph = p b / 2V, qh = q c / V, rh = r b / 2V, flow angles, and the declared signals."""
+    V = y[..., 2]
+    found = {"alpha": y[..., 0], "beta": y[..., 1], "ph": x[..., 0] * aircraft.b / (2 * V)}
+    found |= {"qh": x[..., 1] * aircraft.c / V, "rh": x[..., 2] * aircraft.b / (2 * V)}
+    return found | {name: y[..., 4 + j] for j, name in enumerate(aircraft.signals)}
+
+
+class DesignModel:
+    """f and G of the aircraft's file, with the designer's deliberate errors (`design_model`)."""
+
+    def __init__(self, declaration: Declaration) -> None:
+        wrong, self.aircraft = declaration.design_model, declaration.aircraft
+        mass, ratio = wrong.get("mass", 1.0), wrong.get("inertia") or {}
+        self.masses = [
+            self.aircraft.file["mass"][f"{name}_kgm2"] * mass * ratio.get(name, 1.0)
+            for name in ("Ix", "Iy", "Iz", "Jxz")
+        ]
+        self.inertia = inertia_coefficients(*self.masses)
+        scale, neglected = wrong.get("coefficients") or {}, not wrong.get("engine_terms", True)
+        self.terms = [
+            term._replace(
+                value=0.0
+                if neglected and any(name in self.aircraft.signals for name, _ in term.powers)
+                else term.value * scale.get(term.name, 1.0)
+            )
+            for term in self.aircraft.terms
+        ]
+        self.linearised, self.frozen_alpha = wrong.get("linearised", False), wrong.get("frozen_alpha", False)
+
+    def anchor(self, x0: np.ndarray, y0: np.ndarray, u0: np.ndarray) -> None:
+        """The trim that a linearised model is tied to: f0, G0 and the derivatives of f + G u at (x0, y0, u0),
+        by complex steps."""
+        self.x0, self.y0 = x0, y0
+        self.f0, self.G0 = self._f(x0, y0), self._G(y0)
+        step = 1e-30
+
+        def along(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
+            x, y = x0 + 1j * step * dx, y0 + 1j * step * dy
+            return (self._f(x, y) + self._G(y) @ u0).imag / step
+
+        none_x, none_y = np.zeros(3), np.zeros(y0.size)
+        self.f_x = np.array([along(e, none_y) for e in np.eye(3)]).T
+        self.f_y = np.array([along(none_x, e) for e in np.eye(y0.size)]).T
+
+    def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """f(x, y) (..., 3) rad/s2; linearised: f0 + f_x (x - x0) + f_y (y - y0)."""
+        if self.linearised:
+            f_y = self.f_y.copy()
+            if self.frozen_alpha:
+                f_y[:, 0] = 0.0
+            return self.f0 + (x - self.x0) @ self.f_x.T + (y - self.y0) @ f_y.T
+        return self._f(x, self._frozen(y))
+
+    def G(self, y: np.ndarray) -> np.ndarray:
+        """G(y) (..., 3, surfaces) rad/s2 per rad; linearised: that of the trim."""
+        if self.linearised:
+            return np.broadcast_to(self.G0, (*y.shape[:-1], *self.G0.shape)).copy()
+        return self._G(self._frozen(y))
+
+    def _frozen(self, y: np.ndarray) -> np.ndarray:
+        if not self.frozen_alpha:
+            return y
+        held = y.copy()
+        held[..., 0] = self.y0[0]
+        return held
+
+    def _f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """SPEC section 3: rate products and moments of the terms without a surface."""
+        signal, moment = signals_of(self.aircraft, x, y), self._per_coefficient(y)
+        C = [
+            sum(t.value * powers(t, signal) for t in self.terms if t.axis == axis and t.surface is None)
+            for axis in range(3)
+        ]
+        return np.stack(
+            [
+                sum(self.inertia[K] * x[..., i] * x[..., j] for i, j, K in RATE_PRODUCTS[axis])
+                + sum(self.inertia[K] * moment[i] * C[i] for i, K in MOMENT_FACTORS[axis])
+                for axis in range(3)
+            ],
+            axis=-1,
+        )
+
+    def _G(self, y: np.ndarray) -> np.ndarray:
+        """The same of one radian of each surface."""
+        signal, moment = signals_of(self.aircraft, np.zeros(3), y), self._per_coefficient(y)
+        C = np.zeros((3, len(self.aircraft.surfaces), *y.shape[:-1]), dtype=y.dtype)
+        for t in self.terms:
+            if t.surface is not None:
+                C[t.axis, t.surface] += t.value * powers(t, signal)
+        G = [sum(self.inertia[K] * moment[i] * C[i] for i, K in MOMENT_FACTORS[axis]) for axis in range(3)]
+        return np.moveaxis(np.array(G), (0, 1), (-2, -1))
+
+    def _per_coefficient(self, y: np.ndarray) -> list[np.ndarray]:
+        """qdyn S b, qdyn S c, qdyn S b: moment of a coefficient of 1, N m."""
+        return [y[..., 3] * self.aircraft.S * arm for arm in self.aircraft.arm]
+
+    def inertia_errors(self, share: float) -> dict[str, float]:
+        """Largest change of each inertia coefficient for Ix, Iy, Iz, Jxz within a share: it is at a corner,
+        because a coefficient is monotonic in each inertia."""
+        largest = dict.fromkeys(self.inertia, 0.0)
+        for signs in product((-1.0, 1.0), repeat=4):
+            corner = inertia_coefficients(*(np.array(self.masses) * (1 + share * np.array(signs))))
+            largest = {K: max(largest[K], abs(corner[K] - self.inertia[K])) for K in largest}
+        return largest
+
+
+def servo_positions(declaration: Declaration, command: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Positions u (instants, surfaces) rad of healthy surfaces under the command (instants, surfaces) rad
+    that acts in each JSBSim step:
+
+        u <- u + limited((command - u) (1 - exp(-bandwidth dt_s))),   |limited| <= rate limit times dt_s
+
+    within the travel. Ideal surfaces are at their command."""
+    given = declaration.design_model.get("actuators") or declaration.scenario.get("actuators") or "ideal"
+    of_all = given if isinstance(given, dict) else {}
+    one = [of_all.get(s, of_all) for s in declaration.aircraft.surfaces]
+    bandwidth = np.array([of.get("bandwidth_rad_s", 0.0) for of in one])
+    limit = np.radians([of.get("rate_limit_deg_s", 0.0) for of in one])
+    if not (bandwidth.any() or limit.any()):
+        return command.copy()
+    dt_s, (low, high) = declaration.dt / declaration.n, declaration.aircraft.travel
+    share = np.where(bandwidth > 0, 1.0 - np.array([exp(-w * dt_s) for w in bandwidth]), 1.0)
+    step = np.where(limit > 0, limit * dt_s, np.inf)
+    u = np.empty_like(command)
+    u[0] = start
+    for j in range(1, len(command)):
+        wanted = np.clip(command[j], low, high)
+        u[j] = np.clip(u[j - 1] + np.clip((wanted - u[j - 1]) * share, -step, step), low, high)
+    return u
+
+
+class Frames(NamedTuple):
+    """Means over the frames that end at k = 0, 1, ...; row 0 is not a number.
+
+    F, G, Gu: f + G u, G, the effect of each surface; r: tolerance for a fault that changes in the frame.
+    """
+
+    F: np.ndarray
+    G: np.ndarray
+    Gu: np.ndarray
+    r: np.ndarray
+    G_range: np.ndarray
+    u_range: np.ndarray
+
+
+def mean_of_frames(n: int, of_instants: np.ndarray) -> np.ndarray:
+    """Mean over the n instants of the frame before each k: those from its start to the last one inside. The
+    first of them is still under the old command."""
+    means = of_instants[:-1].reshape(-1, n, *of_instants.shape[1:]).mean(axis=1)
+    return np.concatenate([np.full((1, *of_instants.shape[1:]), np.nan), means])
+
+
+def frames_of(declaration: Declaration, f: np.ndarray, G: np.ndarray, u: np.ndarray) -> Frames:
+    """Means over frames. Tolerance r_s (isolation.md): with z0 the effect G u of a healthy surface in the
+    first step and z its mean over the others, r_s = |z0 - z| / n_s, and 0 with one step."""
+    n, Gu = declaration.n, G * u[:, None, :]
+    r = np.zeros_like(Gu[: len(Gu[:-1]) // n])
+    if n > 1:
+        by_frame = Gu[:-1].reshape(-1, n, *Gu.shape[1:])
+        r = np.abs(by_frame[:, 0] - by_frame[:, 1:].mean(axis=1)) / n
+    return Frames(
+        mean_of_frames(n, f + Gu.sum(axis=-1)), mean_of_frames(n, G), mean_of_frames(n, Gu),
+        np.concatenate([np.zeros((1, *Gu.shape[1:])), r]), _range(n, G), _range(n, u),
+    )  # fmt: skip
+
+
+def _range(n: int, of_instants: np.ndarray) -> np.ndarray:
+    """(2, frames, ...): least and largest within a frame."""
+    by_frame = of_instants[:-1].reshape(-1, n, *of_instants.shape[1:])
+    ends = np.array([by_frame.min(axis=1), by_frame.max(axis=1)])
+    return np.concatenate([np.full((2, 1, *of_instants.shape[1:]), np.nan), ends], axis=1)

@@ -1,0 +1,165 @@
+"""Scenarios to compare in: a covering array over what the diagnosis depends on, and over what it meets."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from tools.drawn.array import CoveringArray, Factor
+
+Document = dict[str, Any]
+FAULTS = {
+    "loss": {"type": "loss_of_effectiveness", "magnitude": 0.5},
+    "total loss": {"type": "loss_of_effectiveness", "magnitude": 1.0},
+    "stuck": {"type": "stuck", "position_deg": 2.0},
+    "hardover": {"type": "hardover", "direction": 1},
+    "float": {"type": "float"},
+    "bias": {"type": "bias", "bias_deg": 1.5},
+    "slow": {"type": "rate_limit", "scale": 0.02},
+    "oscillation": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 6.0},
+    "outside": {"type": "unanticipated", "Cm_alpha3": 10.0},
+}
+GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "quantum_deg_s": 0.001, "scale_error": 0.002}
+SENSORS: dict[str, Any] = {
+    "ideal": "ideal",
+    "gyros": dict.fromkeys("pqr", GYRO),
+    "steady": {"p": {"bias_deg_s": 0.1}, "q": {"scale_error": 0.01}, "V": {"scale_error": 0.01}},
+    "all": {
+        **dict.fromkeys("pqr", GYRO),
+        "alpha": {"noise_std_deg": 0.1, "bias_deg": 0.2}, "beta": {"noise_std_deg": 0.1, "bias_deg": -0.2},
+        "V": {"noise_std_mps": 0.2, "bias_mps": 0.3}, "qdyn": {"noise_std_pa": 4.0, "quantum_pa": 1.0},
+        "engine_rpm": {"bias_rpm": 10.0}, "manifold_pressure": {"noise_std_inhg": 0.05},
+    },
+}  # fmt: skip
+SERVO = {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0}
+SECTIONS: dict[str, dict[str, Document]] = {
+    "actuators": {
+        "ideal": {}, "lag": {"bandwidth_rad_s": 15.0}, "lag and rate": SERVO, "one": {"elevator": SERVO},
+    },
+    "design": {
+        "nominal": {}, "no engine": {"engine_terms": False}, "linearised": {"linearised": True},
+        "frozen alpha": {"frozen_alpha": True}, "both": {"linearised": True, "frozen_alpha": True},
+        "heavy": {"mass": 1.03, "inertia": {"Ix": 0.98, "Jxz": 1.05}},
+    },
+    "sharpen": {
+        "default": {}, "none": {"sharpen": "none"}, "no bank": {"sharpen": {"pole_bank": False}},
+        "no memory": {"sharpen": {"memory": False}}, "no sets": {"sharpen": {"set_membership": False}},
+        "own axes": {"sharpen": {"shared_effectiveness": False}},
+    },
+    "poles": {
+        "default": {},
+        "others": {"detection_pole_per_s": 4.0, "pole_bank_per_s": [30, 200], "isolation_pole_per_s": 3.0},
+        "many": {"pole_bank_per_s": [2.0, 20.0, 60.0, 1e6], "forgetting_time_s": 1.0},
+    },
+    "constant": {
+        "default": {}, "other": {"constant_rad_s2": {"p": 0.05, "q": 0.03}}, "none": {"constant_rad_s2": {}},
+    },
+    "coupling": {"default": {}, "other": {"inertia_coupling": {"p": 0.1, "r": 0.4}}},
+    "coefficients": {
+        "-": {}, "all": {"coefficients": 0.04}, "some": {"coefficients": {"Cl_0": 0.1, "Cm_0": 0.05}},
+    },
+    "inertia": {"-": {}, "some": {"inertia": 0.03}},
+    "deflection": {"-": {}, "some": {"deflection_deg": 0.1}},
+}  # fmt: skip
+BOUNDS = ("constant", "coupling", "coefficients", "inertia", "deflection")
+REFERENCES: dict[str, Document] = {
+    "sines": {
+        "p": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}],
+        "q": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.7}}],
+        "r": [{"sine": {"amplitude_deg_s": 2, "frequency_hz": 0.6}}],
+    },
+    "doublets": {
+        "p": [{"doublet": {"amplitude_deg_s": 8, "start_s": 0.4, "width_s": 0.5}}],
+        "q": [{"doublet": {"amplitude_deg_s": 5, "start_s": 0.3, "width_s": 0.6}}],
+    },
+    "none": {},
+}
+RATES = {"usual": (100, 2.5), "slow": (40, 4.0), "fast": (200, 1.5)}
+STRUCK = frozenset(FAULTS)
+FACTORS = (
+    Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
+    Factor("rate", tuple(RATES)),
+    Factor("substeps", ("1", "2", "5")),
+    Factor("fault_class", ("published", "all")),
+    Factor("pairs", ("false", "true"), {"fault_class": frozenset({"all"})}),
+    Factor("thresholds", ("interval", "published")),
+    Factor("fault_profile", ("any", "abrupt")),
+    *(Factor(name, tuple(levels)) for name, levels in SECTIONS.items()),
+    Factor("declared sensors", tuple(SENSORS)),
+    Factor("true sensors", ("ideal", "as declared")),
+    Factor("turbulence", ("none", "light", "moderate")),
+    Factor("law", ("fault-tolerant", "nominal", "adaptive")),
+    Factor("reference", tuple(REFERENCES)),
+    Factor("fault", ("none", *FAULTS)),
+    Factor("course", ("abrupt", "ended"), {"fault": STRUCK}),
+    Factor("surface", ("first", "second", "third", "last"), {"fault": STRUCK - {"outside"}}),
+)
+
+
+def _forbidden(name: str, level: str, other: str, there: str) -> bool:
+    """What is refused: pairs with noise, air that moves about a derived aircraft, faults only ours have."""
+    if (name, level) == ("pairs", "true"):
+        return there not in {"declared sensors": ("ideal",), "aircraft": ("beaver",)}.get(other, (there,))
+    if (name, level) == ("aircraft", "jsbsim:c172p"):
+        return (other == "turbulence" and there != "none") or (other, there) == ("fault", "outside")
+    return False
+
+
+def scenarios(seed: int) -> Iterator[Document]:
+    """One covering array after the other, without end."""
+    arrays = 0
+    while True:
+        rng = np.random.default_rng([seed, arrays])
+        for number, row in enumerate(CoveringArray(FACTORS, _forbidden, rng).rows()):
+            yield document_of(row, rng, f"compared-{seed}-{arrays}-{number}")
+        arrays += 1
+
+
+def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Document:
+    """A scenario of a row."""
+    rate_hz, duration_s = RATES[row["rate"]]
+    bounds = {key: value for section in BOUNDS for key, value in SECTIONS[section][row[section]].items()}
+    bounds |= {"sensors": SENSORS[row["declared sensors"]], "turbulence": row["turbulence"]}
+    fdi = {
+        "sensor_monitor": "never", "fault_class": row["fault_class"], "thresholds": row["thresholds"],
+        "fault_profile": row["fault_profile"], "pairs": row.get("pairs") == "true", "bounds": bounds,
+        **SECTIONS["sharpen"][row["sharpen"]], **SECTIONS["poles"][row["poles"]],
+    }  # fmt: skip
+    moving = row["turbulence"] != "none"
+    return {
+        "name": name, "aircraft": row["aircraft"], "rate_hz": rate_hz, "duration_s": duration_s,
+        "substeps": int(row["substeps"]), "seed": int(rng.integers(1000)),
+        "reference": REFERENCES[row["reference"]], "control": {"law": row["law"]},
+        "sensors": SENSORS[row["declared sensors"]] if row["true sensors"] == "as declared" else "ideal",
+        "actuators": _actuators(row), "design_model": SECTIONS["design"][row["design"]], "fdi": fdi,
+        "environment": {"turbulence": "dryden", "severity": row["turbulence"]} if moving else {},
+        "faults": _faults(row, rng, duration_s),
+    }  # fmt: skip
+
+
+def _actuators(row: dict[str, str]) -> Any:
+    given = SECTIONS["actuators"][row["actuators"]]
+    if not given or row["actuators"] == "one":
+        return given or "ideal"
+    return dict.fromkeys(SURFACES[row["aircraft"]], given)
+
+
+def _faults(row: dict[str, str], rng: np.random.Generator, duration_s: float) -> list[Document]:
+    if row["fault"] == "none":
+        return []
+    at_s = float(rng.uniform(0.2, 0.6) * duration_s)
+    fault = {**FAULTS[row["fault"]], "at_s": at_s}
+    if "surface" in row:
+        surfaces = SURFACES[row["aircraft"]]
+        fault["actuator"] = surfaces[
+            ("first", "second", "third").index(row["surface"]) if row["surface"] != "last" else -1
+        ]
+    if row["course"] == "ended":
+        fault["end_s"] = at_s + 0.2 * duration_s
+    return [fault]
+
+
+SURFACES = {
+    "beaver": ("aileron", "elevator", "rudder", "flap"),
+    "beaver-split": ("aileron_left", "aileron_right", "elevator", "rudder", "flap_left", "flap_right"),
+    "jsbsim:c172p": ("aileron", "elevator", "rudder"),
+}

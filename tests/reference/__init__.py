@@ -9,6 +9,7 @@ It depends on no name of the package but its public ones (flights.py), so the pa
     bounds.py        eta_bar with all its parts, gyro errors, maps          detection.md, derived-aircraft.md
     detection.py     bank of filters, poles, thresholds, alarm              detection.md
     isolation.py     hypotheses, estimators, tests 1 to 4, decision         isolation.md, fault-types.md
+                     gradients and norm bounds of scheme zhang2005          paper, sec. IV
     diagnosis.py     a whole flight, and the residual after the alarm
 
 flights.py, scenarios.py, comparison.py and test_against_flights.py fly a covering array and compare column by

@@ -170,6 +170,21 @@ class Declaration:
         return self.scenario.get("design_model") or {}
 
     @property
+    def to_the_letter(self) -> bool:
+        """Whether the scheme is the paper's (SPEC section 18): Euler steps, gradients, no further tests."""
+        return bool(self["scheme"] == "zhang2005")
+
+    def memory(self, poles: Any) -> np.ndarray:
+        """a = exp(-lambda dt); of an Euler step 1 - lambda dt, at least 0."""
+        decay = np.array(poles, dtype=float) * self.dt
+        return np.maximum(1.0 - decay, 0.0) if self.to_the_letter else np.exp(-decay)
+
+    @property
+    def norm_bound(self) -> bool:
+        """Whether test 1 has the published bound in place of the interval."""
+        return self.to_the_letter or self["thresholds"] == "published"
+
+    @property
     def all_types(self) -> bool:
         """Whether faults of every type are in the class."""
         return bool(self["fault_class"] == "all")
@@ -181,9 +196,9 @@ class Declaration:
 
     def sharpen(self, step: str) -> bool:
         """Whether a step beyond the published scheme is on; with published thresholds none is by default."""
-        whole = (self.scenario.get("fdi") or {}).get("sharpen")
+        whole = "none" if self.to_the_letter else (self.scenario.get("fdi") or {}).get("sharpen")
         if whole is None:
-            whole = "none" if self["thresholds"] == "published" else "all"
+            whole = "none" if self.norm_bound else "all"
         return bool(whole.get(step, True)) if isinstance(whole, dict) else whole == "all"
 
     def error(self, reading: str) -> Error:
@@ -220,7 +235,11 @@ DEFAULTS: dict[str, Any] = {
     "scheme": "adaptive-estimators", "fault_class": "published", "pairs": False, "thresholds": "interval",
     "detection_pole_per_s": 10.0, "isolation_pole_per_s": 10.0, "forgetting_time_s": 5.0,
     "pole_bank_per_s": [1e6], "fault_profile": "any", "authority": "either", "statistical": None,
-    "slowest_oscillation_rad_s": 1.0, "slowest_rate_deg_s": 0.5, "options": {},
+    "slowest_oscillation_rad_s": 1.0, "slowest_rate_deg_s": 0.5,
+    "options": {
+        "adaptation_gain": 3000.0, "initial_theta": 0.0, "projection": 1, "adaptive_threshold": 1,
+        "constant_threshold_rad_s": 0.002, "leave_out": 0,
+    },
     "bounds": {
         "inertia_coupling": dict.fromkeys(AXES, 0.25), "constant_rad_s2": dict.fromkeys(AXES, 0.02),
         "coefficients": 0.0, "inertia": 0.0, "sensors": "ideal", "deflection_deg": 0.0, "turbulence": "none",

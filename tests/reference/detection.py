@@ -49,7 +49,7 @@ class Bank:
 
     def __init__(self, declaration: Declaration, nu: np.ndarray, eta_bar: np.ndarray, n: np.ndarray) -> None:
         dt = declaration.dt
-        self.a = np.exp(-np.array(poles(declaration)) * dt)[:, None]
+        self.a = declaration.memory(poles(declaration))[:, None]
         frames = len(nu)
         self.E, T_eta = (np.zeros((frames, self.a.size, 3)) for _ in range(2))
         T_n = np.broadcast_to(n[0], (frames, self.a.size, 3)).copy()
@@ -58,6 +58,8 @@ class Bank:
             T_eta[k] = self.a * T_eta[k - 1] + dt * eta_bar[k]
             T_n[k] = self.a * T_n[k - 1] + (1.0 - self.a) * n[k - 1]
         self.T = T_eta + T_n + n[:, None, :]
+        if not declaration["options.adaptive_threshold"]:
+            self.T[:, 0] = declaration["options.constant_threshold_rad_s"]
         self.T[0] = 0.0
 
     def alarm_axis(self, k: int) -> int | None:

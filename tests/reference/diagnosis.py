@@ -67,6 +67,8 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
             threshold[:, i],
         )
     isolation = Isolation(declaration, bank, frames, bounds, G[0])
+    if declaration.to_the_letter:
+        bank.E[:, 0] = approximation_residual(declaration, bank, 0, nu, frames.Gu, readings)
     result = _isolate(declaration, bank, isolation, x, nu, eta_bar, changing, columns)
     if result.alarm:
         residual = approximation_residual(declaration, bank, result.alarm[0], nu, frames.Gu, readings)
@@ -83,7 +85,8 @@ def approximation_residual(
     what the law already takes into account."""
     eps, a = bank.E[:, 0].copy(), bank.a[0]
     for k in range(alarm + 1, len(nu)):
-        known = -(Gu[k] * (1.0 - readings.effectiveness[k - 1])).sum(axis=1)
+        expected = 1.0 if declaration.to_the_letter else readings.effectiveness[k - 1]
+        known = -(Gu[k] * (1.0 - expected)).sum(axis=1)
         eps[k] = a * eps[k - 1] + declaration.dt * (nu[k] - readings.network[k - 1] - known)
     return eps
 
@@ -95,7 +98,10 @@ def _isolate(
     alarm, names, dt = None, [], declaration.dt
     shape = len(x), len(isolation.of), 3
     residual, lower, upper = (np.full(shape, np.nan) for _ in range(3))
-    excluded, effectiveness = np.zeros(shape[:2]), np.ones((len(x), len(declaration.aircraft.surfaces)))
+    excluded, effectiveness = (
+        np.tile(1.0 * isolation.excluded, (len(x), 1)),
+        np.ones((len(x), len(declaration.aircraft.surfaces))),
+    )
     for k in range(1, len(x)):
         bound = eta_bar[k] + (changing[k] + changing[k - 1]) / dt
         frame = Frame(

@@ -23,8 +23,8 @@ class Frame(NamedTuple):
     """What frame k, which ends at t s, says. All but k and t (3,).
 
     x_before, x: measured rates at its start and end, rad/s. F: predicted acceleration, nu: innovation,
-    eta_bar: bound on the model error, bound: eta_bar + (n[k] + n[k-1]) / dt, rad/s2. n_before, n: changing gyro
-    error, rad/s.
+    eta_bar: bound on the model error, bound: eta_bar + (n[k] + n[k-1]) / dt, rad/s2. n_before, n: changing
+    gyro error, rad/s.
     """
 
     k: int
@@ -141,7 +141,8 @@ class Isolation:
         self.ranges = [(one.low, one.high) for one in self.of]
         self.surface = [one.surface for one in self.of]
         self.is_position = np.array([one.kind == POSITION for one in self.of])
-        self.a = np.exp(-declaration["isolation_pole_per_s"] * declaration.dt)
+        self.a = declaration.memory(declaration["isolation_pole_per_s"])
+        self.adaptive = declaration["options.adaptive_threshold"]
         self.forget = np.exp(-declaration.dt / declaration["forgetting_time_s"])
         self.shared = declaration.sharpen("shared_effectiveness")
         self.remembers = declaration.sharpen("memory")
@@ -151,6 +152,9 @@ class Isolation:
         self.L, self.U = np.zeros(shape), np.zeros(shape)  # the fourth column is along the parity direction
         self.widening = Widening(declaration, bounds) if declaration.all_types else None
         self.excluded = np.zeros(len(self.of), dtype=bool)
+        self.excluded[
+            [int(declaration["options.leave_out"]) - 1] if declaration["options.leave_out"] else []
+        ] = True
         self.excluded_at = np.full(len(self.of), -np.inf)
         self.counts = np.ones((len(self.of), 3), dtype=bool)
         if declaration["pairs"]:  # each plane by itself
@@ -199,6 +203,9 @@ class Isolation:
         self.Omega, self.R_plus, self.R_minus, self.B_eta, self.B, self.theta = (
             np.zeros(shape) for _ in range(6)
         )
+        if not self.adaptive:
+            self.B += self.declaration["options.constant_threshold_rad_s"]
+        self.theta += self.declaration["options.initial_theta"]
         self.prior = (self.high - self.low) ** 2 / 12.0
         self.variance = np.repeat(self.prior[:, None], 3, axis=1)
         self.eps = np.zeros(shape)
@@ -211,7 +218,7 @@ class Isolation:
         """
         a, dt, x = self.a, self.declaration.dt, frame.x_before
         self.x_hat = x + dt * (frame.F + of.h + of.Z * self.theta) + a * (self.x_hat - x)
-        Delta = self.correct(of.Z)
+        Delta = self.descend() if self.declaration.to_the_letter else self.correct(of.Z)
         self.Omega = a * self.Omega + dt * of.Z
         self.x_hat = self.x_hat + self.Omega * Delta
         self.R_plus = a * self.R_plus + dt * np.maximum(of.Z, 0.0)
@@ -219,6 +226,18 @@ class Isolation:
         self.B_eta = a * self.B_eta + dt * (frame.eta_bar + of.r)
         self.T_n = a * self.T_n + (1.0 - a) * frame.n_before
         self.B = self.B_eta + self.T_n + frame.n
+        if not self.adaptive:
+            self.B[:] = self.declaration["options.constant_threshold_rad_s"]
+
+    def descend(self) -> np.ndarray:
+        """SPEC section 5: theta_hat' = P{Gamma Omega' eps}, by an Euler step, each axis by itself; the step.
+
+        P limits theta_hat to its range, unless it is switched off."""
+        before, gain = self.theta, self.declaration["options.adaptation_gain"]
+        self.theta = before + self.declaration.dt * gain * self.Omega * self.eps
+        if self.declaration["options.projection"]:
+            self.theta = np.clip(self.theta, self.low[:, None], self.high[:, None])
+        return self.theta - before
 
     def correct(self, Z: np.ndarray) -> np.ndarray:
         """Least squares with forgetting (isolation.md), limited to the feasible set: the step Delta.
@@ -269,7 +288,9 @@ class Isolation:
         """Test 1, the interval of the residual eps = x - x_hat; published: |eps| <= k |Omega| + B."""
         self.eps = x - self.x_hat
         low, high = self.low[:, None], self.high[:, None]
-        if self.declaration["thresholds"] == "published":
+        if not self.adaptive:
+            return -self.B, self.B
+        if self.declaration.norm_bound:
             mu = np.maximum(self.theta - low, high - self.theta) * np.abs(self.Omega) + self.B
             return -mu, mu
         moved = self.Omega * self.theta

@@ -60,6 +60,14 @@ SECTIONS: dict[str, dict[str, Document]] = {
     "inertia": {"-": {}, "some": {"inertia": 0.03}},
     "deflection": {"-": {}, "some": {"deflection_deg": 0.1}},
 }  # fmt: skip
+OPTIONS = {"adaptation_gain": 800.0, "initial_theta": -0.3, "network_gain": 60.0}
+SCHEMES: dict[str, Document] = {
+    "adaptive-estimators": {},
+    "zhang2005": {"scheme": "zhang2005"},
+    "no projection": {"scheme": "zhang2005", "options": {**OPTIONS, "projection": 0}},
+    "no dead zone": {"scheme": "zhang2005", "options": {**OPTIONS, "dead_zone": 0}},
+    "constant thresholds": {"scheme": "zhang2005", "options": {"adaptive_threshold": 0, "leave_out": 1}},
+}
 BOUNDS = ("constant", "coupling", "coefficients", "inertia", "deflection")
 REFERENCES: dict[str, Document] = {
     "sines": {
@@ -75,15 +83,17 @@ REFERENCES: dict[str, Document] = {
 }
 RATES = {"usual": (100, 2.5), "slow": (40, 4.0), "fast": (200, 1.5)}
 STRUCK = frozenset(FAULTS)
+OURS = {"scheme": frozenset({"adaptive-estimators"})}
 FACTORS = (
     Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
     Factor("rate", tuple(RATES)),
     Factor("substeps", ("1", "2", "5")),
+    Factor("scheme", tuple(SCHEMES)),
     Factor("fault_class", ("published", "all")),
     Factor("pairs", ("false", "true"), {"fault_class": frozenset({"all"})}),
-    Factor("thresholds", ("interval", "published")),
+    Factor("thresholds", ("interval", "published"), OURS),
     Factor("fault_profile", ("any", "abrupt")),
-    *(Factor(name, tuple(levels)) for name, levels in SECTIONS.items()),
+    *(Factor(name, tuple(levels), OURS if name == "sharpen" else {}) for name, levels in SECTIONS.items()),
     Factor("declared sensors", tuple(SENSORS)),
     Factor("true sensors", ("ideal", "as declared")),
     Factor("turbulence", ("none", "light", "moderate")),
@@ -99,6 +109,8 @@ def _forbidden(name: str, level: str, other: str, there: str) -> bool:
     """What is refused: pairs with noise, air that moves about a derived aircraft, faults only ours have."""
     if (name, level) == ("pairs", "true"):
         return there not in {"declared sensors": ("ideal",), "aircraft": ("beaver",)}.get(other, (there,))
+    if (name, level) == ("fault_class", "all"):
+        return other == "scheme" and there != "adaptive-estimators"
     if (name, level) == ("aircraft", "jsbsim:c172p"):
         return (other == "turbulence" and there != "none") or (other, there) == ("fault", "outside")
     return False
@@ -120,10 +132,12 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
     bounds = {key: value for section in BOUNDS for key, value in SECTIONS[section][row[section]].items()}
     bounds |= {"sensors": SENSORS[row["declared sensors"]], "turbulence": row["turbulence"]}
     fdi = {
-        "sensor_monitor": "never", "fault_class": row["fault_class"], "thresholds": row["thresholds"],
-        "fault_profile": row["fault_profile"], "pairs": row.get("pairs") == "true", "bounds": bounds,
-        **SECTIONS["sharpen"][row["sharpen"]], **SECTIONS["poles"][row["poles"]],
+        **SCHEMES[row["scheme"]], "fault_class": row["fault_class"], "fault_profile": row["fault_profile"],
+        "bounds": bounds, **SECTIONS["poles"][row["poles"]],
     }  # fmt: skip
+    if row["scheme"] == "adaptive-estimators":
+        fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
+        fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
     moving = row["turbulence"] != "none"
     return {
         "name": name, "aircraft": row["aircraft"], "rate_hz": rate_hz, "duration_s": duration_s,

@@ -54,27 +54,41 @@ def gyro_error(declaration: Declaration, x: np.ndarray) -> np.ndarray:
 DPT_0, KW_TO_DPT, SEA_LEVEL_KG_M3 = 0.08696, 191.18, 1.225  # FDC: dpt = 0.08696 + 191.18 P / (qdyn V)
 
 
-def slipstream_error(declaration: Declaration, y: np.ndarray) -> np.ndarray:
-    """Bound on the error of dpt, which is computed from the engine's instruments and the air data.
+def power_errors(declaration: Declaration) -> tuple[float, float] | None:
+    """Largest errors of the engine's power, kW: by its instruments, and for the whole of the density rho /
+    1.225.
 
-        P = 0.7355 (-326.5 + 0.00412 (pz + 7.4)(n + 2010) + (408.0 - 0.0965 n)(1 - rho / 1.225))  kW
-        dpt = 0.08696 + 191.18 P / (qdyn V),   rho = 2 qdyn / V^2
+        P = 0.7355 (-326.5 + 0.00412 (pz + 7.4)(n + 2010) + (408.0 - 0.0965 n)(1 - rho / 1.225))
 
-    n is that at the start, pz anything up to the engine's largest. With e_q, e_V, e_rho the relative errors
-    (those of airspeed and pressure at most 0.9), s = 1 / ((1 - e_q)(1 - e_V)), e_P the error of the power:
-
-        e = s 191.18 e_P / (qdyn V) + (s - 1) |dpt - 0.08696|,   1 + e_rho = (1 + e_q) / (1 - e_V)^2
+    n is that at the start, pz anything up to the engine's largest. None if no error of an instrument from
+    which dpt is computed is declared.
     """
     used = [declaration.error(name) for name in ("V", "qdyn", "engine_rpm", "manifold_pressure")]
     settings = (declaration.aircraft.file.get("engine") or {}).get("settings") or {}
     if not any(map(any, used)) or not {"engine_rpm", "manifold_pressure_inhg"} <= set(settings):
-        return np.zeros(len(y))
+        return None
     rpm = (declaration.scenario.get("initial") or {}).get("engine_rpm", settings["engine_rpm"]["default"])
     inhg = settings["manifold_pressure_inhg"]["range"][1]
     e_rpm, e_inhg = used[2].e(rpm), used[3].e(inhg)
     by_chart = 0.00412 * ((inhg + 7.4 + e_inhg) * e_rpm + (rpm + e_rpm + 2010.0) * e_inhg)
-    by_instruments = 0.7355 * (by_chart + 0.0965 * e_rpm)
-    by_density = 0.7355 * max(408.0 - 0.0965 * (rpm - e_rpm), 0.0)
+    return 0.7355 * (by_chart + 0.0965 * e_rpm), 0.7355 * max(408.0 - 0.0965 * (rpm - e_rpm), 0.0)
+
+
+def slipstream_error(declaration: Declaration, y: np.ndarray) -> np.ndarray:
+    """Bound on the error of dpt, which is computed from the engine's instruments and the air data.
+
+        dpt = 0.08696 + 191.18 P / (qdyn V),   rho = 2 qdyn / V^2
+
+    With e_q, e_V, e_rho the relative errors
+    (those of airspeed and pressure at most 0.9), s = 1 / ((1 - e_q)(1 - e_V)), e_P the error of the power:
+
+        e = s 191.18 e_P / (qdyn V) + (s - 1) |dpt - 0.08696|,   1 + e_rho = (1 + e_q) / (1 - e_V)^2
+    """
+    given = power_errors(declaration)
+    if not given:
+        return np.zeros(len(y))
+    by_instruments, by_density = given
+    used = [declaration.error(name) for name in ("V", "qdyn")]
     V, qdyn, dpt = y[:, 2], y[:, 3], y[:, 4]
     e_V, e_q = np.minimum(used[0].e(V) / V, 0.9), used[1].e(qdyn) / qdyn
     s = 1.0 / ((1.0 - np.minimum(e_q, 0.9)) * (1.0 - e_V))
@@ -105,6 +119,19 @@ class Magnitudes:
         self.qdyn, self.qdyn_largest = y_read[:, 3], y_largest[:, 3]
 
 
+def published_bound(declaration: Declaration, model: DesignModel, x: np.ndarray) -> np.ndarray:
+    """c_i |C_i x_j x_l| + b_i + the Earth part + rho, for magnitudes of the rates x; without a map b_i has
+    the error of the aircraft's model too."""
+    K = model.inertia
+    c, b = declaration.per_axis("bounds.inertia_coupling"), declaration.per_axis("bounds.constant_rad_s2")
+    if not declaration.aircraft.file.get("model_error_map"):
+        given = declaration.aircraft.file.get("model_error_rad_s2") or {}
+        b = b + [given.get(axis, 0.0) for axis in "pqr"]
+    product = np.stack([abs(K[C]) * x[:, i] * x[:, j] for i, j, C in MAIN_PRODUCT], axis=1)
+    total, k = x.sum(axis=1, keepdims=True), kappa(K)
+    return c * product + b + OMEGA_E * ((1.0 + k) * total + k * OMEGA_E) + RHO
+
+
 class Bounds:
     """The bounds of one flight, at every instant. x (instants, 3), y, u: readings and healthy positions."""
 
@@ -115,19 +142,9 @@ class Bounds:
         self.tolerance = [declaration.coefficient_share(t.name) * abs(t.value) for t in model.terms]
         self.inertia_error = model.inertia_errors(declaration["bounds.inertia"])
         self.level = self.box = self.row = None
-        self.u = u
-        self.now = self._published() + self._declared(u) + self._mapped(x, y, u)
-
-    def _published(self) -> np.ndarray:
-        """c_i |C_i x_j x_l| + b_i + the Earth part + rho; |x| + e replaces the rates."""
-        d, K, X = self.declaration, self.model.inertia, self.sizes.x_largest
-        c, b = d.per_axis("bounds.inertia_coupling"), d.per_axis("bounds.constant_rad_s2")
-        if not d.aircraft.file.get("model_error_map"):
-            given = d.aircraft.file.get("model_error_rad_s2") or {}
-            b = b + [given.get(axis, 0.0) for axis in "pqr"]
-        product = np.stack([abs(K[C]) * X[:, i] * X[:, j] for i, j, C in MAIN_PRODUCT], axis=1)
-        total, k = X.sum(axis=1, keepdims=True), kappa(K)
-        return c * product + b + OMEGA_E * ((1.0 + k) * total + k * OMEGA_E) + RHO
+        self.x, self.y, self.u = x, y, u
+        self.mu = self._mapped(x, y, u)
+        self.now = published_bound(declaration, model, self.sizes.x_largest) + self._declared(u) + self.mu
 
     def _declared(self, u: np.ndarray) -> np.ndarray:
         """eta_bar_e: sum over the products of the model of prod(|v| + e) - prod |v|."""

@@ -171,13 +171,19 @@ class Declaration:
 
     @property
     def to_the_letter(self) -> bool:
-        """Whether the scheme is the paper's (SPEC section 18): Euler steps, gradients, no further tests."""
+        """Whether the scheme is the paper's [Zhang2005]: Euler steps, gradients, no further tests."""
         return bool(self["scheme"] == "zhang2005")
 
     def memory(self, poles: Any) -> np.ndarray:
         """a = exp(-lambda dt); of an Euler step 1 - lambda dt, at least 0."""
         decay = np.array(poles, dtype=float) * self.dt
         return np.maximum(1.0 - decay, 0.0) if self.to_the_letter else np.exp(-decay)
+
+    @property
+    def statistical(self) -> bool:
+        """Whether the statistical detector runs."""
+        given = (self.scenario.get("fdi") or {}).get("statistical")
+        return given is not None and not self.to_the_letter
 
     @property
     def norm_bound(self) -> bool:
@@ -215,14 +221,20 @@ class Declaration:
         return float(share.get(name, 0.0)) if isinstance(share, dict) else float(share)
 
     @cached_property
-    def hypotheses(self) -> list[Hypothesis]:
-        """isolation.md, table 1: losses of the surfaces that lead an axis and of those that stand in for
-        none; of all types also losses of stand-ins, and a position of every surface."""
+    def losses(self) -> list[Hypothesis]:
+        """Losses of the published class: of the surfaces that lead an axis, and of those that stand in for
+        none."""
         aircraft = self.aircraft
         others = [s for s in aircraft.surfaces if s not in (*aircraft.leaders, *aircraft.stand_ins)]
-        lost = [*aircraft.leaders, *others, *(aircraft.stand_ins if self.all_types else ())]
-        found = [Hypothesis(s, LOSS, aircraft.surfaces.index(s), -1.0, 0.0) for s in lost]
+        return [_loss(aircraft, s) for s in (*aircraft.leaders, *others)]
+
+    @cached_property
+    def hypotheses(self) -> list[Hypothesis]:
+        """isolation.md, table 1: losses; of all types also those of stand-ins, and a position of every
+        surface."""
+        aircraft, found = self.aircraft, list(self.losses)
         if self.all_types:
+            found += [_loss(aircraft, s) for s in aircraft.stand_ins]
             low, high = np.minimum(aircraft.travel[0], 0.0), np.maximum(aircraft.travel[1], 0.0)
             found += [
                 Hypothesis(f"{s}_position", POSITION, j, low[j], high[j])
@@ -231,10 +243,15 @@ class Declaration:
         return found
 
 
+def _loss(aircraft: AircraftFile, surface: str) -> Hypothesis:
+    return Hypothesis(surface, LOSS, aircraft.surfaces.index(surface), -1.0, 0.0)
+
+
 DEFAULTS: dict[str, Any] = {
     "scheme": "adaptive-estimators", "fault_class": "published", "pairs": False, "thresholds": "interval",
     "detection_pole_per_s": 10.0, "isolation_pole_per_s": 10.0, "forgetting_time_s": 5.0,
-    "pole_bank_per_s": [1e6], "fault_profile": "any", "authority": "either", "statistical": None,
+    "pole_bank_per_s": [1e6], "fault_profile": "any", "authority": "either",
+    "statistical": {"false_alarms_per_h": 1e-3, "misnaming": 1e-4, "uncertainty_rad_s": 15.0},
     "slowest_oscillation_rad_s": 1.0, "slowest_rate_deg_s": 0.5,
     "options": {
         "adaptation_gain": 3000.0, "initial_theta": 0.0, "projection": 1, "adaptive_threshold": 1,

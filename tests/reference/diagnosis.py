@@ -3,7 +3,7 @@
 readings, commands -> prediction -> innovation and bound -> bank -> alarm -> isolation -> verdict
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from reference.bounds import Bounds, gyro_error
 from reference.declaration import AXES, Declaration
 from reference.detection import Bank
 from reference.isolation import Frame, Isolation
-from reference.prediction import DesignModel, frames_of, mean_of_frames, servo_positions
+from reference.noise import Noise
+from reference.prediction import DesignModel, Frames, frames_of, mean_of_frames, servo_positions
+from reference.statistical import Statistical
 
 
 class Readings(NamedTuple):
@@ -20,7 +22,7 @@ class Readings(NamedTuple):
     x (instants, 3) rad/s; y (instants, 4 + signals): alpha, beta, V, qdyn, signals; command (instants,
     surfaces) rad: the one that acts at the end of each step. After the alarm also, a row for each frame, what
     the law takes for known: network (frames, 3) rad/s2 and effectiveness (frames, surfaces).
-    trim: x, y, u at the start of the flight; None if the first row has it.
+    trim: x, y, u at the start of the flight.
     """
 
     x: np.ndarray
@@ -28,12 +30,12 @@ class Readings(NamedTuple):
     command: np.ndarray
     network: np.ndarray
     effectiveness: np.ndarray
-    trim: tuple[np.ndarray, np.ndarray, np.ndarray] | None
+    trim: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Result(NamedTuple):
     """columns: arrays by the names of log.parquet, a row for each frame. alarm: (frame, axis) or None; names:
-    (frame, name) of each change of the name, None for none."""
+    (frame, name) of each change of the name, None for none. candidates: hypotheses left at the end."""
 
     columns: dict[str, np.ndarray]
     alarm: tuple[int, str] | None
@@ -41,108 +43,157 @@ class Result(NamedTuple):
     candidates: list[str]
 
 
+class Flight(NamedTuple):
+    """What prediction and bounds say of a flight, a row for each frame.
+
+    x: rates rad/s. nu: innovation, eta_bar: its bound, rad/s2. n: changing gyro error, rad/s. of: means.
+    """
+
+    x: np.ndarray
+    nu: np.ndarray
+    eta_bar: np.ndarray
+    n: np.ndarray
+    of: Frames
+
+    def frame(self, k: int, dt: float) -> Frame:
+        """What frame k says."""
+        bound = self.eta_bar[k] + (self.n[k] + self.n[k - 1]) / dt
+        x, n = self.x[k - 1 : k + 1], self.n[k - 1 : k + 1]
+        return Frame(k, k * dt, *x, self.of.F[k], self.nu[k], self.eta_bar[k], bound, *n)
+
+
 def diagnose(declaration: Declaration, readings: Readings) -> Result:
-    """The default scheme, worst case."""
-    n = declaration.n
+    """From readings to names."""
+    n, (x, y) = declaration.n, (readings.x, readings.y)
     model = DesignModel(declaration)
+    model.anchor(*readings.trim)
     u = servo_positions(declaration, readings.command, readings.command[0])
-    if model.linearised or model.frozen_alpha:
-        model.anchor(*(readings.trim or (readings.x[0], readings.y[0], u[0])))
-    f, G = model.f(readings.x, readings.y), model.G(readings.y)
-    frames = frames_of(declaration, f, G, u)
-    bounds = Bounds(declaration, model, readings.x, readings.y, u)
-    x = readings.x[::n]
-    eta_bar, changing = mean_of_frames(n, bounds.now), gyro_error(declaration, x)
-    nu = np.concatenate([np.full((1, 3), np.nan), np.diff(x, axis=0) / declaration.dt - frames.F[1:]])
+    G = model.G(y)
+    frames = frames_of(declaration, model.f(x, y), G, u)
+    bounds = Bounds(declaration, model, x, y, u)
+    at_frames = x[::n]
+    nu = np.concatenate([np.full((1, 3), np.nan), np.diff(at_frames, axis=0) / declaration.dt - frames.F[1:]])
+    eta_bar, changing = mean_of_frames(n, bounds.now), gyro_error(declaration, at_frames)
+    flight = Flight(at_frames, nu, eta_bar, changing, frames)
     bank = Bank(declaration, nu, eta_bar, changing)
-    columns = {}
-    residual, threshold = bank.nearest_to_alarm()
-    for i, axis in enumerate(AXES):
-        columns[f"{axis}_design_rad_s2"] = frames.F[:, i]
-        columns[f"{axis}_eta_bar_rad_s2"] = eta_bar[:, i]
-        columns[f"{axis}_threshold_rad_s"] = bank.T[:, 0, i]
-        columns[f"{axis}_residual_rad_s"] = bank.E[:, 0, i]
-        columns[f"{axis}_alarm_residual_rad_s"], columns[f"{axis}_alarm_threshold_rad_s"] = (
-            residual[:, i],
-            threshold[:, i],
-        )
-    isolation = Isolation(declaration, bank, frames, bounds, G[0])
+    columns = _columns(flight, bank)
     if declaration.to_the_letter:
-        bank.E[:, 0] = approximation_residual(declaration, bank, 0, nu, frames.Gu, readings)
-    result = _isolate(declaration, bank, isolation, x, nu, eta_bar, changing, columns)
+        bank.E[:, 0] = approximation_residual(declaration, bank, 0, flight, readings)
+    detector = None
+    if declaration.statistical:
+        noise = Noise(declaration, bounds, readings.trim)
+        detector = Statistical(declaration, noise, frames)
+    isolation = Isolation(declaration, bank, frames, bounds, G[0])
+    result = Verdict(declaration, flight, bank, isolation, detector).of_flight(columns)
     if result.alarm:
-        residual = approximation_residual(declaration, bank, result.alarm[0], nu, frames.Gu, readings)
+        residual = approximation_residual(declaration, bank, result.alarm[0], flight, readings)
         for i, axis in enumerate(AXES):
             columns[f"{axis}_residual_rad_s"] = residual[:, i]
     return result
 
 
+def _columns(flight: Flight, bank: Bank) -> dict[str, np.ndarray]:
+    residual, threshold = bank.nearest_to_alarm()
+    columns = {}
+    for i, axis in enumerate(AXES):
+        columns[f"{axis}_design_rad_s2"] = flight.of.F[:, i]
+        columns[f"{axis}_eta_bar_rad_s2"] = flight.eta_bar[:, i]
+        columns[f"{axis}_threshold_rad_s"] = bank.T[:, 0, i]
+        columns[f"{axis}_residual_rad_s"] = bank.E[:, 0, i]
+        columns[f"{axis}_alarm_residual_rad_s"] = residual[:, i]
+        columns[f"{axis}_alarm_threshold_rad_s"] = threshold[:, i]
+    return columns
+
+
 def approximation_residual(
-    declaration: Declaration, bank: Bank, alarm: int, nu: np.ndarray, Gu: np.ndarray, readings: Readings
+    declaration: Declaration, bank: Bank, alarm: int, flight: Flight, readings: Readings
 ) -> np.ndarray:
-    """SPEC section 5, FDAE: eps <- a eps + dt (nu - fhat - phi_known); until the alarm it is E of the first
-    filter. fhat: output of the network in the frame before. phi_known = -sum (1 - effectiveness) G_s u_s:
-    what the law already takes into account."""
-    eps, a = bank.E[:, 0].copy(), bank.a[0]
-    for k in range(alarm + 1, len(nu)):
+    """detection.md, after the alarm: eps <- a eps + dt (nu - fhat - phi_known); before it E of the first
+    filter.
+
+    fhat: output of the network in the frame before. phi_known = -sum (1 - effectiveness) G_s u_s: what the
+    law already takes into account, nothing in the published scheme.
+    """
+    eps, a, Gu = bank.E[:, 0].copy(), bank.a[0], flight.of.Gu
+    for k in range(alarm + 1, len(eps)):
         expected = 1.0 if declaration.to_the_letter else readings.effectiveness[k - 1]
         known = -(Gu[k] * (1.0 - expected)).sum(axis=1)
-        eps[k] = a * eps[k - 1] + declaration.dt * (nu[k] - readings.network[k - 1] - known)
+        eps[k] = a * eps[k - 1] + declaration.dt * (flight.nu[k] - readings.network[k - 1] - known)
     return eps
 
 
-def _isolate(
-    declaration: Declaration, bank: Bank, isolation: Isolation, x: np.ndarray, nu: np.ndarray,
-    eta_bar: np.ndarray, changing: np.ndarray, columns: dict[str, Any],
-) -> Result:  # fmt: skip
-    alarm, names, dt = None, [], declaration.dt
-    shape = len(x), len(isolation.of), 3
-    residual, lower, upper = (np.full(shape, np.nan) for _ in range(3))
-    excluded, effectiveness = (
-        np.tile(1.0 * isolation.excluded, (len(x), 1)),
-        np.ones((len(x), len(declaration.aircraft.surfaces))),
-    )
-    for k in range(1, len(x)):
-        bound = eta_bar[k] + (changing[k] + changing[k - 1]) / dt
-        frame = Frame(
-            k,
-            k * dt,
-            x[k - 1],
-            x[k],
-            isolation.frames.F[k],
-            nu[k],
-            eta_bar[k],
-            bound,
-            *changing[k - 1 : k + 1],
-        )
-        of = isolation.effect(frame)
-        if isolation.remembers:
-            isolation.remember(of)
-        started = alarm is not None
+class Verdict:
+    """Alarm, candidates and names, frame by frame."""
+
+    def __init__(
+        self, declaration: Declaration, flight: Flight, bank: Bank, isolation: Isolation,
+        detector: Statistical | None,
+    ) -> None:  # fmt: skip
+        self.declaration, self.flight, self.bank, self.isolation = declaration, flight, bank, isolation
+        self.detector = detector
+        authority = declaration["authority"] if detector else "worst-case"
+        self.by_worst_case = authority != "statistical"
+        self.by_likelihood = detector if authority != "worst-case" else None
+        self.alarm: tuple[int, str] | None = None
+        self.names: list[tuple[int, str | None]] = []
+
+    def of_flight(self, columns: dict[str, np.ndarray]) -> Result:
+        """All frames; fills the columns."""
+        of, surfaces, frames = self.isolation.of, self.declaration.aircraft.surfaces, len(self.flight.x)
+        limits = np.full((3, frames, len(of), 3), np.nan)
+        excluded = np.tile(1.0 * self.isolation.excluded, (frames, 1))
+        effectiveness, shares = np.ones((frames, len(surfaces))), {}
+        for k in range(1, frames):
+            if self.detector:
+                for name, share in self.detector.take(k, self.flight.nu[k]).items():
+                    shares.setdefault(name, np.zeros(frames))[k] = share
+            self.take(k)
+            if self.alarm:
+                limits[:, k] = self.isolation.eps, self.isolation.lower, self.isolation.upper
+                excluded[k], effectiveness[k] = self.isolation.excluded, self.effectiveness()
+        for row, one in enumerate(of):
+            for i, axis in enumerate(AXES):
+                for what, values in zip(("residual", "lower", "upper"), limits, strict=True):
+                    columns[f"fie_{one.name}_{axis}_{what}_rad_s"] = values[:, row, i]
+            columns[f"fie_{one.name}_excluded"] = excluded[:, row]
+        columns |= shares
+        columns |= {f"{s}_effectiveness_estimate": effectiveness[:, j] for j, s in enumerate(surfaces)}
+        left = [one.name for one, out in zip(of, self.isolation.excluded, strict=True) if not out]
+        return Result(columns, self.alarm, self.names, left if self.alarm else [])
+
+    def take(self, k: int) -> None:
+        """A frame: alarm if there was none, then exclusions and the name."""
+        frame = self.flight.frame(k, self.declaration.dt)
+        of = self.isolation.effect(frame)
+        self.isolation.remember(of)
+        started = self.alarm is not None
         if started:
-            isolation.advance(of, frame)
-        elif (axis := bank.alarm_axis(k)) is not None:
-            alarm = k, AXES[axis]
-            isolation.start(frame)
-        if alarm:
-            isolation.exclude(of, frame, started)
-            residual[k], lower[k], upper[k] = isolation.eps, isolation.lower, isolation.upper
-            excluded[k] = isolation.excluded
-            name = isolation.decide()
-            if name != (names[-1][1] if names else None):
-                names.append((k, name))
-            left = np.flatnonzero(~isolation.excluded)
-            if left.size == 1:
-                s = isolation.surface[left[0]]
-                effectiveness[k, s] = 1.0 + isolation.theta[left[0], declaration.aircraft.main_axis[s]]
-    for row, one in enumerate(isolation.of):
-        for i, axis in enumerate(AXES):
-            stem = f"fie_{one.name}_{axis}"
-            columns[f"{stem}_residual_rad_s"] = residual[:, row, i]
-            columns[f"{stem}_lower_rad_s"] = lower[:, row, i]
-            columns[f"{stem}_upper_rad_s"] = upper[:, row, i]
-        columns[f"fie_{one.name}_excluded"] = excluded[:, row]
-    for s, name in enumerate(declaration.aircraft.surfaces):
-        columns[f"{name}_effectiveness_estimate"] = effectiveness[:, s]
-    left = [one.name for one, out in zip(isolation.of, isolation.excluded, strict=True) if not out]
-    return Result(columns, alarm, names, left if alarm else [])
+            self.isolation.advance(of, frame)
+        elif (axis := self.alarm_axis(k)) is not None:
+            self.alarm = k, AXES[axis]
+            self.isolation.start(frame)
+        if self.alarm:
+            self.isolation.exclude(of, frame, started, self.by_worst_case, self.by_likelihood)
+            name = self.isolation.decide(self.by_likelihood)
+            if name != (self.names[-1][1] if self.names else None):
+                self.names.append((k, name))
+
+    def alarm_axis(self, k: int) -> int | None:
+        """The axis of the alarm: of the worst case, or else of the largest score beyond its level; or
+        None."""
+        axis = self.bank.alarm_axis(k) if self.by_worst_case else None
+        if axis is None and self.by_likelihood and self.by_likelihood.largest > 1.0:
+            return self.by_likelihood.axis
+        return axis
+
+    def effectiveness(self) -> np.ndarray:
+        """1 + theta of the surface that is named, 1 of others. Theta is that of the likelihoods, if they
+        count."""
+        found = np.ones(len(self.declaration.aircraft.surfaces))
+        named = self.names[-1][1] if self.names else None
+        for row, one in enumerate(self.isolation.of):
+            if one.name == named:
+                s = one.surface
+                theta = self.isolation.theta[row, self.declaration.aircraft.main_axis[s]]
+                found[s] += self.by_likelihood.theta(s) if self.by_likelihood else theta
+        return found

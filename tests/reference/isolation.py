@@ -6,7 +6,7 @@ Arrays have a row for each hypothesis and a column for each axis.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -182,6 +182,8 @@ class Isolation:
 
     def remember(self, of: Effect) -> None:
         """Test 2: L <- a L + dt (min(0, h + theta_- Z, h + theta_+ Z) - r), and U; along m as well."""
+        if not self.remembers:
+            return
         a, dt, m = self.bank.a[:, 0], self.declaration.dt, self.m
         along = Effect(
             (m * of.h).sum(axis=1, keepdims=True),
@@ -230,7 +232,8 @@ class Isolation:
             self.B[:] = self.declaration["options.constant_threshold_rad_s"]
 
     def descend(self) -> np.ndarray:
-        """SPEC section 5: theta_hat' = P{Gamma Omega' eps}, by an Euler step, each axis by itself; the step.
+        """[Zhang2005, sec. IV] theta_hat' = P{Gamma Omega' eps}, by an Euler step, each axis by itself; the
+        step.
 
         P limits theta_hat to its range, unless it is switched off."""
         before, gain = self.theta, self.declaration["options.adaptation_gain"]
@@ -299,8 +302,10 @@ class Isolation:
             high * self.R_plus + low * self.R_minus - moved + self.B,
         )
 
-    def exclude(self, of: Effect, frame: Frame, started: bool) -> None:
-        """All tests in a frame; started: the estimators began before it."""
+    def exclude(self, of: Effect, frame: Frame, started: bool, by_worst_case: bool, detector: Any) -> None:
+        """All tests in a frame; started: the estimators began before it. by_worst_case: whether tests 1 to 4
+        exclude. detector: statistical detector that may exclude losses once it has raised its alarm, or
+        None."""
         self.lower, self.upper = self.limits(frame.x)
         outside = (self.eps < self.lower) | (self.eps > self.upper)
         excluded = (outside & self.counts).any(axis=1)
@@ -312,8 +317,13 @@ class Isolation:
                 excluded[row] = True
             elif self.abrupt and started and not self.is_position[row]:
                 excluded[row] = not self.narrow(row, of, frame)
-        self.excluded_at[excluded & ~self.excluded] = frame.t
-        self.excluded |= excluded
+        for row in range(len(self.of)):
+            out = excluded[row] and by_worst_case
+            if not out and detector and detector.alarmed:
+                gone = {self.surface[j] for j in np.flatnonzero(self.excluded)}
+                out = detector.excludes(self.surface[row], gone)
+            if out and not self.excluded[row]:
+                self.excluded[row], self.excluded_at[row] = True, frame.t
 
     def contradicts_memory(self, k: int) -> np.ndarray:
         """Test 2: E < L - T or E > U + T on an axis, or along m with sum |m_i| T_i for T."""
@@ -356,9 +366,12 @@ class Isolation:
                 self.set_high[row, axes] = np.minimum(self.set_high[row, axes], high)
         return bool((self.set_low[row] <= self.set_high[row]).all())
 
-    def decide(self) -> str | None:
-        """Decision: the surface of the only hypothesis left, `unanticipated` if none is, None if several."""
+    def decide(self, detector: Any) -> str | None:
+        """Decision: the surface of the only hypothesis left, `unanticipated` if none is, None if several, or
+        if the likelihoods exclude the only one weakly and have not confirmed it."""
         left = np.flatnonzero(~self.excluded)
-        if left.size > 1:
+        if left.size > 1 or (
+            left.size and detector and self.surface[left[0]] in detector.weak - detector.confirmed
+        ):
             return None
         return self.of[left[0]].name if left.size else "unanticipated"

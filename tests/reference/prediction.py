@@ -1,4 +1,4 @@
-"""The design model and what it predicts of a frame. Pages: detection.md (the innovation), SPEC section 3.
+"""The design model and what it predicts of a frame. Pages: detection.md (the innovation). Equations: [FDC].
 
     xdot = f(x, y) + G(y) u        x (3,) rates rad/s; y = (alpha, beta, V, qdyn, signals); u surfaces, rad
 
@@ -23,7 +23,7 @@ MAIN_PRODUCT = ((1, 2, "Pqr"), (0, 2, "Qpr"), (0, 1, "Rpq"))  # detection.md: C_
 
 
 def inertia_coefficients(Ix: float, Iy: float, Iz: float, Jxz: float) -> dict[str, float]:
-    """SPEC section 3: what multiplies rate products and moments."""
+    """[FDC]: what multiplies rate products and moments."""
     Ir = Ix * Iz - Jxz**2
     return {
         "Ppq": (Ix - Iy + Iz) * Jxz / Ir, "Pqr": ((Iy - Iz) * Iz - Jxz**2) / Ir,
@@ -73,19 +73,41 @@ class DesignModel:
         self.linearised, self.frozen_alpha = wrong.get("linearised", False), wrong.get("frozen_alpha", False)
 
     def anchor(self, x0: np.ndarray, y0: np.ndarray, u0: np.ndarray) -> None:
-        """The trim that a linearised model is tied to: f0, G0 and the derivatives of f + G u at (x0, y0, u0),
-        by complex steps."""
+        """The trim that a linearised model is tied to: f0, G0 and the derivatives of f + G u there."""
         self.x0, self.y0 = x0, y0
-        self.f0, self.G0 = self._f(x0, y0), self._G(y0)
+        self.f0, self.G0 = self.nonlinear_f(x0, y0), self.nonlinear_G(y0)
+        self.f_x, self.f_y = self.derivatives(x0, y0, u0)
+
+    def derivatives(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """d(f + G u) / dx (3, 3) and / dy (3, signals), by complex steps."""
         step = 1e-30
 
         def along(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
-            x, y = x0 + 1j * step * dx, y0 + 1j * step * dy
-            return (self._f(x, y) + self._G(y) @ u0).imag / step
+            at = x + 1j * step * dx, y + 1j * step * dy
+            return (self.nonlinear_f(*at) + self.nonlinear_G(at[1]) @ u).imag / step
 
-        none_x, none_y = np.zeros(3), np.zeros(y0.size)
-        self.f_x = np.array([along(e, none_y) for e in np.eye(3)]).T
-        self.f_y = np.array([along(none_x, e) for e in np.eye(y0.size)]).T
+        none_x, none_y = np.zeros(3), np.zeros(y.size)
+        f_x, f_y = [along(e, none_y) for e in np.eye(3)], [along(none_x, e) for e in np.eye(y.size)]
+        return np.array(f_x).T, np.array(f_y).T
+
+    @property
+    def per_moment(self) -> np.ndarray:
+        """(3, 3): acceleration (columns p, q, r) of one N m about each axis (rows)."""
+        found = np.zeros((3, 3))
+        for axis in range(3):
+            for i, name in MOMENT_FACTORS[axis]:
+                found[i, axis] = self.inertia[name]
+        return found
+
+    def coefficient_slope(self, axis: int, name: str, y: np.ndarray, u: np.ndarray) -> float:
+        """d C / d signal of the coefficient of an axis, without rates, by a complex step."""
+        signal = signals_of(self.aircraft, np.zeros(3), y + 0j)
+        signal[name] = signal[name] + 1e-30j
+        of_axis = [t for t in self.terms if t.axis == axis]
+        total = sum(
+            t.value * powers(t, signal) * (1.0 if t.surface is None else u[t.surface]) for t in of_axis
+        )
+        return float(np.imag(total) / 1e-30)
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """f(x, y) (..., 3) rad/s2; linearised: f0 + f_x (x - x0) + f_y (y - y0)."""
@@ -94,13 +116,13 @@ class DesignModel:
             if self.frozen_alpha:
                 f_y[:, 0] = 0.0
             return self.f0 + (x - self.x0) @ self.f_x.T + (y - self.y0) @ f_y.T
-        return self._f(x, self._frozen(y))
+        return self.nonlinear_f(x, self._frozen(y))
 
     def G(self, y: np.ndarray) -> np.ndarray:
         """G(y) (..., 3, surfaces) rad/s2 per rad; linearised: that of the trim."""
         if self.linearised:
             return np.broadcast_to(self.G0, (*y.shape[:-1], *self.G0.shape)).copy()
-        return self._G(self._frozen(y))
+        return self.nonlinear_G(self._frozen(y))
 
     def _frozen(self, y: np.ndarray) -> np.ndarray:
         if not self.frozen_alpha:
@@ -109,8 +131,8 @@ class DesignModel:
         held[..., 0] = self.y0[0]
         return held
 
-    def _f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """SPEC section 3: rate products and moments of the terms without a surface."""
+    def nonlinear_f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """[FDC]: rate products and moments of the terms without a surface."""
         signal, moment = signals_of(self.aircraft, x, y), self._per_coefficient(y)
         C = [
             sum(t.value * powers(t, signal) for t in self.terms if t.axis == axis and t.surface is None)
@@ -125,7 +147,7 @@ class DesignModel:
             axis=-1,
         )
 
-    def _G(self, y: np.ndarray) -> np.ndarray:
+    def nonlinear_G(self, y: np.ndarray) -> np.ndarray:
         """The same of one radian of each surface."""
         signal, moment = signals_of(self.aircraft, np.zeros(3), y), self._per_coefficient(y)
         C = np.zeros((3, len(self.aircraft.surfaces), *y.shape[:-1]), dtype=y.dtype)

@@ -84,12 +84,20 @@ REFERENCES: dict[str, Document] = {
 RATES = {"usual": (100, 2.5), "slow": (40, 4.0), "fast": (200, 1.5)}
 STRUCK = frozenset(FAULTS)
 OURS = {"scheme": frozenset({"adaptive-estimators"})}
+STILL = OURS | {"turbulence": frozenset({"none"})}
+DETECTORS: dict[str, Document] = {
+    "worst case": {},
+    "either": {"statistical": {}},
+    "statistical": {"statistical": {"misnaming": 0.01, "uncertainty_rad_s": 5.0}, "authority": "statistical"},
+    "both": {"statistical": {"false_alarms_per_h": 10.0}, "authority": "worst-case"},
+}
 FACTORS = (
     Factor("aircraft", ("beaver", "beaver-split", "jsbsim:c172p")),
     Factor("rate", tuple(RATES)),
     Factor("substeps", ("1", "2", "5")),
     Factor("scheme", tuple(SCHEMES)),
     Factor("fault_class", ("published", "all")),
+    Factor("detector", tuple(DETECTORS), STILL | {"fault_class": frozenset({"published"})}),
     Factor("pairs", ("false", "true"), {"fault_class": frozenset({"all"})}),
     Factor("thresholds", ("interval", "published"), OURS),
     Factor("fault_profile", ("any", "abrupt")),
@@ -137,6 +145,7 @@ def document_of(row: dict[str, str], rng: np.random.Generator, name: str) -> Doc
     }  # fmt: skip
     if row["scheme"] == "adaptive-estimators":
         fdi |= {"sensor_monitor": "never", "pairs": row.get("pairs") == "true"}
+        fdi |= DETECTORS[row.get("detector", "worst case")]
         fdi |= {"thresholds": row["thresholds"], **SECTIONS["sharpen"][row["sharpen"]]}
     moving = row["turbulence"] != "none"
     return {

@@ -149,7 +149,7 @@ COMPARE = {
     "studies__compare__trial__set_names": ["one", "two"],
     "studies__compare__tune__tune": lambda methods, *how: {
         "methods": [f"{method.grade} {method.name}" for method in methods],
-        "how": how[:-1],
+        "how": how,
     },
     "studies__compare__tune__write_tuned": lambda document, folder: folder / "tuned.json",
     "studies__compare__tune__as_text": str,
@@ -357,7 +357,7 @@ ASKED = [
     ("matrix --pitch-lost --declared", MATRIX), ("matrix --pitch-lost --aircraft beaver", MATRIX),
     ("matrix --declared --aircraft beaver", MATRIX), ("matrix --turbulence light", MATRIX),
     ("power", POWER),
-    ("power --grid full --schemes a,,b --workers 2 --rates-alone --out o --format json", POWER),
+    ("power --grid full --schemes a,,b --workers 2 --out o --format json", POWER),
     ("power --turbulence none --sensors ideal", POWER),
     ("reproduce", REPRODUCE), ("reproduce --workers 5 --out o --format json", REPRODUCE),
     ("verify", VERIFY),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.docs.tables.benchmark import TUNING
 from tools.docs.tables.chosen import (
     BETTER_DRAWS,
     CONSTANT_HEAD,
@@ -22,7 +23,6 @@ from tools.docs.tables.chosen import (
     not_chosen_constants,
 )
 
-from beaver_ftc.diagnosis.rivals import TUNED_FILE
 from beaver_ftc.studies.reproduce.cases import PUBLISHED, keys_of
 from beaver_ftc.studies.reproduce.choices import scenario
 from beaver_ftc.studies.reproduce.reproduction import SETTINGS
@@ -99,7 +99,7 @@ def test_the_sets_of_the_benchmark_are_read_and_apart():
 def test_the_draws_of_tuned_values_are_listed_and_apart_from_those_of_the_ratio():
     last = [
         again["draw"] + again["judged"]
-        for row in json.loads(TUNED_FILE.read_text())["methods"]
+        for row in json.loads(TUNING.read_text())["methods"]
         for again in row.get("again", [])
     ]
     assert max(last, default=0) <= max(TUNED_DRAWS)

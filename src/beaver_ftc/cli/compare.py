@@ -13,7 +13,7 @@ from beaver_ftc.plugins import required
 
 FILES = (
     "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png", "runs.html",
-    "flights.json", "flights.md", "flights.png", "tuned.json",
+    "flights.json", "flights.md", "flights.png", "tuned.json", "tuning.json",
 )  # fmt: skip
 
 
@@ -27,6 +27,7 @@ class Options:
     tune: bool = False
     grade: str | None = None
     trials: Annotated[int, typer.Option(min=5)] = 24
+    restarts: Annotated[int, typer.Option(min=0)] = 8
     seed: int = 1
     draw: Annotated[int, typer.Option(min=0)] = 0
     tuned: Annotated[Path | None, typer.Option(metavar="FILE")] = None
@@ -51,7 +52,8 @@ def command(options: Options) -> None:
     methods and plug-ins.
 
     The command writes comparison.json, .png and .html. For finished runs it writes runs.json, .png and .html.
-    For recorded flights it writes flights.json, .md and .png. With --tune it writes tuned.json.
+    For recorded flights it writes flights.json, .md and .png. With --tune it writes tuned.json, which has the
+    parameters, and tuning.json, which has how they were found.
 
     If a comparison on flights is interrupted, the same command resumes it.
 
@@ -67,7 +69,9 @@ def command(options: Options) -> None:
     tune: Choose parameters of schemes and laws on the calibration flights.
     grade: With --tune: use only flights of this grade. exact: ideal sensors and actuators. actuators:
     actuators that lag. errors: errors of sensors or air. Default: all three grades.
-    trials: With --tune: number of trials for each method and grade.
+    trials: With --tune: number of trials of each search.
+    restarts: With --tune: largest number of further searches for each method and grade. Each has a seed of
+    its own. The search ends earlier if two further searches in a row gain less than 1 %.
     seed: With --tune: seed of the random numbers of the search.
     draw: With --tune: number of the set of calibration flights. 0 is the standard set. With another set, the
     command also compares tuned and default parameters.
@@ -197,16 +201,17 @@ def _registered(option: str, group: str, names: list[str]) -> list[str]:
 def _tune(options: Options, most: int | None) -> None:
     from beaver_ftc.plugins import DETECTORS, LAWS, registered
     from beaver_ftc.studies.compare.trial import STATISTICAL
-    from beaver_ftc.studies.compare.tune import as_text, methods_of, tune, write_tuned
+    from beaver_ftc.studies.compare.tune import Search, as_text, methods_of, tune, write_tuned
     from beaver_ftc.studies.engine.workers import cores
 
     everything = options.schemes is None and options.laws is None
     schemes = [*registered(DETECTORS), STATISTICAL] if everything else _named("--schemes", options.schemes)
     laws = list(registered(LAWS)) if everything else _named("--laws", options.laws)
     methods = methods_of(schemes, laws, _grades(options.grade))
-    with progress_bar(f"{len(methods)} methods and grades, {options.trials} trials each") as progress:
-        workers = options.workers or cores()
-        document = tune(methods, options.trials, options.seed, most, workers, progress, options.draw)
+    how = Search(options.trials, options.seed, options.restarts, most, options.draw)
+    budget = options.trials * (1 + options.restarts)
+    with progress_bar(f"{len(methods)} methods and grades, up to {budget} trials each") as progress:
+        document = tune(methods, how, options.workers or cores(), progress)
     path = write_tuned(document, options.out)
     answer(options.format, document, lambda: f"{as_text(document)}\n\nwritten: {path}")
 

@@ -6,6 +6,7 @@ from math import exp, inf, log, nan, sqrt
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare import criteria
 from beaver_ftc.studies.compare.criteria import (
     EFFORT,
@@ -18,7 +19,7 @@ from beaver_ftc.studies.compare.criteria import (
     flights,
     least_margins,
 )
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, SetFlight
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, SetFlight, result_of
 from beaver_ftc.studies.margins import Margin
 from flying import loss, scenario
 
@@ -93,7 +94,7 @@ def test_what_cannot_be_flown_costs_more_than_all_else(law, monkeypatch):
 def test_a_flight_of_an_entry_is_flown_with_its_values(monkeypatch):
     """On top of what the entry itself flies with."""
     flown_with = []
-    monkeypatch.setattr(criteria, "fly", flown_with.append)
+    monkeypatch.setattr(criteria, "fly", lambda scenario, watch: flown_with.append(scenario))
     monkeypatch.setattr(criteria, "result_of", lambda landing, entry, us: (entry, us))
     case = SetFlight("c", scenario(fdi={"scheme": "augmented-ekf", "options": {"noise": 2.0}}))
     ekf, lqr = Entry("augmented-ekf", LAW), Entry(SCHEME, "lqr")
@@ -104,6 +105,20 @@ def test_a_flight_of_an_entry_is_flown_with_its_values(monkeypatch):
     assert (first.control.law, first.control.options) == (LAW, {})
     assert (second.fdi.scheme, second.control.law) == (SCHEME, "lqr")
     assert second.control.options == {"deflection_deg": 4.0}
+
+
+@pytest.mark.parametrize("alarm", [0.3, 200.0])
+def test_a_flight_that_ends_with_its_false_alarm_costs_what_it_would_have(alarm, monkeypatch):
+    """And flights without one are flown to their end."""
+    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 3}
+    cases = [SetFlight("c", scenario(duration_s=5, faults=faults)) for faults in ([], [fault])]
+    cost, flown_s = DetectorCost("observer-constant", cases), []
+    monkeypatch.setattr(criteria, "result_of", lambda *of: flown_s.append(of[0].frames) or result_of(*of))
+    ended = cost.parts({"alarm": alarm})
+    monkeypatch.setattr(criteria, "fly", lambda scenario, watch: fly(scenario))
+    assert ended == cost.parts({"alarm": alarm})
+    assert ended == ([0.5, 1.5] if alarm == 0.3 else [0.0, pytest.approx(ended[1])])
+    assert len(flown_s) == (2 if alarm == 0.3 else 4)
 
 
 MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", "rudder", 7.0, 8.0, 50.0)]

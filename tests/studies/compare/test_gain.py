@@ -82,9 +82,9 @@ def test_the_gain_is_measured_on_a_draw_of_its_own_alone(monkeypatch, cost, meas
     monkeypatch.setattr(
         tune, "gain_of", lambda group, name, grade, settings, draw: found | {"given": settings}
     )
-    row = tune.tune_method(method, 5, 1, 1, draw=2)
+    row = tune.tune_method(method, tune.Search(5, 1, 0, most=1, draw=2))
     assert ("gain" in row) == measured
     assert not measured or row["given"] == (method.start(), {"pole_per_s": 3.0})
-    assert "gain" not in tune.tune_method(method, 5, 1, 1)
-    text = as_text({"trials": 5, "seed": 1, "draw": 2, "methods": [row]})
+    assert "gain" not in tune.tune_method(method, tune.Search(5, 1, 0, most=1))
+    text = as_text({"trials": 5, "seed": 1, "restarts": 0, "draw": 2, "methods": [row]})
     assert ("25.0" in text) == measured

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import asdict
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,7 @@ from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
 from beaver_ftc.studies.compare.tune import (
     LEAST_GAIN,
     Method,
+    Search,
     as_text,
     methods_of,
     read_tuned,
@@ -33,8 +35,8 @@ from beaver_ftc.studies.margins import Margin
 from commands import beaver
 from flying import scenario
 
-SHIPPED = json.loads(TUNED_FILE.read_text())
-ROWS = [pytest.param(row, id=f"{row['grade']}-{row['kind']}-{row['name']}") for row in SHIPPED["methods"]]
+RECORD = json.loads((Path(__file__).parents[3] / "benchmarks" / "tuning.json").read_text())
+ROWS = [pytest.param(row, id=f"{row['grade']}-{row['kind']}-{row['name']}") for row in RECORD["methods"]]
 GROUPS = {kind: group for group, kind in TUNED_FILE_KEY_BY_PLUGIN_GROUP.items()}
 MINE = """
 from beaver_ftc.diagnosis.rivals.observer import ConstantThresholdObserver
@@ -48,11 +50,15 @@ class Mine(ConstantThresholdObserver):
 """
 
 
+def flown_by(row):
+    return tuned_values(load_tuned_values(), row["grade"], GROUPS[row["kind"]], row["name"])
+
+
 @pytest.mark.parametrize("row", ROWS)
 def test_no_value_that_ships_is_on_the_edge_of_its_range(row):
     """What was found for it, too."""
     ranges = {key: Range(**of) for key, of in row["ranges"].items()}
-    for values in (row["values"], row["found"]):
+    for values in (flown_by(row), row["found"]):
         assert set(values) == set(ranges)
         places = [on_scale(ranges[key], value) for key, value in values.items()]
         assert min(places) > EDGE
@@ -70,18 +76,16 @@ def test_a_method_that_is_tuned_again_gains_at_most_5_percent(row):
     assert ("gain" in last) == (row["cost"] < INADMISSIBLE)
 
 
-def test_everybody_is_tuned_with_the_same_budget_on_every_grade():
+def test_everybody_is_tuned_on_every_grade():
+    """What flies says nothing of how it was found: it is small."""
     everybody = methods_of([*registered(DETECTORS), STATISTICAL], list(registered(LAWS)), FLIGHT_GRADES)
-    rows = {(GROUPS[row["kind"]], row["name"], row["grade"]): row for row in SHIPPED["methods"]}
+    rows = {(GROUPS[row["kind"]], row["name"], row["grade"]): row for row in RECORD["methods"]}
     assert set(rows) == {(each.group, each.name, each.grade) for each in everybody}
     assert {SCHEME, LAW} < {each.name for each in everybody}
     for row in rows.values():
-        searches = 1 + len(row["widened"])
-        assert row["trials"] <= SHIPPED["trials"] * searches
-        assert row["trials"] >= SHIPPED["trials"] - len(row["ranges"])
-        assert row["values"] == tuned_values(
-            load_tuned_values(), row["grade"], GROUPS[row["kind"]], row["name"]
-        )
+        assert row["trials"] >= RECORD["trials"] - len(row["ranges"])
+        assert set(flown_by(row)) == set(row["ranges"])
+    assert set(json.loads(TUNED_FILE.read_text())) == {"grades"}
 
 
 def test_rivals_fly_with_what_was_chosen_for_their_grade():
@@ -105,7 +109,7 @@ def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
     monkeypatch.setattr(tuning, "search", lambda *_: found)
     for name in (SCHEME, "observer-constant"):
         method = Method(DETECTORS, name, "exact")
-        row = tuning.tune_method(method, 24, 1, 1)
+        row = tuning.tune_method(method, Search(24, 1, 3, most=1))
         assert row["values"] == (method.start() if kept else found.values)
         assert (row["found"], row["cost"], row["start_cost"], row["trials"]) == (found.values, cost, 1.0, 24)
 
@@ -131,18 +135,22 @@ def test_a_plug_in_is_tuned_like_everybody(tmp_path):
         "1",
         "--trials",
         "5",
+        "--restarts",
+        "1",
     )
     done = beaver("compare", "--tune", *asked, "--workers", "1", "--format", "json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     path = tmp_path / "comparisons" / "tuned.json"
-    assert json.loads(path.read_text()) == document
+    files = [json.loads(path.with_name(name).read_text()) for name in ("tuned.json", "tuning.json")]
+    assert files == [{"grades": document.pop("grades")}, document]
     (row,) = document["methods"]
     assert row["ranges"] == {"alarm": asdict(Range(0.1, 1e4))}
-    assert document["trials"] == row["trials"] == 5
+    assert (document["trials"], document["restarts"], row["restarts"], row["settled"]) == (5, 1, 1, False)
+    assert row["trials"] == 9
     assert row["cost"] <= row["start_cost"]
     assert read_tuned(path) == {"exact": {"detectors": {"mine": row["values"]}}}
-    assert "5 trials a method and grade" in as_text(document)
+    assert "up to 5 trials a search, seed 1, up to 1 restarts" in as_text(document)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +171,7 @@ def test_a_class_that_says_nothing_has_nothing_to_tune(monkeypatch):
 
 def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     with pytest.raises(BadInput, match="nothing to tune"):
-        tune([], 5, 1, None, 1, None, 0)
+        tune([], Search(5, 1, 0), 1, None)
     (tmp_path / "a.json").write_text('{"grades": {"windy": {}}}')
     for name in ("a.json", "nowhere.json"):
         with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):
@@ -173,13 +181,13 @@ def test_nothing_to_tune_and_no_file_are_said(tmp_path):
 def row_of(grade, name, start_cost, cost, values, widened=(), **more):
     return {
         "grade": grade, "name": name, "start_cost": start_cost, "cost": cost, "values": values,
-        "widened": list(widened), **more,
+        "widened": list(widened), "trials": 70, "settled": True, **more,
     }  # fmt: skip
 
 
 ROWS_MADE = [
     row_of("exact", "observer", 0.81236, 0.52349, {"pole_per_s": 3.14159, "alarm": 20000.0}, ("alarm", "b"),
-           built_in=0.7, retuned=0.6, gain=0.1429, gain_low=-0.0321, gain_high=0.2768),
+           settled=False, built_in=0.7, retuned=0.6, gain=0.1429, gain_low=-0.0321, gain_high=0.2768),
     row_of("errors", "lqr", 1e6, 1e6 - 1.0, {"deflection_deg": 0.25}, gain_margin_db=7.25,
            phase_margin_deg=51.6),
     row_of("errors", "slow", 999.9, 1000.0, {}, ("c",)),
@@ -188,9 +196,10 @@ ROWS_MADE = [
 
 def test_what_was_tuned_as_text():
     """A line a method; with the gain where another draw has measured it."""
-    document = {"trials": 24, "seed": 7, "draw": 0, "methods": ROWS_MADE}
-    head, empty, *table, first, second = as_text(document).splitlines()
-    assert (head, empty) == ("24 trials a method and grade, seed 7", "")
+    document = {"trials": 24, "seed": 7, "restarts": 8, "draw": 0, "methods": ROWS_MADE}
+    head, empty, *table, first, budget, second, none = as_text(document).splitlines()
+    assert head == "up to 24 trials a search, seed 7, up to 8 restarts for each method and grade"
+    assert empty == ""
     assert [re.split("  +", line.strip()) for line in table] == [
         ["grade", "method", "cost at the start", "cost found", "margins dB, deg", "values"],
         ["exact", "observer", "0.812", "0.523", "-", "pole_per_s 3.142, alarm 2e+04"],
@@ -198,7 +207,9 @@ def test_what_was_tuned_as_text():
         ["errors", "slow", "999.900", "inadmissible", "-"],
     ]
     assert first == "observer, exact: on the edge of its range, widened: alarm, b"
+    assert budget == "observer, exact: the budget ended the search; more --restarts may find a lower cost"
     assert second == "slow, errors: on the edge of its range, widened: c"
+    assert none == "slow, errors: no better values were found in 70 trials"
     table = as_text(document | {"draw": 2}).splitlines()[2:6]
     assert [re.split("  +", line.strip())[5:] for line in table] == [
         ["cost, built in", "cost, retuned", "gain, %", "from, %", "to, %", "values"],
@@ -217,22 +228,23 @@ def test_a_tuning_is_of_every_method_on_its_grade(monkeypatch):
 
     monkeypatch.setattr(tuning, "fly_all", fly_all)
     monkeypatch.setattr(
-        tuning, "flights", lambda grade, most: {"exact": "four", "errors": "seventh"}[grade] * most
+        tuning, "flights", lambda grade, most, draw: {"exact": "four", "errors": "seventh"}[grade] * most
     )
     methods = [
         Method(DETECTORS, "x", "exact"), Method(LAWS, "y", "exact"), Method(DETECTORS, "x", "errors"),
         Method(DETECTORS, "z", "errors"),
     ]  # fmt: skip
-    assert tune(methods, 24, 7, 3, 2, print, draw=5) == {
+    how = Search(24, 7, 8, most=3, draw=5)
+    assert tune(methods, how, 2, print) == {
         "procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": 24, "seed": 7,
-        "draw": 5, "flights": {"exact": 12, "errors": 21},
+        "restarts": 8, "draw": 5, "flights": {"exact": 12, "errors": 21},
         "grades": {
             "exact": {"detectors": {"x": {"a": 1.0}}, "laws": {"y": {"a": 2.0}}},
             "errors": {"detectors": {"x": {"a": 3.0}, "z": {"a": 4.0}}},
         },
         "methods": [{"values": {"a": float(n)}, "name": name} for n, name in enumerate("xyxz", 1)],
     }  # fmt: skip
-    assert asked == [(tuning.tune_method, {"trials": 24, "seed": 7, "most": 3, "draw": 5}, 2, print)]
+    assert asked == [(tuning.tune_method, {"how": how}, 2, print)]
 
 
 def test_a_law_is_tuned_by_its_own_cost_and_told_with_its_margins(monkeypatch):
@@ -248,23 +260,24 @@ def test_a_law_is_tuned_by_its_own_cost_and_told_with_its_margins(monkeypatch):
             return [healthy, Margin(50.0, "none", "flap", 7.5 + values["a"], 11.0, 50.0)]
 
     ranges = {"a": Range(0.1, 9.0), "b": Range(0.5, 0.9, "odds")}
-    found = Found({"a": -1.0, "b": 0.7}, 0.5, 0.8, ranges, 31, ("b",))
+    found = Found({"a": -1.0, "b": 0.7}, 0.5, 0.8, ranges, 31, ("b",), 2, True)
     monkeypatch.setattr(tuning, "LawCost", Cost)
     monkeypatch.setattr(tuning, "search", lambda *given: searched.append(given) or found)
     monkeypatch.setattr(Method, "ranges", lambda self: ranges)
     monkeypatch.setattr(Method, "start", lambda self: {"a": 2.0, "b": 0.6})
-    assert tuning.tune_method(Method(LAWS, "lqr", "errors"), 24, 7, 3) == {
+    assert tuning.tune_method(Method(LAWS, "lqr", "errors"), Search(24, 7, 6, most=3)) == {
         "grade": "errors", "kind": "laws", "name": "lqr", "start_cost": 0.8, "cost": 0.5,
         "found": {"a": -1.0, "b": 0.7}, "values": {"a": -1.0, "b": 0.7},
         "ranges": {
             "a": {"low": 0.1, "high": 9.0, "scale": "log"}, "b": {"low": 0.5, "high": 0.9, "scale": "odds"},
         },
-        "widened": ["b"], "trials": 31, "gain_margin_db": 6.5, "phase_margin_deg": 50.0,
+        "widened": ["b"], "trials": 31, "restarts": 2, "settled": True,
+        "gain_margin_db": 6.5, "phase_margin_deg": 50.0,
     }  # fmt: skip
     assert made == [("lqr", "errors", 3, 0)]
     ((cost, *given),) = searched
     assert isinstance(cost, Cost)
-    assert given == [ranges, {"a": 2.0, "b": 0.6}, 24, 7]
+    assert given == [ranges, {"a": 2.0, "b": 0.6}, 24, 7, 6]
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,9 @@
 import json
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from beaver_ftc.diagnosis.rivals import TUNED_FILE
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import (
@@ -24,6 +24,7 @@ from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
 
+TUNING = Path(__file__).parents[3] / "benchmarks" / "tuning.json"  # how the values in tuned.json were found
 Document = dict[str, Any]
 Rows = dict[str, dict[str, Document]]  # set -> scheme or law -> its line
 EXACT = ("published", "envelope", "fault-types", "realism", "healthy")
@@ -64,8 +65,8 @@ GAIN_COLUMNS = (
 
 def benchmark_gains() -> str:
     """By how much the cost of a method falls that is tuned again, on flights of its own: of every search that
-    finds other values, as tuned.json has it."""
-    rows = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["methods"]
+    finds other values, as the record of the searches has it."""
+    rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
     found = [(row, again) for row in rows for again in row["again"] if again.get("gain")]
     last = [row["again"][-1] for row in rows]
     kept = sum(again.get("gain") == 0.0 for again in last)
@@ -165,7 +166,41 @@ def _block(
     body = [(_label(name), *(shown(name, of) for of in rows.values())) for name in next(iter(rows.values()))]
     marked = "" if more is None else f"; bold: a rival's number is better than that of `{ours}`"
     caption = _caption(number, f"{title}; in brackets: faulted flights{marked}")
-    return f"{caption}\n\n{markdown_table(head, body)}"
+    parts = [caption, markdown_table(head, body)]
+    return "\n\n".join(parts if more is None else [*parts, _who_is_better(rows, ours, key, cell, more)])
+
+
+def _who_is_better(rows: Rows, ours: str, key: str, cell: Callable[[Any], str], more: bool) -> str:
+    """The first sentence below a table: the best rival of each set in which one is better than ours."""
+
+    def said(row: Document) -> str:
+        limits = [cell(limit) for limit in _limits(row, key)]
+        return f"{cell(row.get(key))} ({' to '.join(limits)})" if limits else cell(row.get(key))
+
+    found = []
+    for name, of in rows.items():
+        better = [
+            rival for rival in of
+            if rival not in (ours, STATISTICAL, ALONE) and _less(of[ours].get(key), of[rival].get(key), more)
+        ]  # fmt: skip
+        if better:
+            numbers = {rival: of[rival][key] for rival in better}
+            best = (max if more else min)(numbers, key=lambda rival: numbers[rival])
+            found.append(f"`{best}` in `{name}`, {said(of[best])} against {said(of[ours])}")
+    if not found:
+        return f"In no set is a rival better than `{ours}`."
+    rest = "" if len(found) == len(rows) else f" In the other sets no rival is better than `{ours}`."
+    return f"Better than `{ours}` are: {'; '.join(found)}.{rest}"
+
+
+def _limits(row: Document, key: str) -> tuple[Any, ...]:
+    """Lower and upper 95 % limit of a number of a row, if it has them."""
+    if key == "isolation_rate":
+        found = wilson(row["isolated"], row["faults"])
+        return found.low, found.high
+    stem, unit = (key[:-2], "_s") if key.endswith("_s") else (key, "")
+    names = [f"{stem}_{side}{unit}" for side in ("low", "high")]
+    return tuple(row[name] for name in names) if set(names) <= set(row) else ()
 
 
 def _caption(number: int, title: str) -> str:

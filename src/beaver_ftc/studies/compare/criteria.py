@@ -21,19 +21,21 @@ An aircraft that is lost counts `LOST`. A candidate is admissible if
 
 One that is not admissible costs `INADMISSIBLE` and more, the more the further it is from it.
 
-A trial is ended early once it cannot win: of a detector, whose costs only add up, once the sum exceeds the
+A flight of a plug-in ends with a false alarm, after which it costs the most whatever follows. A trial is
+ended early once it cannot win: of a detector, whose costs only add up, once the sum exceeds the
 lowest so far; of a law, once the mean over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest so
 far. Its cost is then the mean up to there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from math import exp, inf, isfinite, isnan, log, sqrt
 from statistics import fmean
 
 from beaver_ftc.documents.errors import BeaverFtcError
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plugins import DETECTORS, LAWS
+from beaver_ftc.results.metrics import Truth
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
@@ -74,10 +76,29 @@ def flights(grade: str, most: int | None, draw: int = 0) -> tuple[SetFlight, ...
     return tuple(case for _, _, case in sorted(placed, key=lambda each: each[:2]))
 
 
+class _FalseAlarm(Exception):
+    """A plug-in has raised an alarm without a fault: nothing that follows changes what its flight costs."""
+
+
+def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
+    plugins, is_false = loop.plugin_frame, Truth.of(loop.scenario).onset.is_false
+
+    def after_frame() -> None:
+        if plugins is not None and plugins.verdict.detected and is_false(float(loop.frames["t"][0])):
+            raise _FalseAlarm
+
+    loop.after_frame = after_frame if plugins is not None else None
+    return lambda: None
+
+
 def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
     """One flight of an entry with these values of its detector or law."""
     scenario = with_values(with_entry(case.scenario, entry), group, values)
-    return result_of(fly(scenario), entry, 0.0)
+    watch = _end_with_false_alarm if group == DETECTORS else None
+    try:
+        return result_of(fly(scenario, watch=watch), entry, 0.0)
+    except _FalseAlarm:
+        return Result(entry, True, 0.0, bool(scenario.faults))
 
 
 class DetectorCost:

@@ -6,6 +6,8 @@ tuned by itself: exact sensors and ideal actuators; actuators that lag; errors o
 tuned is `tunable` in plugins.yaml, or in the class of a plug-in. A method keeps the values that it starts
 with unless the search finds some that cost `LEAST_GAIN` less. Each is tuned again on other draws (gain.py)
 until that gains no more than `LEAST_GAIN`. Both rules are the same for ours and for rivals.
+
+Two files are written: `tuned.json` has the values to fly with, and `tuning.json` how they were found.
 """
 
 import json
@@ -42,7 +44,7 @@ from beaver_ftc.studies.present.tables import aligned
 
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
-NAME = "tuned.json"
+NAME, RECORD = "tuned.json", "tuning.json"
 HEAD = ("grade", "method", "cost at the start", "cost found", "margins dB, deg")
 GAIN_HEAD = ("cost, built in", "cost, retuned", "gain, %", "from, %", "to, %")
 OF_STATISTICAL = {
@@ -92,45 +94,51 @@ def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str
     return [method for method in methods if method.ranges()]
 
 
-def tune(
-    methods: Sequence[Method], trials: int, seed: int, most: int | None, workers: int,
-    progress: Progress | None, draw: int,
-) -> Document:  # fmt: skip
-    """The document of tuned.json. most: flights of each calibration sweep; None is all of them.
+@dataclass(frozen=True)
+class Search:
+    """How to search. trials: of each search. restarts: searches after the first, at most. most: flights of
+    each calibration sweep; None is all of them. draw: of the calibration sets; 0 chooses the values that
+    ship, another number measures the gain over them."""
 
-    draw: of the calibration sets; 0 chooses the values that ship, another number measures the gain over them.
-    """
+    trials: int
+    seed: int
+    restarts: int
+    most: int | None = None
+    draw: int = 0
+
+
+def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progress | None) -> Document:
+    """What both files say: the values of each grade, and a row a method."""
     if not methods:
         raise BadInput("compare --tune: nothing to tune, allowed: methods that declare `tunable`")
-    rows = fly_all(
-        partial(tune_method, trials=trials, seed=seed, most=most, draw=draw), methods, workers, progress
-    )
+    rows = fly_all(partial(tune_method, how=how), methods, workers, progress)
     grades: Document = {}
     for method, row in zip(methods, rows, strict=True):
         of_kind = grades.setdefault(method.grade, {}).setdefault(
             TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group], {}
         )
         of_kind[method.name] = row["values"]
-    counts = {grade: len(flights(grade, most)) for grade in grades}
-    how = {"procedure": PROCEDURE, "trials": trials, "seed": seed, "draw": draw}
-    return how | {"flights": counts, "grades": grades, "methods": rows}
+    counts = {grade: len(flights(grade, how.most, how.draw)) for grade in grades}
+    said = {"procedure": PROCEDURE, **asdict(how), "flights": counts}
+    del said["most"]  # which the numbers of flights say
+    return said | {"grades": grades, "methods": rows}
 
 
-def tune_method(method: Method, trials: int, seed: int, most: int | None, draw: int = 0) -> Document:
+def tune_method(method: Method, how: Search) -> Document:
     """A row: the values chosen, their cost, that of the values at the start, trials, ranges, margins; on a
-    draw that does not choose what ships, the gain."""
+    draw that does not choose what ships, the gain of the values found, small or large."""
     cost = (
-        DetectorCost(method.name, flights(method.grade, most, draw))
+        DetectorCost(method.name, flights(method.grade, how.most, how.draw))
         if method.group == DETECTORS
-        else LawCost(method.name, method.grade, most, draw)
+        else LawCost(method.name, method.grade, how.most, how.draw)
     )
     start = method.start()
-    found = search(cost, method.ranges(), start, trials, seed)
+    found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
     values = found.values if gains else start
     row = {**_row(method, found), "values": values, **_margins(cost, values)}
-    if draw and min(found.cost, found.start_cost) < INADMISSIBLE:
-        row |= gain_of(method.group, method.name, method.grade, (start, values), draw)
+    if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
+        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw)
     return row
 
 
@@ -150,6 +158,8 @@ def _row(method: Method, found: Found) -> Document:
         "ranges": {key: asdict(of) for key, of in found.ranges.items()},
         "widened": list(found.widened),
         "trials": found.trials,
+        "restarts": found.restarts,
+        "settled": found.settled,
     }
 
 
@@ -161,11 +171,12 @@ def _margins(cost: DetectorCost | LawCost, values: Values) -> Document:
 
 
 def write_tuned(document: Document, folder: Path) -> Path:
-    """Write the file that `compare --tuned` reads."""
+    """Write the file that `compare --tuned` reads and, next to it, the record of the search."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / NAME
-    path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    return path
+    record = {key: value for key, value in document.items() if key != "grades"}
+    for name, content in ((RECORD, record), (NAME, {"grades": document["grades"]})):
+        (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return folder / NAME
 
 
 def read_tuned(path: Path) -> Document:
@@ -179,13 +190,23 @@ def read_tuned(path: Path) -> Document:
 
 
 def as_text(document: Document) -> str:
-    """A line a method and grade; then where ranges were widened."""
+    """A line a method and grade; then where ranges were widened, and which searches the budget ended."""
     rows = [[*HEAD, *(GAIN_HEAD if document["draw"] else ()), "values"]]
     rows += [list(_cells(row, document["draw"])) for row in document["methods"]]
-    edges = [(row["name"], row["grade"], row["widened"]) for row in document["methods"] if row["widened"]]
-    widened = [f"{name}, {of}: on the edge of its range, widened: {', '.join(at)}" for name, of, at in edges]
-    head = f"{document['trials']} trials a method and grade, seed {document['seed']}"
-    return "\n".join([head, "", aligned(rows), *widened])
+    said = [sentence for row in document["methods"] for sentence in _remarks(row)]
+    head = f"up to {document['trials']} trials a search, seed {document['seed']}, "
+    head += f"up to {document['restarts']} restarts for each method and grade"
+    return "\n".join([head, "", aligned(rows), *said])
+
+
+def _remarks(row: Document) -> Iterator[str]:
+    who = f"{row['name']}, {row['grade']}"
+    if row["widened"]:
+        yield f"{who}: on the edge of its range, widened: {', '.join(row['widened'])}"
+    if row["cost"] >= row["start_cost"]:
+        yield f"{who}: no better values were found in {row['trials']} trials"
+    if not row["settled"]:
+        yield f"{who}: the budget ended the search; more --restarts may find a lower cost"
 
 
 def _cells(row: Document, draw: int) -> Iterator[str]:

@@ -7,6 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.compare import trial
 
 FLIGHT = SimpleNamespace(frames=2000, scenario=SimpleNamespace(rate_hz=100.0))
@@ -78,3 +79,17 @@ def test_a_flight_that_cannot_be_flown_counts_as_one_of_its_kind(monkeypatch, fa
     assert (found.entry, found.false_alarm, found.fault_free_s, found.error) == (entry, False, 0.0, "no trim")
     assert found.faulted is bool(faults)
     assert (found.delay_s, found.rms_deg_s, found.correct) == (inf, inf, False)
+
+
+# What stands for what, besides the sets of gusts: a constant error of the model covers wrong coefficients.
+COVERED = ("uncertainty.coefficients.", "environment.gust")
+
+
+@pytest.mark.parametrize("name", trial.set_names())
+def test_a_set_has_enough_flights_and_draws_inside_what_it_declares(name):
+    """For the statistical detector as well, which declares how fast the model's error changes."""
+    cases = trial.of_set(name)
+    assert name == "healthy" or sum(bool(case.scenario.faults) for case in cases) >= 36
+    both = trial.Entry(trial.STATISTICAL, trial.LAW)
+    outside = {each.key for case in cases for each in undeclared(trial.with_entry(case.scenario, both))}
+    assert not [key for key in outside if not key.startswith(COVERED)]

@@ -84,12 +84,18 @@ def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
     ]
 
 
+def first_sentences(part: Document) -> list[list[str]]:
+    """Below each table of `sections`: who is better; nothing where no flight has a fault."""
+    return [[part["who_is_better"][which]] if part["who_is_better"] else [] for which in ("schemes", "laws")]
+
+
 def as_text(document: Document) -> str:
     """For a terminal."""
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"{name}: {part['flights']} flights")
-        blocks += [aligned([header, *rows]) + "\n" for header, rows in sections(part)]
+        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+            blocks.append("\n".join([aligned([header, *rows]), *first, ""]))
         blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
         blocks.append("")
     return "\n".join(blocks)
@@ -121,7 +127,9 @@ def write_leaderboard(document: Document, path: Path) -> None:
 def _sets(document: Document) -> Iterator[page.Part]:
     for name, part in document["sets"].items():
         yield page.Heading(f"{name}: {part['flights']} flights")
-        yield from (page.Table(header, rows) for header, rows in sections(part))
+        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+            yield page.Table(header, rows)
+            yield from first
         losses = [f"{sentence}." for sentence in part["better_than_ours"]]
         nothing = "nothing here: in these tables no rival has a better number than ours, us/frame aside."
         yield page.Bullets("What loses:", losses or [nothing])

@@ -2,7 +2,7 @@
 what tables, figure, page and `--format json` are made from.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import inf
 from operator import itemgetter
 from statistics import median
@@ -15,16 +15,22 @@ from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
+    Estimate,
     poisson_bound,
     quantile_bound,
     share_within,
+    sign_test,
+    wilson,
     wilson_bound,
 )
 from beaver_ftc.studies.present.tables import finite
 
 
-def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -> Document:
-    """Tally one entry over one set; oracle: the yardstick's results of the same flights, in the same order.
+def line_of(
+    entry: Entry, results: Sequence[Result], oracle: Sequence[Result], ours: Sequence[Result] = ()
+) -> Document:
+    """Tally one entry over one set; oracle, ours: results of the yardstick, and of our entry if there are
+    any, in the same flights, in the same order.
 
     What never comes is infinite; None where there was nothing to count.
     """
@@ -46,6 +52,7 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         "faults": n,
         "detection_rate": detected / n if n else None,
         "detection_rate_lower": wilson_bound(detected, n, CONFIDENCE, upper=False) if n else None,
+        **(_between("detection_rate", wilson(detected, n)) if n else {}),
         "delay_median_s": share_within([r.delay_s for r in faulted], 0.5),
         "delay_90_s": share_within([r.delay_s for r in faulted], 0.9),
         "isolation_rate": sum(r.correct for r in faulted) / n if n else None,
@@ -61,7 +68,25 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         **_spread("after", [r.after_deg_s for r in faulted]),
         **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
         **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
+        "against_ours": _duel(entry, results, ours),
     }
+
+
+def _between(name: str, found: Estimate) -> Document:
+    return {f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _duel(entry: Entry, mine: Sequence[Result], ours: Sequence[Result]) -> Document:
+    """In how many flights with a fault an entry is better or worse than ours, and the probability of so
+    uneven a result between equals. Of schemes: whether the fault is detected; of laws: the tracking error."""
+
+    def badness(result: Result) -> float:
+        return result.rms_deg_s if entry.law != LAW else float(result.delay_s == inf)
+
+    both = zip(mine, ours, strict=bool(ours))
+    pairs = [(badness(a), badness(b)) for a, b in both if a.faulted and b.faulted]
+    better, worse = sum(a < b for a, b in pairs), sum(a > b for a, b in pairs)
+    return {"better": better, "worse": worse, "p": sign_test(better, worse)}
 
 
 def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:
@@ -81,8 +106,8 @@ def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:
 
 def lines_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> list[Document]:
     """One line an entry, in their order."""
-    yardstick = _results(trials, Entry(SCHEME, ORACLE))
-    return [line_of(entry, _results(trials, entry), yardstick) for entry in entries]
+    yardstick, ours = (_results(trials, Entry(SCHEME, law)) for law in (ORACLE, LAW))
+    return [line_of(entry, _results(trials, entry), yardstick, ours) for entry in entries]
 
 
 def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
@@ -136,6 +161,7 @@ EFFORT = {
     "energy_median": "median energy of the surfaces, deg2/s2",
 }
 MORE_IS_BETTER = ("detection_rate", "isolation_rate")
+SIGNIFICANT = 0.05
 
 
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
@@ -157,6 +183,7 @@ def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
         "lines": lines,
         "trade_off": {s: [_finite(point) for point in of] for s, of in points.items()},
         "without_false_alarm": free,
+        "who_is_better": who_is_better(lines),
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
@@ -164,6 +191,67 @@ def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 
 def _finite(document: Document) -> Document:
     return {key: finite(value) for key, value in document.items()}
+
+
+YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")  # and parts of ours
+
+
+def who_is_better(lines: Sequence[Document]) -> Document:
+    """A sentence on the schemes, and one on the laws: who is best, with intervals, and how sure that is."""
+    if not any(row["faults"] for row in lines):
+        return {}
+    schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in YARDSTICKS}
+    laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in YARDSTICKS}
+    return {
+        "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more=True),
+        "laws": leader(laws, LAW, "ratio_median", "Tracking error over the oracle's, median", _ratio, False),
+    }
+
+
+def leader(
+    rows: Mapping[str, Document], ours: str, key: str, what: str, cell: Callable[[float], str], more: bool
+) -> str:
+    """One sentence: who has the best number of this key, with its interval, and ours with its own.
+
+    rows: by name, each with `against_ours`: how often it is better and worse than ours, and how likely that
+    is between equals.
+    """
+    sign = -1.0 if more else 1.0
+
+    def badness(name: str) -> float:
+        value = rows[name].get(key)
+        return inf if value is None else sign * value
+
+    def said(name: str) -> str:
+        value, low, high = (rows[name].get(key + end) for end in ("", "_low", "_high"))
+        shown = "none" if value is None else cell(value)
+        limits = [("no limit" if limit is None else cell(limit)) for limit in (low, high)]
+        return f"{name} {shown} ({' to '.join(limits)})"
+
+    rivals = [name for name in rows if name != ours and not name.startswith(ours)]
+    if not rivals:
+        return f"{what}: {said(ours)}."
+    best = min(rivals, key=badness)
+    if badness(best) == badness(ours):
+        alike = [name for name in rivals if badness(name) == badness(ours)]
+        return f"{what}: {ours} and {', '.join(alike)} are equally good: {said(ours)}."
+    first, second = (best, ours) if badness(best) < badness(ours) else (ours, best)
+    duel = rows[best]["against_ours"]
+    wins, losses = (duel["better"], duel["worse"]) if first == best else (duel["worse"], duel["better"])
+    sure = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
+    return (
+        f"{what}: {said(first)} is better than {said(second)}; wins: {wins} against {losses}, "
+        f"p = {duel['p']:.2g}{sure}."
+    )
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100 * share:.0f} %"
+
+
+def _ratio(ratio: float) -> str:
+    return f"{ratio:.2f}"
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:

@@ -1,5 +1,6 @@
 """What a detector or a law is told before a flight: the frame, the design model, the trim, the bounds."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -26,6 +27,8 @@ class DeclaredErrors:
     - `noise`, `bias`, `resolution`, `slope` (7,): errors of the instruments for p, q, r (rad/s), angle of
       attack, sideslip (rad), airspeed (m/s) and dynamic pressure (Pa). `noise` is the standard deviation of a
       sample. `slope` is the relative error of the scale factor, without unit.
+    - `further_noise`, `further_bias`, `further_resolution`, `further_slope` (7,): the same of the instruments
+      for the attitude (rad, three angles), the accelerations (m/s², three axes) and the altitude (m).
     - `gust_rad_s`, `gust_time_s` (3,): standard deviation, rad/s, and correlation time, s, of the rotation of
       the air about each axis.
     - `gust_effect` (3, 3) 1/s: angular acceleration for each rad/s of this rotation.
@@ -42,6 +45,10 @@ class DeclaredErrors:
     bias: np.ndarray = field(default_factory=_ZEROS[7])
     resolution: np.ndarray = field(default_factory=_ZEROS[7])
     slope: np.ndarray = field(default_factory=_ZEROS[7])
+    further_noise: np.ndarray = field(default_factory=_ZEROS[7])
+    further_bias: np.ndarray = field(default_factory=_ZEROS[7])
+    further_resolution: np.ndarray = field(default_factory=_ZEROS[7])
+    further_slope: np.ndarray = field(default_factory=_ZEROS[7])
     gust_rad_s: np.ndarray = field(default_factory=_ZEROS[3])
     gust_time_s: np.ndarray = field(default_factory=_ZEROS[3])
     gust_effect: np.ndarray = field(default_factory=_ZEROS[3, 3])
@@ -110,7 +117,6 @@ class Context:
     - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.
     - `constant_rad_s2` (3,) rad/s²: declared bound on the constant error of the angular acceleration.
       `inertia_coupling` (3,): declared bound on the relative error of the inertia coupling.
-    - `seed`: seed of the scenario.
     - `options`: the mapping `fdi.options` for a detector, `control.options` for a law.
     - `surfaces`: names of the surfaces.
     - `leading`: indices of the main surfaces of roll, pitch and yaw. `leaders` contains their names.
@@ -126,11 +132,16 @@ class Context:
     travel_rad: np.ndarray
     constant_rad_s2: np.ndarray
     inertia_coupling: np.ndarray
-    seed: int = 0
     options: Mapping[str, float] = field(default_factory=dict)
     surfaces: tuple[str, ...] = field(default_factory=lambda: load().surfaces)
     leading: tuple[int, int, int] = (0, 1, 2)
     declared: DeclaredErrors = field(default_factory=DeclaredErrors)
+
+    @property
+    def seed(self) -> int:
+        """A former field, always 0 now: the noise of the instruments follows from the seed of a scenario."""
+        warnings.warn("Context.seed is always 0, and will be removed", DeprecationWarning, stacklevel=2)
+        return 0
 
     @property
     def leaders(self) -> tuple[str, ...]:

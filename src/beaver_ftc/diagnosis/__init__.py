@@ -35,6 +35,10 @@ else:
     __getattr__, __dir__ = lazily(__name__)
 
 
+_UNREAD = np.full(3, nan)
+_UNREAD.flags.writeable = False
+
+
 class Measured(NamedTuple):
     """The measurements of one frame. Each array is a copy, so you can keep it.
 
@@ -49,6 +53,13 @@ class Measured(NamedTuple):
       the previous frame, the innovation is (x - x_before) / dt - acceleration.
     - `contribution` (3, surfaces) rad/s²: the part G u of each commanded surface.
     - `eta_bar` (3,) rad/s²: declared bound on the error of `acceleration`.
+
+    The last three fields are readings at `t_s`. They are NaN if no such instrument is read, as in some
+    recorded flights.
+
+    - `attitude` (3,) rad: roll, pitch and yaw angle.
+    - `force` (3,) m/s²: accelerometers, in body axes: all forces but gravity, over the mass.
+    - `altitude_m`: altitude above sea level, m.
     """
 
     t_s: float
@@ -57,6 +68,9 @@ class Measured(NamedTuple):
     acceleration: np.ndarray
     contribution: np.ndarray
     eta_bar: np.ndarray
+    attitude: np.ndarray = _UNREAD
+    force: np.ndarray = _UNREAD
+    altitude_m: float = nan
 
 
 class Verdict(NamedTuple):

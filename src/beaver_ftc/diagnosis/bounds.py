@@ -66,6 +66,7 @@ from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
 if TYPE_CHECKING:
     from beaver_ftc.design.context import DeclaredErrors
 
+_FURTHER_READINGS = ("phi", "theta", "psi", "ax", "ay", "az", "altitude")  # of a plug-in, after SIGNALS
 _FIRST_AIR_DATA_SIGNAL_INDEX = (
     3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 )
@@ -891,6 +892,10 @@ def declared_errors_for_plugin(
         bias=reading_bias,
         resolution=reading_resolution,
         slope=sensor_errors.each("slope"),
+        **{
+            f"further_{name}": sensor_errors.each("steady" if name == "bias" else name, _FURTHER_READINGS)
+            for name in ("noise", "bias", "resolution", "slope")
+        },
         gust_rad_s=gust_rotation_std_rad_s,
         gust_time_s=gust_correlation_time_s,
         gust_effect=acceleration_per_air_rotation(DesignFunctions(design.copy()), y),

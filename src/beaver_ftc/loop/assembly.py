@@ -298,6 +298,11 @@ def y_places(frame: np.void) -> list[int]:
     return ch.signal_places(frame["prediction"]["u"].size, int(frame["truth"]["declared"]))
 
 
+def reads_accelerometers(frame: np.void) -> bool:
+    """Whether accelerometers are read in this flight: their channels stand after all others."""
+    return bool(frame["truth"]["n"] > y_places(frame)[-1] + 1)
+
+
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])

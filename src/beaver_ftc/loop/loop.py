@@ -228,7 +228,10 @@ class Loop:
             detector = named_detector(self.scenario)
         if law is None:
             law = named_law(self.frames, self.scenario, self.trimmed)
-        return plugged(self.frames, self.scenario, self.trimmed, detector, law)
+        plugins = plugged(self.frames, self.scenario, self.trimmed, detector, law)
+        if plugins is not None:
+            self.read_more()  # plug-ins are given what there is
+        return plugins
 
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""

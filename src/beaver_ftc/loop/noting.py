@@ -23,19 +23,21 @@ def fly_and_note(frames, references, log, notes):
     """
     frame = frames[0]
     row = row_of(notes, frame.k)
-    at = put(row, 0, frame.fdi.statistical.gust.output.angular_acceleration_by_gust)  # of the elapsed frame
     status = whole.begin(frame)
     if status == NOT_FINITE:
         return status
-    row[at] = frame.t
-    at = put(row, at + 1, frame.measured.x)
+    row[0] = frame.t
+    at = put(row, 1, frame.measured.x)
     for i in range(4 + frame.truth.declared):
         row[at + i] = frame.measured.y[i]
     means = frame.prediction.frame_means
     at = put(row, at + 4 + frame.truth.declared, means.predicted_acceleration)
     for axis in range(3):
         at = put(row, at, means.Gu[axis])
-    at = put(row, put(row, at, frame.fdi.bound.eta_bar), frame.prediction.u)
+    at = put(row, put(row, at, frame.fdi.bound.eta_bar), frame.measured.attitude)
+    at = put(row, at, frame.measured.force)
+    row[at] = frame.measured.altitude
+    at = put(row, at + 1, frame.prediction.u)
     whole.diagnose(frame)
     whole.decide(frame)
     whole.command(frame)
@@ -58,14 +60,13 @@ def put(row, at, values):
 class Notes:
     """The notes of a flight as arrays, a row a frame flown; units as in `Measured`.
 
-    gust (frames, 3) rad/s2: what the vanes' view of the air explains of each elapsed frame. inside (frames,):
-    whether the flight is inside the aircraft's map of the model's error; error (frames, 3) rad/s2: the bound
-    that the map gives there. statistic (frames,): of the built-in detection.
+    inside (frames,): whether the flight is inside the aircraft's map of the model's error; error (frames, 3)
+    rad/s2: the bound that the map gives there. statistic (frames,): of the built-in detection.
     """
 
     def __init__(self, loop: Loop) -> None:
         self._n, self._signals = len(loop.aircraft.surfaces), len(y_places(loop.frames[0]))
-        widths = (3, 1, 3, self._signals, 3, 3 * self._n, 3, self._n, 3, 1, 1)
+        widths = (1, 3, self._signals, 3, 3 * self._n, 3, 3, 3, 1, self._n, 3, 1, 1)
         self._ends = np.cumsum(widths)[:-1]
         self._rows, self._frames = np.zeros((loop.n_frames, sum(widths))), loop.frames
         compiled = direct(fly_and_note, loop.frames, loop.references, loop.log, self._rows)
@@ -74,10 +75,11 @@ class Notes:
     def read(self) -> None:
         """Read the rows of the frames flown."""
         rows = self._rows[: int(self._frames["k"][0])]
-        self.gust, t, x, y, model, Gu, eta_bar, u, self.error, inside, statistic = np.split(
-            rows, self._ends, axis=1
-        )
+        (
+            t, x, y, model, Gu, eta_bar, attitude, force, altitude, u, self.error, inside, statistic,
+        ) = np.split(rows, self._ends, axis=1)  # fmt: skip
         self.inside, self.statistic = inside[:, 0] > 0.0, statistic[:, 0]
         Gu = Gu.reshape(-1, 3, self._n)
-        shown = zip(t[:, 0].tolist(), x, y, model, Gu, eta_bar, strict=True)
+        times, altitudes = t[:, 0].tolist(), altitude[:, 0].tolist()
+        shown = zip(times, x, y, model, Gu, eta_bar, attitude, force, altitudes, strict=True)
         self.seen = list(zip(map(Measured._make, shown), u, strict=True))

@@ -7,7 +7,7 @@ taken by `diagnose` (adaptive_estimators.PYTHON_PLUGIN).
 """
 
 from collections.abc import Callable, Mapping
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CAS
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
-from beaver_ftc.loop.assembly import Trim, y_places
+from beaver_ftc.loop.assembly import Trim, reads_accelerometers, y_places
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
@@ -189,6 +189,9 @@ def measured_of(frame: np.void) -> Measured:
         frame["prediction"]["frame_means"]["predicted_acceleration"].copy(),
         frame["prediction"]["frame_means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),
+        frame["measured"]["attitude"].copy(),
+        frame["measured"]["force"].copy() if reads_accelerometers(frame) else np.full(3, nan),
+        float(frame["measured"]["altitude"]),
     )
 
 
@@ -209,7 +212,6 @@ def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapp
         travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=constant,
         inertia_coupling=bound["inertia_coupling_error_share"].copy(),
-        seed=scenario.seed,
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),

@@ -131,10 +131,10 @@ class SubmittedCode:
         return self
 
     def reset(self, context: Context) -> None:
-        """Start it with what a plug-in may know, but for the seed and options."""
+        """Start it with what a plug-in is given; the design model is asked on this line."""
         self._model, self.surfaces = context.model, context.surfaces
         self._sizes = context.trim_y.size, len(context.surfaces)
-        self._start(replace(context, model=None, seed=0, options={}))  # type: ignore[arg-type]
+        self._start(replace(context, model=None))  # type: ignore[arg-type]
         self._answer(pilot.BEGUN, 0, LOAD_S)
 
     def _start(self, context: Context | None) -> None:
@@ -298,7 +298,8 @@ class SubmittedCode:
 
 def _shown(measured: Measured) -> list[np.ndarray]:
     return [np.array([measured.t_s]), measured.x, measured.y, measured.acceleration,
-            measured.contribution.ravel(), measured.eta_bar]  # fmt: skip
+            measured.contribution.ravel(), measured.eta_bar, measured.attitude, measured.force,
+            np.array([measured.altitude_m])]  # fmt: skip
 
 
 def _finite(numbers: np.ndarray, what: str) -> np.ndarray:

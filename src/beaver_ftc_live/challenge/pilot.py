@@ -127,8 +127,15 @@ def _split(numbers: np.ndarray, *sizes: int) -> list[np.ndarray]:
 def frame_of(numbers: np.ndarray, y: int, surfaces: tuple[str, ...]) -> tuple[Measured, list[np.ndarray]]:
     """What is measured, and what a frame says besides."""
     n = len(surfaces)
-    t, x, of_y, acceleration, contribution, eta_bar, *rest = _split(numbers, 1, 3, y, 3, 3 * n, 3)
-    return Measured(float(t[0]), x, of_y, acceleration, contribution.reshape(3, n), eta_bar), rest
+    sizes = 1, 3, y, 3, 3 * n, 3, 3, 3, 1
+    t, x, of_y, acceleration, contribution, eta_bar, attitude, force, altitude, *rest = _split(
+        numbers, *sizes
+    )
+    measured = Measured(
+        float(t[0]), x, of_y, acceleration, contribution.reshape(3, n), eta_bar, attitude, force,
+        float(altitude[0]),
+    )  # fmt: skip
+    return measured, rest
 
 
 def law_given(numbers: np.ndarray, surfaces: tuple[str, ...]) -> tuple[Reference, Verdict]:

@@ -9,7 +9,6 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare.replay import (
     Recorder,
     Trace,
-    aware_of_the_air,
     record,
     replay,
     replay_together,
@@ -72,51 +71,6 @@ def test_the_statistical_detector_alarms_on_the_recording_as_in_flight():
     seen = replay(record(scenario(**keys)), "adaptive-estimators")
     assert seen.delay_s() == pytest.approx(flown.detection_time_s - 6.0)
     assert not seen.false_alarm(1.0)
-
-
-@pytest.fixture(scope="module")
-def airborne():
-    """A flight in light turbulence with exact instruments and a perfect model; the vanes see the air."""
-    return record(
-        scenario(
-            duration_s=30,
-            uncertainty={},
-            environment={"turbulence": "dryden", "severity": "light"},
-            fdi={"statistical": {}, "bounds": {"turbulence": "light"}},
-        )
-    )
-
-
-def unexplained(recording):
-    """Acceleration that a detector cannot explain, RMS per axis after two seconds."""
-    x = np.array([measured.x for measured, _ in recording.seen])
-    believed = np.array([measured.acceleration for measured, _ in recording.seen])
-    return np.sqrt(np.mean((np.diff(x, axis=0) / 0.01 - believed[1:])[200:] ** 2, axis=0))
-
-
-def test_with_the_vanes_what_is_left_unexplained_is_what_is_declared_of_it(airborne):
-    aware = aware_of_the_air(airborne)
-    declared = aware.context.declared
-    assert unexplained(aware)[1] < 0.2 * unexplained(airborne)[1]
-    assert unexplained(aware)[[0, 2]] == pytest.approx(declared.turbulence_rad_s2[[0, 2]], rel=0.3)
-    assert unexplained(aware)[1] <= 1.2 * declared.turbulence_rad_s2[1]
-    assert declared.gust_rad_s[0] == airborne.context.declared.gust_rad_s[0]
-    assert np.array_equal(aware.context.declared.gust_time_s, airborne.context.declared.gust_time_s)
-
-
-def test_noise_of_the_vanes_is_told_as_well():
-    vanes = {name: {"noise_std_deg": 0.5} for name in ("alpha", "beta")}
-    noisy = record(
-        scenario(
-            duration_s=10,
-            uncertainty={},
-            sensors=vanes,
-            fdi={"statistical": {}, "bounds": {"sensors": vanes, "turbulence": "light"}},
-        )
-    )
-    seen = np.std(noisy.air[200:], axis=0)
-    assert seen[1] > 0.01
-    assert aware_of_the_air(noisy).context.declared.model_rad_s2[1] > 0.5 * seen[1]
 
 
 def test_the_recording_changes_nothing(recorded):

@@ -13,7 +13,8 @@ def alarms(low, value, high, hours=0.5):
 
 
 def total(scheme, flights=4, median_s=0.25, **changes):
-    within = {f"{within_s:g}": {"value": 0.5 + 0.1 * i} for i, within_s in enumerate(WITHIN_S)}
+    rates = {f"{within_s:g}": 0.5 + 0.1 * i for i, within_s in enumerate(WITHIN_S)}
+    within = {soon: {"value": rate, "low": rate - 0.2, "high": rate + 0.1} for soon, rate in rates.items()}
     found = {"flights": flights, "within": within, "median_delay_s": median_s}
     return {**AT, "scheme": scheme, "surface": "rudder", **found, **changes}
 
@@ -25,7 +26,7 @@ def document():
     return {
         "grid": {
             "conditions": [("perfect", "none")], "surfaces": ["rudder"], "magnitudes": [0.05, 0.3],
-            "excitations_deg_s": [2, 8], "vanes": True,
+            "excitations_deg_s": [2, 8],
         },
         "levels": [
             {**level, "scheme": "statistical", "calibration": alarms(1.0, 7.0, 20.0)},
@@ -53,9 +54,8 @@ def test_every_line_says_what_the_survey_found(document):
     assert "losses of 5, 30 % detected" in text
     assert "references of 2, 8 deg/s" in text
     assert "at most 3.6 per hour, on the same 0.40 h" in text
-    assert "as the statistical scheme sees it by the vanes" in text
+    assert "every reading that the statistical scheme uses" in text
     assert text.endswith("could not be judged: other: broke")
-    assert "have the rates alone" in as_text({**document, "grid": {**document["grid"], "vanes": False}})
 
 
 def test_by_chance_as_many_are_detected_as_alarms_fall_into_the_time(document):
@@ -65,6 +65,24 @@ def test_by_chance_as_many_are_detected_as_alarms_fall_into_the_time(document):
     assert float(percent) == pytest.approx(0.1 * float(seconds.split()[0]), abs=0.051)
 
 
+@pytest.mark.parametrize(("p", "chance"), [(0.0002, ""), (0.3, ", so this may be chance")])
+def test_below_a_table_it_is_said_who_is_better(document, p, chance):
+    """Of each surface, with intervals; the built-in detectors alone are no rivals."""
+    soon = total("both")["within"] | {"5": {"value": 0.4, "low": 0.3, "high": 0.5}}
+    duel = {**AT, "ours": "both", "against": "other", "surface": "rudder", "within_s": 5.0, "verdict": "x"}
+    duel |= {"seeds_ours": 1, "seeds_theirs": 13, "p": p}
+    document["totals"] += [{**total("both"), "within": soon}]
+    document["comparison"] = [duel, {**duel, "within_s": 1.0, "seeds_theirs": 0}]
+    lines = as_text(document).splitlines()
+    (said,) = [line for line in lines if line.startswith("rudder, found within 5 s: ")]
+    best = total("other")["within"]["5"]
+    share = f"other {100 * best['value']:.0f} % ({100 * best['low']:.0f} % to {100 * best['high']:.0f} %)"
+    assert said.endswith(
+        f": {share} is better than both 40 % (30 % to 50 %); wins: 13 against 1, p = {p:.2g}{chance}."
+    )
+    assert lines.index(said) < next(i for i, line in enumerate(lines) if line.startswith("per surface: "))
+
+
 def test_nothing_flown_has_no_shares():
     assert shares(total("x", flights=0)) == "-"
     assert title_of("tactical-grade", "light") == "tactical-grade sensors, light turbulence"
@@ -72,6 +90,7 @@ def test_nothing_flown_has_no_shares():
 
 def test_where_one_is_better_than_another_is_said_by_condition():
     duel = {**AT, "ours": "statistical", "against": "other", "surface": "rudder", "verdict": "better"}
+    duel["within_s"] = 5.0
     duels = [
         duel,
         {**duel, "surface": "elevator"},
@@ -79,6 +98,11 @@ def test_where_one_is_better_than_another_is_said_by_condition():
         {**duel, "verdict": "even", "turbulence": "light"},
     ]
     worse, better, counts = comparison({"comparison": duels})
-    assert worse == "statistical is worse than third: rudder with perfect sensors, light turbulence"
-    assert better == "statistical is better than other: rudder, elevator with perfect sensors, still air"
+    assert (
+        worse == "statistical is worse than third within 5 s: rudder with perfect sensors, light turbulence"
+    )
+    assert (
+        better
+        == "statistical is better than other within 5 s: rudder, elevator with perfect sensors, still air"
+    )
     assert "4 comparisons: better in 2, worse in 1, no difference" in counts

@@ -249,17 +249,6 @@ class TestSurvey:
         assert run_power(folder.parent, SMALL, contenders(["observer-constant"])) == document
         assert {path.name: path.read_bytes() for path in (folder / "figures").iterdir()} == pictures
 
-    def test_without_the_vanes_plug_ins_are_shown_the_rates_alone_and_ours_as_before(self):
-        grid = replace(SMALL, magnitudes=(1.0,), surfaces=("elevator",))
-        with_vanes, without = (
-            fly_block((grid.faulted()[-1], True), replace(grid, vanes=vanes), contenders(["augmented-ekf"]))
-            for vanes in (True, False)
-        )
-        for scheme in BUILT_IN:
-            assert with_vanes.traces[scheme] == without.traces[scheme]
-        assert with_vanes.traces["augmented-ekf"] != without.traces["augmented-ekf"]
-        assert with_vanes.deflections[0][1] > 1.5 * without.deflections[0][1]
-
     def test_a_bout_flown_alone_gives_the_same(self, survey):
         document, folder = survey
         block = SMALL.faulted()[-1]

@@ -15,7 +15,8 @@ from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
 from beaver_ftc.studies.decay.survey import TOGETHER, run_decay
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.power.shown import run_power
+from beaver_ftc.studies.power.probabilities import DUELS_S
+from beaver_ftc.studies.power.shown import run_power, who_is_better
 from beaver_ftc.studies.power.survey import GRIDS, contenders
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.one_flight import fly_one
@@ -138,9 +139,22 @@ def _power_of(document: Document) -> str:
     """At the same rate of false alarms for all; `both` at its default level as well."""
     return "\n\n".join(
         (
-            *(f"{title}\n\n{_power_within(document, soon)}" for soon, title in SOON.items()),
-            _duels(document["comparison"]),
+            *(
+                f"{title}\n\n{_power_within(document, soon)}\n\n{_best(document, soon)}"
+                for soon, title in SOON.items()
+            ),
+            *(_duels(document["comparison"], within_s) for within_s in DUELS_S),
         )
+    )
+
+
+def _best(document: Document, soon: str) -> str:
+    """Who finds most, a line an air and a surface."""
+    sensors = document["grid"]["conditions"][0][0]
+    return "\n".join(
+        f"- {air.capitalize()} air, {sentence}"
+        for turbulence, air in AIRS.items()
+        for sentence in who_is_better(document, sensors, turbulence, float(soon))
     )
 
 
@@ -163,16 +177,17 @@ def _power_within(document: Document, soon: str) -> str:
     return markdown_table(head, [*rows, own, informed])
 
 
-def _duels(comparison: list[Document]) -> str:
-    """How often our two detectors together find more, or less, of the same faults within a second."""
-    verdicts = [duel["verdict"] for duel in comparison if duel["ours"] == "both"]
+def _duels(comparison: list[Document], within_s: float) -> str:
+    """How often our two detectors together find more, or less, of the same faults so soon."""
+    place = {"ours": "both", "within_s": within_s}
+    verdicts = [duel["verdict"] for duel in comparison if place.items() <= duel.items()]
     better, worse = (verdicts.count(verdict) for verdict in ("better", "worse"))
     rest = len(verdicts) - better - worse
     return (
         "The scheme *both* was compared with each rival, for each surface and each kind of air. The "
-        f"comparison counts the faults found within 1 s. In {better} of these {len(verdicts)} comparisons "
-        f"*both* finds significantly more faults, and in {worse} significantly fewer. In the other {rest} "
-        "the difference is not significant."
+        f"comparison counts the faults found within {within_s:g} s. In {better} of these {len(verdicts)} "
+        f"comparisons *both* finds significantly more faults, and in {worse} significantly fewer. In the "
+        f"other {rest} the difference is not significant."
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
+from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.diagnosis.rivals.kalman import (
     TurbulenceModel,
     sigma_points,
@@ -45,7 +46,8 @@ class EffectivenessFilter:
 
     def reset(self, context: Context) -> None:
         """Start healthy, with theta known to a tenth."""
-        self.context, self.options = context, rival_options(self.name, self.defaults, context)
+        self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
+        self.context = context = self.vane_gust.context
         self.leading_surface_indices = list(context.leading)
         self.turbulence_model = TurbulenceModel(context)
         self.n_states = N_STATES_WITHOUT_GUSTS + self.turbulence_model.n_states
@@ -61,6 +63,7 @@ class EffectivenessFilter:
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Predict over the elapsed frame, update with the measured rates, decide."""
+        measured = self.vane_gust.subtracted(measured)
         if self.is_first_frame:
             self.is_first_frame = False
             self.z[:3] = measured.x
@@ -208,11 +211,11 @@ class AugmentedUkf(EffectivenessFilter):
         """Each sigma point a frame later; f differs between points by its change from the measured state."""
         dt, f = self.context.dt_s, self.context.model.f
         propagated_points = state_points.copy()
-        f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
+        rates = np.concatenate((state_points[:, :3], measured.x[None]))
+        f_at_rates = f(rates, measured.y)
+        f_change_from_measured = f_at_rates[:-1] - f_at_rates[-1]
         contribution = measured.contribution[:, self.leading_surface_indices]
-        acceleration_changes_from_loss = np.array(
-            [contribution @ point[3:N_STATES_WITHOUT_GUSTS] for point in state_points]
-        )
+        acceleration_changes_from_loss = state_points[:, 3:N_STATES_WITHOUT_GUSTS] @ contribution.T
         propagated_points[:, :3] += dt * (
             measured.acceleration + f_change_from_measured + acceleration_changes_from_loss
         )

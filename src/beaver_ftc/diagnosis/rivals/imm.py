@@ -13,6 +13,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
+from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.diagnosis.rivals.kalman import (
     TurbulenceModel,
     log_likelihood,
@@ -76,7 +77,8 @@ class InteractingMultipleModels:
 
     def reset(self, context: Context) -> None:
         """Healthy, almost certainly."""
-        self.context, self.options = context, rival_options(self.name, self.defaults, context)
+        self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
+        self.context = context = self.vane_gust.context
         self.dt = context.dt_s
         self.transition_probabilities = transition_matrix(self.options["stay"], N_MODES)
         self.mode_probabilities = np.full(N_MODES, _MIN_MODE_PROBABILITY)
@@ -102,6 +104,7 @@ class InteractingMultipleModels:
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Mix, filter, weigh, decide."""
+        measured = self.vane_gust.subtracted(measured)
         if self.is_first_frame:
             self.is_first_frame, self.x[:, :3] = False, measured.x
             return Verdict(statistic=0.0)

@@ -22,6 +22,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
+from beaver_ftc.diagnosis.rivals.gust import VaneGust
 
 
 class FadingSurfaceFits:
@@ -95,7 +96,8 @@ class ConstantThresholdObserver:
 
     def reset(self, context: Context) -> None:
         """No residual."""
-        self.options = rival_options(self.name, self.defaults, context)
+        self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
+        context = self.vane_gust.context
         self.leading_surface_indices, self.leaders = list(context.leading), context.leaders
         pole_per_s = self.options["pole_per_s"]
         self.dt_s, self.decay_factor = context.dt_s, exp(-pole_per_s * context.dt_s)
@@ -115,6 +117,7 @@ class ConstantThresholdObserver:
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Filter the innovation, compare, and from the alarm on ask whose effect it is."""
+        measured = self.vane_gust.subtracted(measured)
         if self.previous_rates is not None:
             rate_innovation = measured.x - self.previous_rates - self.dt_s * measured.acceleration
             self.eps = self.decay_factor * self.eps + rate_innovation

@@ -14,10 +14,10 @@ from time import process_time
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis import Detector, Measured, Verdict, informed_test
+from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.noting import Notes
-from beaver_ftc.loop.readout import FrameReadout, switch_statistical_tests
+from beaver_ftc.loop.readout import switch_statistical_tests
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
@@ -80,9 +80,7 @@ class Recording:
     """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
 
     known (frames,): whether the flight is inside the aircraft's map of the model's error; error (frames, 3)
-    rad/s2: the bound that the map gives there. With `fdi.statistical`,
-    where the aircraft's forces are known: air (frames, 3) rad/s2, what the vanes' view of the air explains of
-    each elapsed frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
+    rad/s2: the bound that the map gives there.
     """
 
     context: Context
@@ -91,8 +89,6 @@ class Recording:
     onset: Onset
     known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     error: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    air: np.ndarray | None = None
-    air_noise: np.ndarray | None = None
 
     @property
     def fault_at_s(self) -> float:
@@ -106,36 +102,15 @@ def record(scenario: Scenario) -> Recording:
     recorder = Recorder()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
     try:
-        statistical = scenario.fdi.statistical is not None
-        switch_statistical_tests(loop.frames[0], statistical)
+        switch_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
         notes = Notes(loop)
         for _ in loop.chunks():
             pass
         notes.read()
         onset = Truth.of(scenario).onset
-        recording = Recording(recorder.context, notes.seen, notes.statistic, onset, notes.inside, notes.error)
-        diagnosis = FrameReadout(loop.frames[0]).diagnosis
-        if statistical and diagnosis.gust.subtracts_measured_gust:
-            recording.air = notes.gust
-            recording.air_noise = np.sqrt(diagnosis.acceleration_variance_from_input_noise)
+        return Recording(recorder.context, notes.seen, notes.statistic, onset, notes.inside, notes.error)
     finally:
         loop.release()
-    return recording
-
-
-def aware_of_the_air(recording: Recording) -> Recording:
-    """The flight as shown to a detector that uses the vanes' view of the air as the built-in one does.
-
-    What is seen of the air is part of `acceleration`, what is not is what is declared of it.
-    """
-    assert recording.air is not None
-    assert recording.air_noise is not None
-    seen = [
-        (measured._replace(acceleration=measured.acceleration + air), command)
-        for (measured, command), air in zip(recording.seen, recording.air, strict=True)
-    ]
-    context = informed_test.context_with_measured_gust(recording.context, recording.air_noise)
-    return replace(recording, context=context, seen=seen)
 
 
 def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:

@@ -129,6 +129,7 @@ PLACE = ("sensors", "turbulence", "surface")
 CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
 SIGNIFICANT = 0.05
 JUDGED_S = 1.0
+DUELS_S = (JUDGED_S, WATCHED_S)
 
 
 def document_of(
@@ -213,23 +214,26 @@ def _lines(
 
 
 def _comparison(rows: Sequence[Row]) -> list[Document]:
-    """Our schemes against every other on the same flights, by how many faults each finds within JUDGED_S.
+    """Our schemes against every other on the same flights, by how many faults each finds in each of DUELS_S.
 
     Flights of a seed share their noise, so a seed counts once: for who finds more of its faults.
     """
     compared = []
     for place, here in grouped(rows, *PLACE).items():
-        found = {scheme: _found_by_seed(of) for (scheme,), of in grouped(here, "scheme").items()}
-        others = [scheme for scheme in found if scheme not in BUILT_IN]
-        for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in found], others):
-            duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
-            compared.append(duel | _duel(found[ours], found[scheme]))
+        for within_s in DUELS_S:
+            of_each = grouped(here, "scheme").items()
+            found = {scheme: _found_by_seed(of, within_s) for (scheme,), of in of_each}
+            others = [scheme for scheme in found if scheme not in BUILT_IN]
+            for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in found], others):
+                duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
+                duel["within_s"] = within_s
+                compared.append(duel | _duel(found[ours], found[scheme]))
     return compared
 
 
-def _found_by_seed(rows: Sequence[Row]) -> dict[int, int]:
+def _found_by_seed(rows: Sequence[Row], within_s: float) -> dict[int, int]:
     return {
-        seed: sum(row["delay_s"] is not None and row["delay_s"] <= JUDGED_S + 1e-9 for row in of)
+        seed: sum(row["delay_s"] is not None and row["delay_s"] <= within_s + 1e-9 for row in of)
         for (seed,), of in grouped(rows, "seed").items()
     }
 
@@ -239,6 +243,4 @@ def _duel(ours: dict[int, int], theirs: dict[int, int]) -> Document:
     wins, losses = sum(a > b for a, b in pairs), sum(a < b for a, b in pairs)
     p = sign_test(wins, losses)
     verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"
-    return {
-        "within_s": JUDGED_S, "seeds_ours": wins, "seeds_theirs": losses, "p": p, "verdict": verdict,
-    }  # fmt: skip
+    return {"seeds_ours": wins, "seeds_theirs": losses, "p": p, "verdict": verdict}

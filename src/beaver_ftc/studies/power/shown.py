@@ -3,7 +3,7 @@ command `power`."""
 
 import io
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from itertools import product
@@ -24,6 +24,7 @@ from beaver_ftc.commands import (
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
+from beaver_ftc.studies.compare.scores import leader, percent
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.power import probabilities, survey
 from beaver_ftc.studies.power.probabilities import (
@@ -35,7 +36,17 @@ from beaver_ftc.studies.power.probabilities import (
     limit,
     summary,
 )
-from beaver_ftc.studies.power.survey import BUILT_IN, GRIDS, WITHIN_S, Grid, Watched, fly_block, lost
+from beaver_ftc.studies.power.survey import (
+    BOTH,
+    BUILT_IN,
+    GRIDS,
+    WATCHED_S,
+    WITHIN_S,
+    Grid,
+    Watched,
+    fly_block,
+    lost,
+)
 from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Files, Makers
 from beaver_ftc.studies.present.tables import plain, printed, seconds
@@ -54,10 +65,35 @@ INFORMED = "informed test"
 
 def as_text(document: Document, colour: bool = False) -> str:
     """Tables, legend, comparison and failures."""
-    tables = [_table(document, *condition) for condition in document["grid"]["conditions"]]
+    shown = []
+    for condition in document["grid"]["conditions"]:
+        shown += [
+            printed([_table(document, *condition)], WIDTH, colour),
+            *who_is_better(document, *condition),
+            "",
+        ]
     said = [*_legend(document), "", *comparison(document)]
     said += [f"could not be judged: {failure}" for failure in document["failures"]]
-    return "\n".join([printed(tables, WIDTH, colour), *said])
+    return "\n".join([*shown, *said])
+
+
+def who_is_better(
+    document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
+) -> Iterator[str]:
+    """Below the table of a condition, a sentence a surface: who finds most faults so soon."""
+    here, soon = {"sensors": sensors, "turbulence": turbulence}, f"{within_s:g}"
+    for surface in document["grid"]["surfaces"]:
+        place, rows = here | {"surface": surface}, dict[str, Document]()
+        for total in _those(document["totals"], **place):
+            if total["flights"] and (total["scheme"] == BOTH or total["scheme"] not in BUILT_IN):
+                found, duel = total["within"][soon], {"better": 0, "worse": 0, "p": 1.0}
+                against = {"against": total["scheme"], "ours": BOTH, "within_s": within_s}
+                for one in _those(document["comparison"], **place, **against):
+                    duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
+                rates = {"rate": found["value"], "rate_low": found["low"], "rate_high": found["high"]}
+                rows[total["scheme"]] = rates | {"against_ours": duel}
+        if BOTH in rows:
+            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
 
 
 def _table(document: Document, sensors: str, turbulence: str) -> "Table":
@@ -122,19 +158,18 @@ def _legend(document: Document) -> list[str]:
         f"{WITHIN_S[-1]:g} s.",
         f"{OWN.strip()}: at the level that follows from what it declares.",
         f"{INFORMED}: knows surface, magnitude and instant; made once in that time at the same rate.",
-        "plug-ins and that test are shown the air as the statistical scheme sees it by the vanes."
-        if grid["vanes"]
-        else "plug-ins and that test have the rates alone; the statistical scheme sees the air by its vanes.",
+        "plug-ins are given every reading that the statistical scheme uses; that test knows the gusts "
+        "that the vanes show.",
     ]
 
 
 def comparison(document: Document) -> list[str]:
     """Where ours finds more or fewer faults than another scheme, and is unlikely to by chance."""
     lines, counts = [], []
-    for (ours,), duels in grouped(document["comparison"], "ours").items():
+    for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items():
         verdicts = [duel["verdict"] for duel in duels]
         counts.append(
-            f"{ours}, faults found within {JUDGED_S:g} s, {len(verdicts)} comparisons: better in "
+            f"{ours}, faults found within {within_s:g} s, {len(verdicts)} comparisons: better in "
             f"{verdicts.count('better')}, worse in {verdicts.count('worse')}, no difference at "
             f"p < {SIGNIFICANT:g} in the rest"
         )
@@ -146,7 +181,9 @@ def comparison(document: Document) -> list[str]:
                     for condition, here in so.items()
                 ]
                 if places:
-                    lines.append(f"{ours} is {verdict} than {against}: {'; '.join(places)}")
+                    lines.append(
+                        f"{ours} is {verdict} than {against} within {within_s:g} s: {'; '.join(places)}"
+                    )
     return [*lines, *counts]
 
 
@@ -333,8 +370,6 @@ class Power(StudyCommand):
     altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
     aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
     surface: Fly only losses of this surface. The command then prints one line for each loss.
-    rates_alone: Plug-ins receive only the body rates, and no air data. The built-in detector uses air data,
-    too.
     out: Folder in which the result folder `power` is written.
     """
 
@@ -346,7 +381,6 @@ class Power(StudyCommand):
     altitude: AltitudeOption = None
     aircraft: str | None = None
     surface: str | None = None
-    rates_alone: bool = False
     workers: WorkersOption = None
     out: Path = Path("runs")
 
@@ -360,7 +394,7 @@ class Power(StudyCommand):
     def run(self, reporter: Reporter) -> Document:
         """Fly the grid; of one surface with the answers in words."""
         chosen = survey.contenders(None if self.schemes is None else listed(self.schemes))
-        grid = replace(GRIDS[self.grid].only(self.sensors, self.turbulence), vanes=not self.rates_alone)
+        grid = GRIDS[self.grid].only(self.sensors, self.turbulence)
         grid = grid.elsewhere(self.aircraft, self.airspeed, self.altitude, self.surface)
         document = run_power(self.out, grid, chosen, self.processes, reporter.progress)
         said = probabilities.answers(document, self.surface) if self.surface else []

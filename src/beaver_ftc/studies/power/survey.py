@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 
 from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.informed_test import WhiteningFilter
+from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.airframe import air_of, find_aircraft
@@ -58,7 +59,6 @@ class Grid:
     healthy_h: float
     healthy_flight_s: float
     per_h: float
-    vanes: bool = True  # whether plug-ins are shown the air as our statistical detector sees it
     # what its scenarios say besides: another aircraft, and where it starts
     where: dict[str, Any] = field(default_factory=dict, hash=False)
 
@@ -228,7 +228,9 @@ def deflections(
         return [0.0] * len(within_s)
     place = recording.context.surfaces.index(surface)
     moment = np.array([measured.contribution[:, place] for measured in since])
-    d = WhiteningFilter(recording.context).deflection_coefficient_by_frame(-magnitude * moment)
+    d = WhiteningFilter(VaneGust(recording.context).context).deflection_coefficient_by_frame(
+        -magnitude * moment
+    )
     frames = [round(s / recording.context.dt_s) for s in within_s]
     return [float(d[min(n, len(d)) - 1]) for n in frames]
 
@@ -252,24 +254,21 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> W
     block, faulted = case
     if not faulted:
         healthy = scenario_of(block, grid.healthy_flight_s, where=grid.where)
-        return _watch(Watched(block), [healthy], schemes, grid.vanes)
+        return _watch(Watched(block), [healthy], schemes)
     at_s = strikes_at_s(block)
     faults = ([loss(*fault, at_s)] for fault in grid.faults)
     flights = [scenario_of(block, at_s + WATCHED_S, one, grid.where) for one in faults]
-    return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
+    return _watch(Watched(block, grid.faults), flights, schemes)
 
 
-def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str], vanes: bool) -> Watched:
+def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]) -> Watched:
     seen: list[Recording] = []  # what plug-ins are shown of the flights
     for scheme in schemes:
         try:
             if scheme in FLOWN_THEMSELVES:
                 recordings = [replay.record(with_fdi(flight, scheme)) for flight in flights]
                 if scheme in BUILT_IN:
-                    seen = [
-                        replay.aware_of_the_air(one) if vanes and one.air is not None else one
-                        for one in recordings
-                    ]
+                    seen = recordings
                 traces = [replay.trace(recording, recording.built_in) for recording in recordings]
             elif seen:
                 traces = replay.replay_together(seen, scheme)

@@ -15,7 +15,9 @@ from telling import numbers
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 MEASURED = Measured(
-    2.5, *(numbers(*shape, seed=seed) for seed, shape in enumerate([(3,), (5,), (3,), (3, 4), (3,)]))
+    2.5,
+    *(numbers(*of, seed=seed) for seed, of in enumerate([(3,), (5,), (3,), (3, 4), (3,), (3,), (3,)])),
+    altitude_m=1234.5,
 )
 REFERENCE = Reference(*(numbers(3, seed=seed) for seed in (6, 7, 8)))
 

@@ -1,0 +1,105 @@
+"""Plug-ins are given every reading that ours use, with its errors, and nothing that tells of the noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.results.simulation import Simulation
+from beaver_ftc.studies.compare.replay import Recorder
+from flying import Memory, scenario
+
+REAL = {"sensors": "tactical-grade", "fdi": {"bounds": {"sensors": "tactical-grade"}}}
+
+
+def recorded(**changes):
+    """What a detector is given in a flight, and the log of it."""
+    recorder, log = Recorder(), Memory()
+    fly(scenario(duration_s=8, **changes), log, detector=recorder)
+    return recorder, log
+
+
+def test_attitude_and_altitude_of_sound_instruments_are_those_flown():
+    recorder, log = recorded()
+    for name, column in (("phi_rad", 0), ("theta_rad", 1), ("psi_rad", 2)):
+        read = np.array([measured.attitude[column] for measured, _ in recorder.seen])
+        assert np.sin(read - log[name]) == pytest.approx(0.0, abs=1e-12)
+    read = np.array([measured.altitude_m for measured, _ in recorder.seen])
+    assert read == pytest.approx(log["altitude_m"], abs=1e-6)
+
+
+def test_accelerations_of_sound_instruments_add_up_to_the_change_of_the_velocity():
+    """force + gravity - w x v is the acceleration in body axes; its sum over a second, by the mean of two
+    frames, is the change of airspeed and flow angles in still air."""
+    recorder, log = recorded()
+    a, b, V = (log[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps"))
+    phi, theta = log["phi_rad"], log["theta_rad"]
+    v = np.stack([V * np.cos(a) * np.cos(b), V * np.sin(b), V * np.sin(a) * np.cos(b)], axis=1)
+    w = np.stack([log[f"{axis}_rad_s"] for axis in "pqr"], axis=1)
+    down = np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
+    force = np.array([measured.force for measured, _ in recorder.seen])
+    rate = force + 9.80665 * down - np.cross(w, v)
+    change = v[200:] - v[100:-100]
+    summed = np.cumsum(0.005 * (rate[1:] + rate[:-1]), axis=0)
+    assert summed[199:] - summed[99:-100] == pytest.approx(change, abs=0.05)
+    assert np.abs(change).max() > 0.5
+
+
+def test_readings_have_the_errors_of_their_instruments():
+    """As the context declares them."""
+    sound, _ = recorded()
+    real, log = recorded(**REAL)
+    declared = real.context.declared
+    assert (declared.further_noise > 0.0).all()
+    read = np.array([[*m.attitude, *m.force, m.altitude_m] for m, _ in real.seen])
+    for column, name in enumerate(("phi_rad", "theta_rad", None, None, None, None, "altitude_m")):
+        if name is not None:
+            error = read[:, column] - log[name]
+            assert 0.5 < np.std(error) / declared.further_noise[column] < 2.0
+    steps = (
+        np.diff(read, axis=0).std(axis=0),
+        np.diff([[*m.force] for m, _ in sound.seen], axis=0).std(axis=0),
+    )
+    assert (steps[0][3:6] > 1.2 * declared.further_noise[3:6]).all()
+    assert (steps[0][3:6] > steps[1]).all()
+
+
+def test_a_simulation_shows_the_same_readings():
+    recorder, _ = recorded(**REAL)
+    sim = Simulation(scenario(duration_s=8, **REAL), detector=Recorder())
+    sim.step(frames=100)
+    assert np.array_equal(np.hstack(sim.measured[-3:]), np.hstack(recorder.seen[100][0][-3:]))
+
+
+def test_without_accelerometers_there_is_no_reading_of_theirs():
+    sim = Simulation(scenario(duration_s=1))
+    sim.step()
+    assert np.isnan(sim.measured.force).all()
+    assert np.isfinite(sim.measured.attitude).all()
+
+
+def test_nothing_in_the_context_tells_of_the_noise():
+    """Flights that differ by their seed alone differ in every reading, and not in a bit of the context: what
+    rebuilds the noise of one from its context gives the same for the other, which has another noise."""
+    first, second = (recorded(**REAL, seed=seed)[0] for seed in (7, 8))
+    assert not np.array_equal(first.seen[9][0].x, second.seen[9][0].x)
+    assert not differences("context", first.context, second.context)
+    assert differences("context", first.context, replace(second.context, dt_s=0.02)) == ["context.dt_s"]
+
+
+def differences(place, one, other):
+    """Where two things are not the same, part by part."""
+    parts = getattr(one, "__dict__", None) or getattr(one, "_asdict", dict)()
+    if not parts:
+        return [] if np.array_equal(one, other) else [place]
+    pairs = ((name, part, vars(other)[name]) for name, part in parts.items())
+    return [where for name, *two in pairs for where in differences(f"{place}.{name}", *two)]
+
+
+def test_the_former_seed_is_a_number_of_no_flight():
+    """A notice says that it goes."""
+    loop = Loop(scenario(duration_s=1, seed=7), Recorder())
+    with pytest.warns(DeprecationWarning, match="Context.seed"):
+        assert loop.plugin_frame.detector.context.seed == 0
+    loop.release()

@@ -25,12 +25,15 @@ class VaneGust:
 
     def __init__(self, context: Context) -> None:
         declared = context.declared
-        self._is_declared, self._dt = declared.air, context.dt_s
+        self._dt = context.dt_s
         self._effect, self._lag_s = declared.gust_effect, declared.gust_time_s
         self._airspeed = float(context.trim_y[2])
         self._air_rotation = np.zeros(3)  # rad/s in level axes
         self._before: tuple[np.ndarray, np.ndarray, float] | None = None  # velocity, force, heading
-        self.context = context_with_measured_gust(context, self._noise(context)) if declared.air else context
+        self._is_measured = declared.air and self._airspeed > 0.0
+        self.context = context
+        if self._is_measured:
+            self.context = context_with_measured_gust(context, self._noise(context))
 
     def _noise(self, context: Context) -> np.ndarray:
         """Standard deviation (3,) rad/s2 of the effect, by the noise of a sample of each instrument."""
@@ -45,7 +48,7 @@ class VaneGust:
 
     def subtracted(self, measured: Measured) -> Measured:
         """The measurements, with the effect of the gust in the acceleration of the elapsed frame."""
-        if not self._is_declared:
+        if not self._is_measured:
             return measured
         phi, theta, psi = measured.attitude.tolist()
         alpha, beta, V = measured.y[:3].tolist()

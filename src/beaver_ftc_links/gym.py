@@ -111,13 +111,21 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
     `info["metrics"]` of the last step is the document metrics.json.
 
     scenario: a name, a path, a mapping or a Scenario. frames_per_step: how long an action is held.
+    render_mode: None alone, there is nothing to render.
+
+    A pickled environment, or a copy (`copy.deepcopy`), is in the same state and goes on by itself. The
+    episode is flown again until now, as in `Simulation.clone`.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012  (the name and form Gymnasium looks for)
 
-    def __init__(self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1) -> None:
+    def __init__(
+        self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1, render_mode: None = None
+    ) -> None:
         self.scenario = load(scenario).with_(NO_SENSOR)
         _check_count("frames_per_step", frames_per_step)
+        if render_mode is not None:
+            raise BadInput(f"render_mode: {render_mode!r:.60} is not known, allowed: None")
         self.frames_per_step = frames_per_step
         surfaces = len(aircraft(self.scenario.aircraft).surfaces)
         seen = (BESIDE_SURFACES + surfaces,)
@@ -156,14 +164,15 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         return episode.observation(), reward + DEPARTURE * departed, departed, not departed, info
 
     def clone(self) -> "BeaverEnv":
-        """Another environment in the same state: what is done to one changes nothing in the other.
+        """Another environment in the same state: what is done to one changes nothing in the other."""
+        return deepcopy(self)
 
-        Exact, as `Simulation.clone`, and at its price: the episode is flown again until now.
-        """
-        other = BeaverEnv(self.scenario, self.frames_per_step)
-        other._np_random, other._np_random_seed = deepcopy(self._np_random), self._np_random_seed
-        other._seeded, other._episode = self._seeded, self._episode and self._episode.clone()
-        return other
+    def __getstate__(self) -> Info:
+        return self.__dict__ | {"_episode": self._episode and self._episode.snapshot()}
+
+    def __setstate__(self, state: Info) -> None:
+        snapshot = state["_episode"]
+        self.__dict__.update(state, _episode=snapshot and snapshot.resume())
 
 
 class _Part(NamedTuple):

@@ -1,5 +1,8 @@
 """The Gymnasium environment: the checker's rules, and that it is the same aircraft as in a flight."""
 
+import pickle
+from copy import deepcopy
+
 import numpy as np
 import pytest
 
@@ -74,6 +77,27 @@ def test_an_action_held_over_frames_is_the_same_given_frame_by_frame():
     *_, over, info = ten.step(_action(1))
     assert over
     assert info["metrics"]["frames"] == 200
+
+
+@pytest.mark.parametrize("copied", [deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_is_in_the_same_state_and_goes_on_by_itself(copied):
+    noisy = scenario(duration_s=2, sensors={"q": {"noise_std_deg_s": 0.1}}, faults=[FAULT])
+    env = gymnasium.make("beaver_ftc/Beaver-v0", scenario=noisy, render_mode=None)
+    copied(env).reset(seed=7)  # before an episode has begun
+    env.reset(seed=7)
+    for k in range(20):
+        env.step(_action(k))
+    other = copied(env)
+    for k in range(20, 40):
+        mine, its = env.step(_action(k)), other.step(_action(k))
+        assert np.array_equal(mine[0], its[0])
+        assert mine[1:4] == its[1:4]
+    assert np.array_equal(env.reset()[0], other.reset()[0])  # the seeds to come, too
+
+
+def test_there_is_nothing_to_render():
+    with pytest.raises(BadInput, match="render_mode: 'human' is not known, allowed: None"):
+        BeaverEnv(render_mode="human")
 
 
 def test_a_seed_replaces_the_scenarios():

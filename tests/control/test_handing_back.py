@@ -74,7 +74,9 @@ def test_pitch_is_handed_back_without_a_leap(law):
     trimmed = log["flap_cmd_rad"][0]
     assert log["flap_cmd_rad"][t < 17.0][-1] == pytest.approx(trimmed, abs=np.radians(0.01))
     assert np.all(log["flap_cmd_rad"][t > 17.1] == trimmed)
-    assert document["isolation"]["withdrawn"] == [{"fault": "elevator", "from_s": 12.0, "to_s": 16.0}]
+    because = "the detector gave another verdict"
+    gone = {"fault": "elevator", "from_s": 12.0, "to_s": 16.0, "because": because}
+    assert document["isolation"]["withdrawn"] == [gone]
     assert document["isolation"]["so_far"] is None  # a plug-in says itself how sure it is
 
 

@@ -135,6 +135,9 @@ class Flight:
     end: tuple[float, float] | None = None
     so_far: bool | None = None
     withdrawn: tuple[dict[str, Any], ...] = ()
+    withdrawn_types: tuple[dict[str, Any], ...] = ()
+    windows: tuple[dict[str, Any], ...] = ()
+    estimate_at_s: float | None = None
     closest_approach: tuple[float, ...] = (0.11,)
     inconclusive: dict[str, Any] | None = None
 

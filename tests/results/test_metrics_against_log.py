@@ -7,6 +7,7 @@ against what bounds it.
 import sys
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -215,8 +216,14 @@ def all_names(flown):
 
 
 def taken_back(flown):
+    """The log does not show why."""
+    said = flown.metrics["isolation"]["withdrawn"]
     spells = [spell for spell in names_in_time(flown) if spell[2] <= flown.t[-1] and spell[0] in SURFACES]
-    return [{"fault": name, "from_s": a, "to_s": b} for name, a, b in spells]
+    assert len(said) == len(spells)
+    return [
+        {"fault": name, "from_s": a, "to_s": b, "because": one["because"]}
+        for (name, a, b), one in zip(spells, said, strict=True)
+    ]
 
 
 def type_of(flown):
@@ -539,6 +546,17 @@ def several(flown, said):
     assert (said["withdrawn"], said["probing_s"], first["frequency_rad_s"]) == ([], None, None)
 
 
+def windows(flown, found):
+    """Between two instants at which a fault begins or ends, while one is in force."""
+    spans = [(fault["at_s"], fault.get("end_s") or flown.end_s) for fault in flown.faults]
+    edges = sorted({time_s for span in spans for time_s in span if time_s <= flown.end_s})
+    expected = [(a, b) for a, b in pairwise(edges) if any(begin <= a and b <= end for begin, end in spans)]
+    assert [(one["from_s"], one["to_s"]) for one in found] == [pytest.approx(span) for span in expected]
+    for one in found:
+        assert one["detected"] is (one["time_s"] is not None)
+        assert one["time_s"] is None or one["from_s"] <= one["time_s"] < one["to_s"]
+
+
 HINTS = {
     "airspeed ": lambda f: (
         "autopilot" not in f.given and abs(f["airspeed_mps"][-1] - f.scenario.initial.airspeed_mps) > 5
@@ -570,6 +588,7 @@ def hints(flown, said):
 
 
 BOUNDED = {
+    "windows": windows,
     "detection.guaranteed_delay_s": guarantee,
     "detection.statistical": chance,
     "detection.inconclusive": blind,

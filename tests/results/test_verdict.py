@@ -179,8 +179,16 @@ FIRST, AGAIN, OTHER = (
     ("gone", "said"),
     [
         ([], ""),
-        ([FIRST], "; named before: elevator for 0.25 s"),
-        ([FIRST, OTHER, AGAIN], "; named before: elevator 2 times for 1.25 s in all, flap for 0.50 s"),
+        ([FIRST], "; named before: elevator from 12.00 s to 12.25 s"),
+        (
+            [OTHER | {"type": "rate_limit", "because": "a sensor is broken"}],
+            "; named before: flap (rate limit) from 13.00 s to 13.50 s, withdrawn because a sensor is broken",
+        ),
+        (
+            [FIRST, OTHER, AGAIN],
+            "; named before: elevator 2 times, for 1.25 s in all, from 12.00 s to 15.00 s; "
+            "flap from 13.00 s to 13.50 s",
+        ),
     ],
 )
 def test_what_was_named_before_in_words(gone, said):

@@ -25,8 +25,12 @@ from beaver_ftc.diagnosis.types import (
 
 MAX_WITHDRAWN_ISOLATIONS = 16
 
-# An isolation that was withdrawn: the surface, isolated from when to when, s.
-WITHDRAWN_ISOLATION_RECORD = record(surface=int, from_s=float, to_s=float)
+# Why an isolation is withdrawn: an estimator refutes the surface, all types are excluded on it, a sensor is
+# found broken, a plug-in says so; or none of these, and it is one of several that are possible.
+SURFACE_REFUTED, TYPES_REFUTED, SENSOR_BROKEN, PLUGIN_DECIDES, SEVERAL_POSSIBLE = range(5)
+
+# An isolation that was withdrawn, or the type of one: surface and type, -1 if open, from when to when, s.
+WITHDRAWN_ISOLATION_RECORD = record(surface=int, fault_type=int, from_s=float, to_s=float, reason=int)
 
 
 @sized
@@ -35,14 +39,17 @@ def conclusion_dtype(n_surfaces: int) -> np.dtype:
     UNANTICIPATED. fault_type: of the isolated fault, -1 if open. accommodated_surface, accommodation_mode:
     the surface the law acts upon, and its accommodation mode. effectiveness: of every surface, where a
     plug-in estimates it (has_effectiveness). isolated_from_s: since when each surface is isolated, -1 if it
-    is not; withdrawn_isolations: what was isolated before."""
+    is not; isolated_type, type_from_s: its type, -1 if open, and since when. withdrawn_isolations,
+    withdrawn_types: what was isolated before, and of which other type."""
     return record(
         detected=int, detected_at_s=float, detected_axis=int, isolated_estimator=int, isolated_at_s=float,
         fault_type=int, type_decided_at_s=float, accommodated_surface=int, accommodation_mode=int,
         has_effectiveness=int,
         effectiveness=n_surfaces, isolated_from_s=n_surfaces,
-        n_withdrawn_isolations=int,
+        isolated_type=(int, n_surfaces), type_from_s=n_surfaces,
+        n_withdrawn_isolations=int, n_withdrawn_types=int,
         withdrawn_isolations=(WITHDRAWN_ISOLATION_RECORD, MAX_WITHDRAWN_ISOLATIONS),
+        withdrawn_types=(WITHDRAWN_ISOLATION_RECORD, MAX_WITHDRAWN_ISOLATIONS),
     )  # fmt: skip
 
 
@@ -50,6 +57,7 @@ def reset_conclusion(conclusion: np.void) -> None:
     """Fill the record of a diagnosis that has concluded nothing."""
     conclusion["detected_at_s"] = conclusion["isolated_at_s"] = -1.0
     conclusion["isolated_estimator"], conclusion["isolated_from_s"] = NOT_ISOLATED, -1.0
+    conclusion["isolated_type"], conclusion["type_from_s"] = -1, -1.0
     conclusion["fault_type"] = conclusion["accommodated_surface"] = conclusion[
         "accommodation_mode"
     ] = conclusion["type_decided_at_s"] = -1
@@ -112,21 +120,49 @@ def withdraw_conclusion_for_sensor_fault(conclusion):
 
 
 @kernel
-def update_isolation_interval(conclusion, surface_index, is_isolated, t):
-    """Record at t s whether a surface is isolated, and store an isolation that is withdrawn. If the store is
-    full, the latest one replaces the last."""
+def update_isolation_interval(conclusion, surface_index, is_isolated, t, isolated_type, reason):
+    """Record at t s whether a surface is isolated, and of which type (-1 if open); store what is withdrawn,
+    and why. If a store is full, the latest one replaces the last."""
     isolated_from_s = conclusion.isolated_from_s[surface_index]
+    earlier_type = conclusion.isolated_type[surface_index]
     if is_isolated and isolated_from_s < 0.0:
         conclusion.isolated_from_s[surface_index] = t
     elif isolated_from_s >= 0.0 and not is_isolated:
-        withdrawn_isolation = conclusion.withdrawn_isolations[
-            min(conclusion.n_withdrawn_isolations, MAX_WITHDRAWN_ISOLATIONS - 1)
-        ]
-        withdrawn_isolation.surface = surface_index
-        withdrawn_isolation.from_s = isolated_from_s
-        withdrawn_isolation.to_s = t
+        store_withdrawn(
+            conclusion.withdrawn_isolations, conclusion.n_withdrawn_isolations, surface_index, earlier_type,
+            isolated_from_s, t, reason,
+        )  # fmt: skip
         conclusion.n_withdrawn_isolations += 1
         conclusion.isolated_from_s[surface_index] = -1.0
+    elif earlier_type >= 0 and isolated_type != earlier_type:
+        store_withdrawn(
+            conclusion.withdrawn_types, conclusion.n_withdrawn_types, surface_index, earlier_type,
+            conclusion.type_from_s[surface_index], t, reason,
+        )  # fmt: skip
+        conclusion.n_withdrawn_types += 1
+    isolated_type = isolated_type if is_isolated else -1
+    if isolated_type != earlier_type:
+        conclusion.isolated_type[surface_index], conclusion.type_from_s[surface_index] = isolated_type, t
+
+
+@kernel
+def store_withdrawn(store, n_stored, surface_index, withdrawn_type, from_s, to_s, reason):
+    """Fill the next record of a store (MAX_WITHDRAWN_ISOLATIONS,)."""
+    withdrawn = store[min(n_stored, MAX_WITHDRAWN_ISOLATIONS - 1)]
+    withdrawn.surface, withdrawn.fault_type, withdrawn.reason = surface_index, withdrawn_type, reason
+    withdrawn.from_s, withdrawn.to_s = from_s, to_s
+
+
+@kernel
+def reason_of_withdrawal(conclusion_is_by_plugin, sensor_is_broken, estimator_is_excluded, any_type_is_left):
+    """Why a surface, or its type, is isolated no longer: the first of the reasons that is given."""
+    if sensor_is_broken:
+        return SENSOR_BROKEN
+    if conclusion_is_by_plugin:
+        return PLUGIN_DECIDES
+    if estimator_is_excluded:
+        return SURFACE_REFUTED
+    return SEVERAL_POSSIBLE if any_type_is_left else TYPES_REFUTED
 
 
 @kernel
@@ -159,7 +195,7 @@ def assessment_dtype(n_surfaces: int) -> np.dtype:
     open, or where faults of every type are not diagnosed; effectiveness; apply_immediately: whether the law
     applies it at once, not gradually; deflection_offset, deflection_lag rad. unknown_acceleration (3,)
     rad/s2: explained by no known fault. pitch_undecided: elevator or flap is at fault, and it has long been
-    open which.
+    open which. is_held: the surfaces are assessed as before a sensor broke.
     """
     return record(
         detected=int, no_surface_to_accommodate=int, diagnoses_all_types=int, isolated_surface=int,
@@ -168,7 +204,7 @@ def assessment_dtype(n_surfaces: int) -> np.dtype:
         effectiveness=n_surfaces, apply_immediately=(int, n_surfaces), deflection_offset=n_surfaces,
         deflection_lag=n_surfaces,
         unknown_acceleration=3,
-        pitch_undecided=int,
+        pitch_undecided=int, is_held=int,
     )  # fmt: skip
 
 
@@ -178,6 +214,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
     `statistical_dtype`."""
     diagnoses_all_types = config.diagnoses_all_types
     isolated_surface_index = isolated_surface(conclusion, estimators)
+    assessment.is_held = 0
     assessment.detected, assessment.diagnoses_all_types = conclusion.detected, diagnoses_all_types
     assessment.isolated_surface, assessment.any_surface_lags, assessment.no_surface_to_accommodate = (
         isolated_surface_index,
@@ -206,6 +243,20 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             )
             assessment.effectiveness[s] = 1.0 + estimated_theta
             assessment.apply_immediately[s] = is_loss_precise
+
+
+@kernel
+def hold_assessment(assessment, types):
+    """Go on with the assessment from before a sensor broke: effectiveness, and offsets of constant faults.
+
+    What varies from frame to frame cannot be estimated without the sensor, and is taken for zero.
+    """
+    assessment.is_held, assessment.any_surface_lags, assessment.deflection_lag[:] = 1, 0, 0.0
+    for s, surface in enumerate(types.surface):
+        if assessment.accommodation_mode[s] != GIVE_UP and not verdict.any_constant_parameter_type_remains(
+            surface
+        ):
+            assessment.deflection_offset[s] = 0.0
 
 
 @kernel

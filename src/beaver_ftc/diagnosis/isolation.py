@@ -295,7 +295,7 @@ FAULT_EFFECT_RECORD = record(acceleration_at_zero_theta=3, regressor=3, error_bo
 ISOLATION_ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
-    excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3,
+    excluded=int, excluded_at_s=float, exclusion_is_pending=int, ignored_axes=(int, 3), xhat=3, residual=3,
     lower_threshold=3, upper_threshold=3,
     confirmed_by_likelihood=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
     # Omega, and the same of the positive and the negative part of Z
@@ -553,9 +553,11 @@ def set_constant_isolation_thresholds(isolation, constant_threshold_rad_s):
 
 
 @kernel
-def exclude_fault(fie, t):
-    """Exclude a fault from t s on."""
-    if not fie.excluded:
+def exclude_fault(fie, t, waits_a_frame):
+    """Exclude a fault from t s on, or, if `waits_a_frame`, from the next frame on."""
+    if waits_a_frame and not fie.exclusion_is_pending:
+        fie.exclusion_is_pending = 1
+    elif not fie.excluded:
         fie.excluded, fie.excluded_at_s = 1, t
 
 

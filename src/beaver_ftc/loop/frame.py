@@ -33,7 +33,12 @@ from beaver_ftc.diagnosis.bounds import (
     error_map_time_row_index,
     is_coordinate_outside_span_of_boxes,
 )
-from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration_and_pitch
+from beaver_ftc.diagnosis.conclusion import (
+    assess_surfaces,
+    assess_unknown_acceleration_and_pitch,
+    hold_assessment,
+    uses_statistical_estimates,
+)
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
 from beaver_ftc.diagnosis.model_prediction import (
@@ -45,8 +50,8 @@ from beaver_ftc.diagnosis.model_prediction import (
     store_command_and_move_healthy_surfaces,
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
-from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.diagnosis.schemes import built_in_detection_threshold_ratio, record_isolated_surfaces
+from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME_NUMBER
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (
@@ -88,10 +93,11 @@ INCONCLUSIVE = record(
 @sized
 def accounts_dtype(n: int) -> np.dtype:
     """Accounts of a flight with n surfaces; actuator_travel (n,) rad, actuator_energy
-    (n,) rad2/s: the integral of the speed's square."""
+    (n,) rad2/s: the integral of the speed's square. beyond_threshold_at_s: since a window of faults began
+    (windows.py), the first frame in which the diagnosis shows a fault, -1 if none."""
     return record(
         guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
-        inconclusive=INCONCLUSIVE,
+        inconclusive=INCONCLUSIVE, beyond_threshold_at_s=float,
         saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
     )  # fmt: skip
 
@@ -435,7 +441,10 @@ def assess_faults(frame):
     """Put what the diagnosis says of each surface, and of what is unknown, where the law reads it."""
     fdi, assessment = frame.fdi, frame.assessment
     config, found, types, layout, detector = fdi.config, fdi.verdict, fdi.types, fdi.layout, fdi.statistical
-    assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
+    if found.detected and sensor_monitor.has_alarm(fdi.sensor_monitor):
+        hold_assessment(assessment, types)
+    else:
+        assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
     assess_unknown_acceleration_and_pitch(
         assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound
     )
@@ -520,12 +529,30 @@ def fly_profile(frame, commanded):
 
 
 @kernel
+def note_beyond_threshold(accounts, fdi, t):
+    """Note that a detector is beyond its threshold at t s. A plug-in says so itself."""
+    monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.alarm_authority
+    if fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER:
+        is_beyond = fdi.plugin_verdict.detected == 1
+    else:
+        uses_statistics = uses_statistical_estimates(detector.test_config, authority)
+        ratio = built_in_detection_threshold_ratio(fdi.bank, detector.alarm, authority, uses_statistics)
+        is_beyond = ratio > 1.0 or (
+            sensor_monitor.has_alarm(monitor) and monitor.output.worst_residual_bound_ratio > 1.0
+        )
+    if is_beyond:
+        accounts.beyond_threshold_at_s = t
+
+
+@kernel
 def account(frame):
     """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
     control, truth, sums = frame.control, frame.truth, frame.accounts
     track(sums.tracking, truth, control.reference.output.model_rate)
     if truth.faulted:
         account_authority(sums.authority, control.axes)
+        if sums.beyond_threshold_at_s < 0.0:
+            note_beyond_threshold(sums, frame.fdi, frame.t)
     else:
         filters.update_max_residual_ratio_by_filter(frame.fdi.bank)
         statistical.update_max_alarm_score_so_far(frame.fdi.statistical.alarm)

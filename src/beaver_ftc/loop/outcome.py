@@ -30,8 +30,16 @@ from beaver_ftc.control.autopilot import (
 from beaver_ftc.design import altitude_of
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis import Verdict
+from beaver_ftc.diagnosis.conclusion import (
+    PLUGIN_DECIDES,
+    SENSOR_BROKEN,
+    SEVERAL_POSSIBLE,
+    SURFACE_REFUTED,
+    TYPES_REFUTED,
+)
 from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
 from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
 from beaver_ftc.plant import channels as ch
@@ -119,10 +127,13 @@ class Landing:
     (`candidates`; with them what damage that the aircraft declares may have taken). so_far: whether it is a
     surface that our schemes name, which they do by exclusion: it is the only one left, until data exclude it
     as well; None of a plug-in's and of nothing. withdrawn: spells in which a surface was named before,
-    {fault, from_s, to_s}, the last the latest. estimate: the isolated fault's parameter, theta in [-1, 0]
-    for a loss of effectiveness. guaranteed_delay_s: from the fault to the instant from which detection
-    was certain, None if that never came. worst_residual_ratio: largest |residual| / threshold in healthy
-    flight; closest_approach: the same of each filter of the bank, the published one first.
+    {fault, type, from_s, to_s, because}, the last the latest; withdrawn_types: the same of types of which a
+    surface was named that still is. estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of
+    effectiveness; estimate_at_s: the instant that it is of, None for the last frame. windows: what was found
+    in each spell with the same faults, as in windows.py. guaranteed_delay_s: from the fault to the instant
+    from which detection was certain, None if that never came. worst_residual_ratio: largest |residual| /
+    threshold in healthy flight; closest_approach: the same of each filter of the bank, the published one
+    first.
     surface_travel_rad: path of each surface, up and down added. engine_power: if pitch was left to the
     engine, since when and for how long, s, and the lowest and highest manifold pressure, inHg. faults: of
     several at once (`fdi.pairs`), as in types/verdict.py, the first named first. statistical: when the
@@ -180,6 +191,9 @@ class Landing:
     changes: tuple[dict[str, Any], ...] = ()
     so_far: bool | None = None
     withdrawn: tuple[dict[str, Any], ...] = ()
+    withdrawn_types: tuple[dict[str, Any], ...] = ()
+    windows: tuple[dict[str, Any], ...] = ()
+    estimate_at_s: float | None = None
     inconclusive: dict[str, Any] | None = None
 
 
@@ -369,22 +383,54 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
 
 
 def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
-    """What `_alarm` and `_isolation` have, of surfaces or of an instrument."""
-    fdi = frame["fdi"]
+    """What `_alarm` and `_isolation` have, of surfaces, of an instrument, or of both."""
+    fdi, monitor = frame["fdi"], frame["fdi"]["sensor_monitor"]["output"]
     broken = sensor_monitor_finding(fdi["sensor_monitor"], float(frame["t"]))
     if broken is not None:
-        return {"detection_axis": None, **broken, "so_far": False if broken["isolated"] else None}
-    said = _alarm(fdi) | _isolation(fdi, surfaces)
-    return said | {"so_far": None if said["isolated"] is None else said["isolated"] in surfaces}
+        broken["so_far"] = False if broken["isolated"] else None
+        if not monitor["keeps_surface_conclusion"]:
+            return {"detection_axis": None, **broken}
+    alarm, said = _alarm(fdi), _isolation(fdi, surfaces)
+    said["so_far"] = None if said["isolated"] is None else said["isolated"] in surfaces
+    if broken is None:
+        return alarm | said
+    if said["isolated"] in surfaces:  # its estimate is of the last frame with a sound sensor
+        said["estimate_at_s"] = float(monitor["alarmed_at_s"]) - float(frame["dt"])
+        if not fdi["config"]["diagnoses_all_types"]:
+            effectiveness = frame["assessment"]["effectiveness"][surfaces.index(said["isolated"])]
+            said["estimate"] = float(effectiveness) - 1.0
+    found = said.get("faults") or (said,)
+    parts = (*found, broken) if said["isolated"] else (broken, *found)
+    return {**parts[0], **alarm, "faults": parts}
 
 
-def _withdrawn(fdi: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
-    """Surfaces that were named and are not any more, as many as there is room for."""
-    gone = fdi["verdict"]["withdrawn_isolations"][: int(fdi["verdict"]["n_withdrawn_isolations"])]
+_WHY_WITHDRAWN = {
+    SURFACE_REFUTED: "no fault of it explains the measurements",
+    TYPES_REFUTED: "no fault type explains the measurements",
+    SENSOR_BROKEN: "a sensor is broken",
+    PLUGIN_DECIDES: "the detector gave another verdict",
+    SEVERAL_POSSIBLE: "it is no longer the only explanation",
+}
+
+
+def _withdrawn(fdi: np.void, surfaces: Sequence[str], what: str) -> tuple[dict[str, Any], ...]:
+    """What was named and is not any more, with the reason, as many as there is room for; what: `isolations`,
+    of surfaces, or `types`, of surfaces that are still named."""
+    gone = fdi["verdict"][f"withdrawn_{what}"][: int(fdi["verdict"][f"n_withdrawn_{what}"])]
     return tuple(
-        {"fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]), "to_s": float(one["to_s"])}
+        {
+            "fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]),
+            "to_s": float(one["to_s"]),
+            "type": TYPE_NAMES[int(one["fault_type"])] if one["fault_type"] >= 0 else None,
+            "because": _WHY_WITHDRAWN[int(one["reason"])],
+        }
         for one in gone
-    )
+    )  # fmt: skip
+
+
+def found_so_far(frame: np.void, surfaces: Sequence[str], verdict: Verdict | None) -> dict[str, Any]:
+    """Alarm and names as of the frame just flown; verdict: of a plug-in detector, the last one."""
+    return _findings(frame, surfaces) if verdict is None else _of_verdict(frame["fdi"], verdict)
 
 
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
@@ -455,9 +501,10 @@ def landing_of(
     columns: tuple[str, ...],
     verdict: Verdict | None = None,
     replaced: tuple[dict[str, Any], ...] = (),
+    windows: tuple[dict[str, Any], ...] = (),
 ) -> Landing:
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one, `replaced`
-    what changes in flight have ended."""
+    what changes in flight have ended, `windows` what was found in each."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
     tracking, envelope, supervisor = accounts["tracking"], accounts["envelope"], frame["supervisor"]
     surfaces, departed = scenario.airframe.surfaces, int(frame["departed"])
@@ -497,11 +544,13 @@ def landing_of(
         arrival=_by_channel(frame, "mean_deviation"),
         limits=_limits(frame, surfaces),
         changes=replaced,
-        withdrawn=_withdrawn(fdi, surfaces),
+        withdrawn=_withdrawn(fdi, surfaces, "isolations"),
+        withdrawn_types=_withdrawn(fdi, surfaces, "types"),
+        windows=windows,
         inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["actuator_travel"], strict=True)},
         surface_energy_rad2_s={
             s: float(x) for s, x in zip(surfaces, accounts["actuator_energy"], strict=True)
         },
-        **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
+        **found_so_far(frame, surfaces, verdict),
     )

@@ -24,7 +24,14 @@ from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MODES
-from beaver_ftc.scenario.faults import DAMAGE, MOST_FAULTS, UNANTICIPATED, fault_name, place_of
+from beaver_ftc.scenario.faults import (
+    DAMAGE,
+    MOST_FAULTS,
+    UNANTICIPATED,
+    fault_name,
+    place_of,
+    without_effect,
+)
 from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import sensors_there
@@ -234,7 +241,8 @@ class Stepping:
         - `fault`: the keys of a fault in a scenario file, without `at_s`.
 
         If the same fault is already present, the call has no effect. Raises BadInput if a key or value is
-        wrong. The message names the key.
+        wrong, or if the fault would have no effect because of another fault of its surface. The message names
+        the key.
         """
         with checked_against(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
@@ -242,6 +250,8 @@ class Stepping:
             return
         if len(self._faults) >= MOST_FAULTS:
             raise BadInput(f"faults: this flight has had {MOST_FAULTS}, allowed: a new flight, or fewer")
+        for _, says in without_effect((*self._faults, new)):
+            raise BadInput(f"fault: {says}")
         self._note_asked("inject", fault=dict(fault))
         self._declare((*self._faults, new))
 

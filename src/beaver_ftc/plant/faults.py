@@ -2,9 +2,9 @@
 
 A fault at `at_s` is in force in the first frame whose time t >= at_s - 1e-9 s, and in every JSBSim run of
 that frame; one with `end_s` is repaired in the first frame whose time t >= end_s - 1e-9 s. Faults may
-overlap: effectiveness and rate scale multiply, biases and alpha^3 moments add; of two jams the earlier
-holds, of two runaways or two oscillations the later. On one surface a jam hides a trailing surface, which
-hides a runaway (that is the aircraft's own order).
+overlap: effectiveness and rate scale multiply, biases and alpha^3 moments add. Which masks which on one
+surface (that is the aircraft's own order) stands in the rows of the types: a scenario with a fault that is
+masked as it begins is refused.
 
 A fault of an instrument changes what it says and leaves the aircraft alone. Several of one instrument add up:
 offsets add, relative errors multiply, noise adds by its squares; one that is frozen or lost says nothing
@@ -119,6 +119,10 @@ class _Schedule:
     def begun(self, k: int) -> bool:
         """Whether some fault has struck by frame k, repaired or not."""
         return any(event.first <= k for event in self._events)
+
+    def in_force(self, k: int) -> tuple[bool, ...]:
+        """Of each fault whether it is in force in frame k."""
+        return tuple(event.in_force(k) for event in self._events)
 
     def next_change(self, k: int) -> int:
         """The first frame after k in which something changes; NEVER if none."""

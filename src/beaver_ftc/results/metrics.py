@@ -15,7 +15,13 @@ excluded this one so far, and nothing within the class proves that a fault outsi
 It is false of `unanticipated` and of an instrument, null of nothing and of what a plug-in names.
 `isolation.withdrawn`: surfaces that were named before, and from when to when. `isolation.premature` is true
 of a name given before the fault that it names began, or the first one where it names none that was declared:
-such a name is not correct and meets no expectation. Null of nothing.
+such a name is not correct and meets no expectation. Null of nothing. An estimate is that of the last frame,
+unless `estimate_at_s` says another instant.
+
+`windows`, of a flight with several faults or one that ends: each spell in which the same faults are in force,
+with the first frame in it in which a detector is beyond its threshold, and the names and sizes that the
+diagnosis gives in its last frame, held against the faults that act then. A name that stands since before
+counts from the fault's first frame on.
 
 `detection.inconclusive`: null, or the frames in which the built-in diagnosis can conclude nothing: their
 `share`, the first of them `from_s`, and `reasons`, each with the `quantity`, its own `share`, the range that
@@ -31,7 +37,7 @@ frames in which nothing could be concluded, the reason is given.
 import json
 import math
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
@@ -48,11 +54,13 @@ from beaver_ftc.scenario.faults import (
     LOSS_OF_EFFECTIVENESS,
     UNANTICIPATED,
     Damage,
+    acting_at,
     is_share,
     of_a_sensor,
+    size_at,
 )
 from beaver_ftc.scenario.sensors import sensor_words
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -181,6 +189,29 @@ class Truth:
     def onset_of(self, fault: DeclaredFault | None) -> Onset:
         """When a fault begins."""
         return Onset(None if fault is None else fault.at_s, self.rate_hz)
+
+    def within(self, acting: Sequence[DeclaredFault]) -> Self:
+        """That of a window in which these faults act."""
+        surfaces = {fault.actuator for fault in acting if fault.actuator is not None}
+        outside = self.outside_class_from_second_fault if len(surfaces) > 1 else None
+        return replace(self, faults=tuple(acting), outside_class_from_second_fault=outside)
+
+    def against(self, name: str | None, time_s: float | None) -> DeclaredFault | None:
+        """The fault that a name given then is held against: the first one in force of those that it names
+        rightly, or the first one that strikes."""
+        meant = self.faults_named_rightly_by(name, time_s)
+        now = (fault for fault in meant if time_s is not None and is_in_force(fault, time_s))
+        return next(now, meant[0] if meant else None)
+
+    def is_type_right(
+        self, fault: DeclaredFault | None, kind: str | None, time_s: float | None
+    ) -> bool | None:
+        """Whether a type decided then is that of `fault`, or of another one that acts on its surface then."""
+        if fault is None:
+            return None if kind is None else False
+        alike = [one for one in acting_at(self.faults, time_s or 0.0) if one.actuator == fault.actuator]
+        right = [one.is_of_type(kind) for one in (fault, *(alike if fault.actuator else ()))]
+        return None if right[0] is None else any(right)
 
     def faults_named_rightly_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
         """The declared faults of which a name given then is right, as they strike."""
@@ -351,6 +382,7 @@ def _metrics_before_expectations(flight: "Landing", truth: Truth) -> Metrics:
         outside_class=outside_class(scenario),
         detection=_detection_record(flight, truth),
         isolation=_isolation_record(flight, truth),
+        windows=_window_records(flight, truth),
         # the alarm is latched: there is one a diagnosis
         false_alarm=any(truth.onset.is_false(time_s) for time_s in _alarm_times_s(flight)),
         fault_free_s=_rounded_known_number(fault_free_s(flight)),
@@ -426,20 +458,62 @@ def _detection_record(flight: "Landing", truth: Truth) -> model.Detection:
 
 
 def _isolation_record(flight: "Landing", truth: Truth) -> model.Isolation:
-    meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
-    against = meant[0] if meant else truth.first
-    kind = flight.isolation_type
-    correct = None if flight.isolated is None else bool(meant)
-    type_correct = against.is_of_type(kind) if against else (None if kind is None else False)
+    meant = truth.against(flight.isolated, flight.isolation_time_s)
+    against = meant or truth.first
+    correct = None if flight.isolated is None else meant is not None
+    type_correct = truth.is_type_right(against, flight.isolation_type, flight.type_time_s)
     named = _named_fault_record(vars(flight), against, (correct, type_correct), truth)
     return model.Isolation(
         isolated=flight.isolated is not None,
         **vars(named),
-        withdrawn=tuple(model.Withdrawn.of(_with_rounded_numbers(gone)) for gone in flight.withdrawn),
+        withdrawn=tuple(map(_withdrawn_record, flight.withdrawn)),
         names=_names_given_in_flight(flight, truth),
         probing_s=_rounded_interval(flight.probing_s),
         faults=tuple(_record_of_one_of_several_faults(found, truth) for found in flight.faults),
+        types_withdrawn=tuple(map(_withdrawn_record, flight.withdrawn_types)) or None,
     )
+
+
+def _withdrawn_record(gone: Document) -> model.Withdrawn:
+    return model.Withdrawn.of(_with_rounded_numbers(gone))
+
+
+def _window_records(flight: "Landing", truth: Truth) -> tuple[model.Window, ...] | None:
+    """What was found in each window; null of a flight that has no more than one, to its end."""
+    known = flight.windows
+    if len(known) < 2 and not (known and known[0]["to_s"] < flight.frames / truth.rate_hz):
+        return None
+    return tuple(_window_record(_with_rounded_numbers(window), truth) for window in known)
+
+
+def _window_record(window: Document, truth: Truth) -> model.Window:
+    """A name that stands since before a fault of the window counts from that fault on."""
+    last_frame_s, found = window["to_s"] - 1.0 / truth.rate_hz, window["found"]
+    acting = acting_at(truth.faults, last_frame_s)
+    here = truth.within(acting)
+    alarm_s = window["alarm_s"]
+    return model.Window(
+        from_s=window["from_s"],
+        to_s=window["to_s"],
+        faults=tuple(i for i, fault in enumerate(truth.faults) if fault in acting),
+        detected=alarm_s is not None,
+        time_s=alarm_s,
+        delay_s=Onset(window["from_s"], truth.rate_hz).delay_s(alarm_s),
+        isolation=tuple(_name_in_window(one, here, last_frame_s) for one in found.get("faults") or (found,)),
+    )
+
+
+def _name_in_window(found: Document, truth: Truth, last_frame_s: float) -> model.NameInWindow:
+    against = truth.against(found["isolated"], last_frame_s)
+    if against is not None:
+        begins_s = truth.onset_of(against).first_frame_with_fault_s
+        times = {key: found.get(key) for key in ("isolation_time_s", "type_time_s")}
+        found = found | {key: max(time, begins_s) for key, time in times.items() if time is not None}
+    at_s = found.get("estimate_at_s") or last_frame_s
+    named = _record_of_one_of_several_faults(found | {"estimate_at_s": at_s}, truth)
+    on_place = [fault for fault in truth.faults if fault.actuator == named.fault]
+    true_size = size_at(named.type, on_place, at_s) if on_place and named.estimate is not None else None
+    return model.NameInWindow(**vars(named), true_size=_rounded_number_or_none(true_size))
 
 
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
@@ -462,11 +536,11 @@ def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
 def _record_of_one_of_several_faults(found: Document, truth: Truth) -> model.Named:
     """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
     name, kind = found["isolated"], found["isolation_type"]
-    meant = truth.faults_named_rightly_by(name, found["isolation_time_s"])
-    correct = None if name is None else bool(meant)
-    type_correct = None if kind is None else any(bool(fault.is_of_type(kind)) for fault in meant)
-    of_ours = {**found, "so_far": None if name is None else True}  # no other diagnosis names several
-    return _named_fault_record(of_ours, meant[0] if meant else None, (correct, type_correct), truth)
+    meant = truth.against(name, found["isolation_time_s"])
+    correct = None if name is None else meant is not None
+    type_correct = None if kind is None else truth.is_type_right(meant, kind, found.get("type_time_s"))
+    of_ours = {"so_far": None if name is None else True, **found}  # no other diagnosis names several
+    return _named_fault_record(of_ours, meant, (correct, type_correct), truth)
 
 
 def _named_fault_record(
@@ -492,6 +566,7 @@ def _named_fault_record(
         frequency_rad_s=_rounded_number_or_none(found.get("frequency_rad_s")),
         so_far=found["so_far"],
         premature=premature,
+        estimate_at_s=_rounded_number_or_none(found.get("estimate_at_s")),
     )
 
 

@@ -204,6 +204,7 @@ class Named(Part):
     - `so_far`: True if the name was given because all other candidates are excluded. Later data can exclude
       this name, too.
     - `premature`: True if the name was given before the fault began.
+    - `estimate_at_s`: time to which `estimate` belongs, s, if it is not the last frame of the flight.
     """
 
     fault: str | None
@@ -220,6 +221,39 @@ class Named(Part):
     frequency_rad_s: float | None
     so_far: bool | None
     premature: bool | None
+    estimate_at_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+
+
+@dataclass(frozen=True)
+class NameInWindow(Named):
+    """A fault that the diagnosis named in a window. `Named` explains the other fields.
+
+    - `true_size`: true size at `estimate_at_s`, in the unit of `estimate`; None if there is no fault of this
+      type then.
+    """
+
+    true_size: float | None = field(default=None, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Window(Part):
+    """A part of the flight in which the same faults are in force.
+
+    - `from_s`, `to_s`: begin and end of the window, s.
+    - `faults`: places, in the list `faults` of the metrics, of the faults that act at its end.
+    - `detected`: True if the test of a detector exceeded its threshold in the window.
+    - `time_s`, `delay_s`: time of the first such frame, s, and the delay from the begin of the window, s.
+    - `isolation`: one `NameInWindow` for each fault that is named in the last frame of the window. If no
+      fault is named, there is one entry without a name.
+    """
+
+    from_s: float
+    to_s: float
+    faults: tuple[int, ...]
+    detected: bool
+    time_s: float | None
+    delay_s: float | None
+    isolation: tuple[NameInWindow, ...]
 
 
 @dataclass(frozen=True)
@@ -228,11 +262,15 @@ class Withdrawn(Part):
 
     - `fault`: the name of the fault.
     - `from_s`, `to_s`: times at which the name was given and withdrawn, s.
+    - `type`: the fault type that was named with it, or None.
+    - `because`: reason of the diagnosis.
     """
 
     fault: str
     from_s: float
     to_s: float
+    type: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    because: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -245,6 +283,8 @@ class Isolation(Part):
       names are included, but premature names are not.
     - `probing_s`: times at which probing began and ended, s; None without probing.
     - `faults`: one `Named` for each fault if several faults were named at once; otherwise empty.
+    - `types_withdrawn`: fault types that the diagnosis gave and later withdrew, while the name of the surface
+      remained; None if there are none.
     """
 
     isolated: bool
@@ -266,6 +306,10 @@ class Isolation(Part):
     names: tuple[str, ...]
     probing_s: Span | None
     faults: tuple[Named, ...]
+    estimate_at_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    types_withdrawn: tuple[Withdrawn, ...] | None = field(
+        default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True
+    )
 
 
 @dataclass(frozen=True)
@@ -555,6 +599,7 @@ class Metrics(Part):
     expectations: tuple[Expectation, ...]
     passed: bool
     versions: dict[str, str]
+    windows: tuple[Window, ...] | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     interrupted_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     link: Link | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     certificate: CertificateCounts | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)

@@ -4,6 +4,7 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 """
 
 import io
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +20,7 @@ from beaver_ftc.results.model import (
     Metrics,
     Named,
     ProtectionLimit,
+    Window,
     Withdrawn,
 )
 from beaver_ftc.scenario.declared import in_words
@@ -49,7 +51,7 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     declared = metrics.faults or (metrics.fault,)
     said = (
         ("flight", _condition_text(metrics)),
-        *(("" if i else "fault", _fault_text(fault)) for i, fault in enumerate(declared)),
+        *(("" if i else "fault", _fault_text(fault, metrics.faults)) for i, fault in enumerate(declared)),
         ("assumed", _assumptions_text(metrics)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
@@ -57,6 +59,10 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ("statistical", _statistical_text(metrics)),
         ("isolation", _isolation_text(metrics)),
         *(("", said) for said in _further_fault_texts(metrics)),
+        *(
+            ("" if i else "windows", _window_text(window, metrics))
+            for i, window in enumerate(metrics.windows or ())
+        ),
         ("probing", _probing_text(metrics)),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
@@ -82,6 +88,20 @@ def _further_fault_texts(metrics: Metrics) -> list[str]:
         _named_fault_text(fault, metrics) if fault.fault else _candidates_text(fault.candidates)
         for fault in rest
     ]
+
+
+def _window_text(window: Window, metrics: Metrics) -> str:
+    """What was found in one window, and when of it."""
+    alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
+    found = [
+        _named_fault_text(one, metrics)
+        if one.fault
+        else _candidates_text(one.candidates)
+        if one.candidates
+        else "not isolated"
+        for one in window.isolation
+    ]
+    return f"{_seconds_text(window.from_s)} to {_seconds_text(window.to_s)}: {'; '.join([alarm, *found])}"
 
 
 MAX_LISTED_CANDIDATES = 4  # places, or types: more are counted
@@ -306,15 +326,30 @@ def _outside_class_text(metrics: Metrics) -> str:
     return f"{outside}: {says}" if outside else ""
 
 
-def _fault_text(fault: Fault | None) -> str:
+def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:
+    """A fault, and from when on another one of `faults` masks it."""
     if fault is None:
         return "none"
     end_s = fault.end_s if isinstance(fault, DeclaredFault) else None
+    masked = _masked_text(fault, faults) if isinstance(fault, DeclaredFault) else ""
     until = f" to {_seconds_text(end_s)}" if end_s else ""
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
     what = f"{place} {fault.type.replace('_', ' ')}".strip()
     size = ", ".join(_fault_size_texts(fault))
-    return f"{what}{' (' + size + ')' if size else ''} at {_seconds_text(fault.at_s)}{until}"
+    return f"{what}{' (' + size + ')' if size else ''} at {_seconds_text(fault.at_s)}{until}{masked}"
+
+
+def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
+    """While which other faults a fault does not act."""
+    from beaver_ftc.scenario.faults import masking
+
+    later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
+    spells = [
+        f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
+        f"({_without_underscores(one.type)})"
+        for one in later
+    ]
+    return f", without effect {' and '.join(spells)}" if spells else ""
 
 
 _DEVIATION_FORMAT_OF_CHANNEL = {
@@ -371,22 +406,25 @@ def _sensor_fault_size_texts(fault: DeclaredFault, sensor: str) -> list[str]:
 
 
 def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
-    """The true size, where the fault named is one that was injected."""
-    from beaver_ftc.scenario.faults import TYPES
+    """The true size at the instant of the estimate, where the fault named is one that was injected. The
+    instant too, unless the size is the same at every one."""
+    from beaver_ftc.scenario.faults import TYPES, acting_at, size_at
 
-    if isolation.estimate is None:
+    faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
+    if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
         return ""
-    row = TYPES.get(isolation.type or "")
-    key, sign = (row and row.truth) or ("", 1.0)
-    sizes = [
-        fault.size[key]
-        for fault in metrics.faults
-        if (fault.actuator, fault.type) == (isolation.fault, isolation.type) and key in fault.size
-    ]
-    if not sizes or row is None:
-        return ""
-    in_words = _value_text if isolation.estimate_deg is not None else row.size_in_words
-    return f" (true {in_words(sign * sizes[0])}{' deg' if isolation.estimate_deg is not None else ''})"
+    flown, at_s = metrics.flight, isolation.estimate_at_s
+    if at_s is None:
+        at_s = flown.flown_s - 1.0 / flown.rate_hz if flown and flown.rate_hz else math.inf
+    lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
+    when = "" if lasts and isolation.estimate_at_s is None else f" at {_seconds_text(at_s)}"
+    size = size_at(isolation.type, faults, at_s)
+    if size is None:
+        is_over = all(fault.type != isolation.type for fault in acting_at(faults, at_s))
+        return f"{when} (the fault is over then)" if is_over else when
+    if isolation.estimate_deg is None:
+        return f"{when} (true {TYPES[str(isolation.type)].size_in_words(size)})"
+    return f"{when} (true {_value_text(math.degrees(size))} deg)"
 
 
 def _detection_text(metrics: Metrics) -> str:
@@ -424,7 +462,11 @@ def _statistical_text(metrics: Metrics) -> str:
 def _isolation_text(metrics: Metrics) -> str:
     isolation = metrics.isolation
     return "; ".join(
-        [_isolated_or_candidates_text(isolation, metrics), *_withdrawn_texts(isolation.withdrawn)]
+        [
+            _isolated_or_candidates_text(isolation, metrics),
+            *_withdrawn_texts("named before", isolation.withdrawn),
+            *_withdrawn_texts("type named before", isolation.types_withdrawn or ()),
+        ]
     )
 
 
@@ -435,18 +477,20 @@ def _isolated_or_candidates_text(isolation: Isolation, metrics: Metrics) -> str:
     return _candidates_text(left) if metrics.detection.detected and left else "none"
 
 
-def _withdrawn_texts(gone: Sequence[Withdrawn]) -> list[str]:
-    """What was named before, for how long, each surface once."""
-    spans: dict[str, list[float]] = {}
+def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
+    """What was named before, each name once: when, and why it was withdrawn, the last time of several."""
+    spells: dict[str, list[Withdrawn]] = {}
     for one in gone:
-        spans.setdefault(one.fault, []).append(one.to_s - one.from_s)
-    said = [
-        f"{name} for {_seconds_text(times[0])}"
-        if len(times) == 1
-        else f"{name} {len(times)} times for {_seconds_text(sum(times))} in all"
-        for name, times in spans.items()
-    ]
-    return [f"named before: {', '.join(said)}"] if said else []
+        kind = f" ({_without_underscores(one.type)})" if one.type else ""
+        spells.setdefault(f"{one.fault}{kind}", []).append(one)
+    said = []
+    for name, each in spells.items():
+        total = _seconds_text(sum(one.to_s - one.from_s for one in each))
+        often = f" {len(each)} times, for {total} in all," if len(each) > 1 else ""
+        when = f"from {_seconds_text(each[0].from_s)} to {_seconds_text(each[-1].to_s)}"
+        why = f", withdrawn because {each[-1].because}" if each[-1].because else ""
+        said.append(f"{name}{often} {when}{why}")
+    return [f"{heading}: {'; '.join(said)}"] if said else []
 
 
 def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:

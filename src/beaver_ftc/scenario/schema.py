@@ -81,7 +81,15 @@ from beaver_ftc.scenario.diagnosis import (
     Scheme,
     changes_refused,
 )
-from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, Nameable
+from beaver_ftc.scenario.faults import (
+    MOST_FAULTS,
+    Fault,
+    FaultType,
+    Nameable,
+    SensorFault,
+    SurfaceFault,
+    without_effect,
+)
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Autopilot, Reference
 
@@ -113,6 +121,7 @@ def conflicts(said: Mapping[str, Any]) -> Iterator[Conflict]:
         yield ("duration_s",), f"{duration_s:g} is less than one frame, allowed: at least {1 / rate_hz:g} s"
     yield from _too_late("faults", faults_s or (), duration_s)
     yield from _too_late("changes", changes_s or (), duration_s)
+    yield from _without_effect(said.get("faults", ()))
     yield from _out_of_order(changes_s or ())
     expect, autopilot = said.get("expect"), said.get("autopilot")
     if faults_s is not None and not faults_s:
@@ -126,6 +135,14 @@ def _too_late(section: str, starts_s: Instants, end_s: float | None) -> Iterator
         if at_s and end_s and at_s >= end_s:
             allowed = f"allowed: earlier than duration_s, {end_s:g} s"
             yield (section, i, "at_s"), f"{at_s:g} is after the end, {allowed}"
+
+
+def _without_effect(faults: Any) -> Iterator[Conflict]:
+    """What a scenario declares is flown: no fault of a surface that another one masks as it begins."""
+    if isinstance(faults, list | tuple) and all(
+        isinstance(fault, SurfaceFault | SensorFault) for fault in faults
+    ):
+        yield from ((("faults", i, "at_s"), says) for i, says in without_effect(faults))
 
 
 def _out_of_order(changes_s: Instants) -> Iterator[Conflict]:

@@ -58,7 +58,7 @@ class Teller:
             found.append((WARNING, " or ".join(open_between)))
         if 0.0 <= self._named_s <= sim.t_s - ESTIMATED_S and verdict.estimate is not None:
             self._named_s = -1.0
-            found.append((INFO, f"{verdict.isolated}, {-100.0 * verdict.estimate:.0f} % lost"))
+            found.append((INFO, f"{verdict.isolated}, {round(-100.0 * verdict.estimate) + 0} % lost"))
         if sim.departed and not self._lost:
             self._lost = True
             found.append((EMERGENCY, "the aircraft is lost"))

@@ -452,7 +452,8 @@ def rejecting_dtype(n: int) -> np.dtype:
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw).
 
-    It is the diagnosis' estimate; where the law is not informed of the truth, also what its observer sees.
+    It is the diagnosis' estimate; where the law is not informed of the truth, also what its observer sees by
+    sound sensors.
     """
     if control.config.informed:
         accommodation.accommodate(control, assessment, faults, prediction, measured)
@@ -466,7 +467,7 @@ def accommodate(control, assessment, faults, prediction, measured):
         start = start_of(surfaces.output, assessment, s, False)
         if assessment.no_surface_to_accommodate and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
-        elif assessment.accommodation_mode[s] != GIVE_UP:
+        elif assessment.accommodation_mode[s] != GIVE_UP and not assessment.is_held:
             target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
         named = assessment.detected and s == assessment.isolated_surface
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)

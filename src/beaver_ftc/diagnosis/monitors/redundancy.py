@@ -342,7 +342,7 @@ def gust_speed_and_filtered_change_bounds(
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
     output = monitor["output"]
-    if not output["alarmed"] or output["keeps_surface_conclusion"]:
+    if not output["alarmed"]:
         return None
     finding: dict[str, Any] = {
         "isolated": None, "isolation_type": None, "estimate": None, "candidates": (),

@@ -1151,7 +1151,7 @@ def estimate_reading(monitor, prediction_record, readings, sensor_index):
 @kernel
 def estimate_rate_and_mark_replaced(monitor, prediction_record, axis):
     """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
-    change since.
+    change since, with the surface faults that stay isolated.
 
     The rate itself is used for the next sample: its own error shows there.
     """
@@ -1162,6 +1162,11 @@ def estimate_rate_and_mark_replaced(monitor, prediction_record, axis):
     predicted_acceleration = prediction_record.f[axis]
     for s in range(u.size):
         predicted_acceleration += prediction_record.G[axis, s] * u[s]
+    if monitor.output.keeps_surface_conclusion:
+        predicted_acceleration += (
+            prediction_record.acceleration_with_known_faults[axis]
+            - prediction_record.frame_means.predicted_acceleration[axis]
+        )
     angle_correction_rad = monitor.config.replaced_rate_correction_share * test.residual
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
         angle_correction_rad = (

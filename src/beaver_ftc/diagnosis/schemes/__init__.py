@@ -22,8 +22,14 @@ from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme
-from beaver_ftc.diagnosis.state import SCHEME_KERNEL_PATHS, STATISTICAL_DETECTOR
+from beaver_ftc.diagnosis.state import PLUGIN_SCHEME_NUMBER, SCHEME_KERNEL_PATHS, STATISTICAL_DETECTOR
 from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types.registry import FIRST_TYPE_WITH_SAME_NAME
+from beaver_ftc.diagnosis.types.verdict import (
+    DEDUCED_FAULTY,
+    TYPE_UNDECIDED,
+    any_type_of_name_remains,
+)
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import pairs_refused
@@ -103,14 +109,33 @@ def record_isolated_surfaces(fdi, t):
         sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface_conclusion
     )
     sole_isolated_surface_index = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
-    for s in range(fdi.types.surface.size):
-        is_surface_isolated = (
-            fdi.types.surface[s].status.is_isolated
-            if fdi.types.pair.enabled
-            else s == sole_isolated_surface_index
+    diagnoses_all_types, estimators = fdi.config.diagnoses_all_types, fdi.isolation.estimator
+    for s, surface in enumerate(fdi.types.surface):
+        is_surface_isolated, type_index = s == sole_isolated_surface_index, conclusion.fault_type
+        if fdi.types.pair.enabled:
+            is_surface_isolated, type_index = surface.status.is_isolated, surface.status.fault_type
+        estimator_index = (
+            fdi.layout.position_estimator[s] if diagnoses_all_types else fdi.layout.loss_estimator[s]
+        )
+        first_of_pair_is_refuted = (
+            s == fdi.types.pair.first_pitch_fault_surface
+            and surface.status.can_be_at_fault_basis == DEDUCED_FAULTY
+        )
+        named_type = conclusion.isolated_type[s] if is_surface_isolated else TYPE_UNDECIDED
+        reason = conclusions.reason_of_withdrawal(
+            fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER,
+            surface_conclusion_is_void,
+            estimator_index >= 0 and estimators[estimator_index].excluded,
+            not diagnoses_all_types
+            or (any_type_of_name_remains(surface, named_type) and not first_of_pair_is_refuted),
         )
         conclusions.update_isolation_interval(
-            conclusion, s, is_surface_isolated and not surface_conclusion_is_void, t
+            conclusion,
+            s,
+            is_surface_isolated and not surface_conclusion_is_void,
+            t,
+            FIRST_TYPE_WITH_SAME_NAME[type_index] if type_index >= 0 else -1,
+            reason,
         )
 
 

@@ -95,7 +95,10 @@ def update_detection_filters(fdi, prediction, measured):
 
 @kernel
 def update_fault_effects_and_isolation_estimators(fdi, prediction):
-    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
+    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation.
+
+    With a broken sensor they stay as they are: the reading in its place follows from the design model.
+    """
     config = fdi.config
     bound_record = fdi.bound
     isolation_record = fdi.isolation
@@ -111,7 +114,7 @@ def update_fault_effects_and_isolation_estimators(fdi, prediction):
         frame_means.Gu,
         frame_means.Gu_tolerance_for_fault_change,
     )
-    if is_detected:
+    if is_detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
         isolation.advance_estimators(
             isolation_record, bound_record, prediction.x_before, frame_means.predicted_acceleration, config.dt
         )
@@ -218,11 +221,23 @@ def parity_excludes(fdi, fie):
 
 
 @kernel
+def exclude_or_wait_for_sensors(fdi, fie, is_possible, t):
+    """Exclude the fault of estimator fie at t s, unless it is possible.
+
+    Where sensors are monitored, a fault that has been isolated is excluded a frame later: it may be a gyro
+    that contradicts it, and the attitude shows that a frame late.
+    """
+    if not is_possible or fie.exclusion_is_pending:
+        is_isolated = fdi.verdict.isolated_from_s[fie.surface] >= 0.0
+        isolation.exclude_fault(fie, t, fdi.sensor_monitor.config.enabled and is_isolated)
+
+
+@kernel
 def update_and_exclude_by_worst_case(fdi, x, t, isolation_started_earlier):
     """Exclude the faults that are not possible in the worst case."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_earlier):
-            isolation.exclude_fault(fie, t)
+        is_possible = update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_earlier)
+        exclude_or_wait_for_sensors(fdi, fie, is_possible, t)
 
 
 @kernel
@@ -242,10 +257,10 @@ def isolate_loss_by_worst_case(fdi, measured, t, isolation_started_earlier):
 def isolate_loss_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not update_and_test_if_possible_in_worst_case(
+        is_possible = update_and_test_if_possible_in_worst_case(
             fdi, fie, measured.x, isolation_started_earlier
-        ) or update_and_test_if_likelihood_excludes(fdi, fie):
-            isolation.exclude_fault(fie, t)
+        ) and not update_and_test_if_likelihood_excludes(fdi, fie)
+        exclude_or_wait_for_sensors(fdi, fie, is_possible, t)
     decide_isolated_loss(fdi, t)
 
 
@@ -254,8 +269,7 @@ def isolate_loss_by_statistics(fdi, measured, t, isolation_started_earlier):
     """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         update_and_test_if_possible_in_worst_case(fdi, fie, measured.x, isolation_started_earlier)
-        if update_and_test_if_likelihood_excludes(fdi, fie):
-            isolation.exclude_fault(fie, t)
+        exclude_or_wait_for_sensors(fdi, fie, not update_and_test_if_likelihood_excludes(fdi, fie), t)
     decide_isolated_loss(fdi, t)
 
 
@@ -270,10 +284,10 @@ def isolate_fault_type_by_worst_case(fdi, measured, t, isolation_started_earlier
 def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not update_and_test_if_possible_in_worst_case(
+        is_possible = update_and_test_if_possible_in_worst_case(
             fdi, fie, measured.x, isolation_started_earlier
-        ) or parity_excludes(fdi, fie):
-            isolation.exclude_fault(fie, t)
+        ) and not parity_excludes(fdi, fie)
+        exclude_or_wait_for_sensors(fdi, fie, is_possible, t)
     judge_frame_and_decide_fault_type(fdi, t, isolation_started_earlier)
 
 

@@ -8,7 +8,8 @@ named when the other alone cannot explain the flight; both are when neither can 
 
 *Pitch*: two unknowns in one equation. A constant that explains everything on one surface is taken for one
 fault. Once that was named, with its constant, a second fault that refutes it is found on the other surface,
-whose deflection follows from what is known of the first, taken to last. Anything else stays open.
+whose deflection follows from what is known of the first, taken to last. If nothing on the other surface
+explains that either, the name of the first is withdrawn. Anything else stays open.
 
 A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
 previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
@@ -352,10 +353,19 @@ def decide_pitch_isolation(types, layout, t):
         first_surface = types.surface[types.pair.first_pitch_fault_surface]
         second_surface_index = layout.partner[types.pair.first_pitch_fault_surface]
         second_surface = types.surface[second_surface_index]
-        update_isolation_type_and_times(first_surface, 1, first_surface.status.fault_type, t)
+        second_is_anomalous = second_surface.evidence.n_anomalous_frames > 0
+        second_may_be_at_fault = estimator_or_deduction_allows_fault(
+            second_surface
+        ) and verdict.any_type_remains(second_surface)
+        update_isolation_type_and_times(
+            first_surface,
+            second_may_be_at_fault or not second_is_anomalous,
+            first_surface.status.fault_type,
+            t,
+        )
         second_shows_fault = (
-            second_surface.evidence.n_anomalous_frames > 0
-            and estimator_or_deduction_allows_fault(second_surface)
+            second_is_anomalous
+            and second_may_be_at_fault
             and verdict.any_type_explains_flight(second_surface)
         )
         update_isolation_type_and_times(

@@ -87,6 +87,18 @@ def any_type_remains(surface):
 
 
 @kernel
+def any_type_of_name_remains(surface, first_type_of_name):
+    """Whether a type of this name is left; with TYPE_UNDECIDED, one of any name."""
+    for type_index in range(N_TYPES):
+        if type_is_not_excluded(surface, type_index) and first_type_of_name in (
+            FIRST_TYPE_WITH_SAME_NAME[type_index],
+            TYPE_UNDECIDED,
+        ):
+            return True
+    return False
+
+
+@kernel
 def any_type_explains_flight(surface):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for type_index in range(N_TYPES):
@@ -690,6 +702,12 @@ def _remaining_candidate_texts(
 
     Of one plane also both its surfaces, as `elevator+flap`.
     """
+    first_fault_surface = int(fdi["types"]["pair"]["first_pitch_fault_surface"])
+    if fdi["types"]["pair"]["enabled"] and first_fault_surface in surface_indices:
+        status = fdi["types"]["surface"]["status"][first_fault_surface]
+        if not (status["may_be_sole_fault"] or status["is_isolated"]):
+            yield "unanticipated"  # no second fault explains what the first one leaves
+            return
     possible_surface_indices = [s for s in surface_indices if _can_be_at_fault(fdi, s)]
     for s in possible_surface_indices:
         type_names = _remaining_type_names(fdi, s)

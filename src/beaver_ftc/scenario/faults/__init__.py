@@ -8,7 +8,7 @@ type stands in diagnosis/types/table/.
 """
 
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from importlib import import_module
@@ -22,6 +22,7 @@ from beaver_ftc.documents.document import Conflict, Number, Section, entry, numb
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.airframe import Actuator, among, checked_aircraft, named
 from beaver_ftc.scenario.sensors import AnySensorFault, SensorFault, fault_name, sensor_words, sensors_there
+from beaver_ftc.scenario.signals import grown_share, is_in_force
 
 Keys = Mapping[str, Any]  # of a fault in a scenario, beside type, actuator and times
 Properties = dict[str, float]  # failure properties of one surface
@@ -68,7 +69,9 @@ class SurfaceFault(Section):
     adds: ClassVar[bool] = True  # whether a second one of the like changes anything
     stays_where_it_is: ClassVar[bool] = False  # whether it must be known where the actuator was
     follows_actuator: ClassVar[bool] = False  # whether `follow` is called in every frame
-    truth: ClassVar[tuple[str, float] | None] = None  # the key that an estimate is of, and the sign of that
+    truth: ClassVar[str] = ""  # the property that an estimate is of, as its difference from the healthy value
+    masks: ClassVar[tuple[str, ...]] = ()  # types that do not act on a surface where this one is in force
+    replaces_like: ClassVar[bool] = False  # of two of this type the later acts; else the earlier does
     size: ClassVar[tuple[str, str] | None] = None  # an estimate in words: "of" so many "%", or "deg"
     in_words: ClassVar[InWords] = {}  # its parameters
     examples: ClassVar[tuple[tuple[str, Keys], ...]] = ()  # of `matrix`: name, fault; off_deg: off the trim
@@ -197,7 +200,7 @@ class LossOfEffectiveness(Gradual):
     """
 
     properties = (("effectiveness", 1.0),)
-    truth, size = ("magnitude", -1.0), ("of", "%")
+    truth, size = "effectiveness", ("of", "%")
     in_words = growing(magnitude=lambda value: f"{100 * value:g} %")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
@@ -209,7 +212,7 @@ class LossOfEffectiveness(Gradual):
 
     @classmethod
     def size_in_words(cls, estimate: float) -> str:
-        return f"{-100.0 * estimate:.3g} %"
+        return f"{round(-100.0 * estimate, 9) + 0.0:.3g} %"  # a sum with 0.0 is never -0
 
     @classmethod
     def estimate_in_words(cls, estimate: float) -> str:
@@ -229,7 +232,8 @@ class Stuck(Switched):
     """
 
     properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"
-    adds, stays_where_it_is, truth, size = False, True, ("position_deg", 1.0), ("at", "deg")
+    adds, stays_where_it_is, truth, size = False, True, "stuck-at-rad", ("at", "deg")
+    masks = ("stuck", "float", "hardover", "bias", "rate_limit", "oscillatory")
     in_words = constant(position_deg="{:g} deg".format)
     examples = (("stuck +3 deg", {"off_deg": 3.0}), ("stuck -3 deg", {"off_deg": -3.0}))
     button, hidden, mavlink = Button(2, "jam", {}), (Hidden(2, {}),), (2, {})
@@ -258,7 +262,7 @@ class Hardover(Switched):
     """The surface runs to a stop at its rate limit."""
 
     properties, holds = (("hardover", 0.0),), "hardover"
-    adds, size = False, ("at", "deg")
+    adds, size, masks, replaces_like = False, ("at", "deg"), ("hardover",), True
     in_words = constant(direction=lambda value: f"to the {'upper' if value > 0 else 'lower'} stop")
     examples = (("hardover +", {"direction": 1}), ("hardover -", {"direction": -1}))
     button, hidden = Button(4, "hardover", {"direction": 1}), (Hidden(1, {"direction": 1}, True),)
@@ -278,6 +282,7 @@ class Float(Switched):
     """The surface floats freely in the airflow and gives no moment."""
 
     properties, holds, adds = (("float", 0.0),), "float", False
+    masks = ("float", "hardover", "bias", "rate_limit", "oscillatory")
     examples = (("float", {}),)
     button, mavlink = Button(3, "float", {}), (1, {})
 
@@ -292,7 +297,7 @@ class Bias(Gradual):
     """The position of the surface differs from its command by a constant."""
 
     properties = (("bias-rad", 0.0),)
-    truth, size = ("bias_deg", 1.0), ("of", "deg")
+    truth, size = "bias-rad", ("of", "deg")
     in_words = growing(bias_deg="{:+g} deg".format)
     examples = (("bias +2 deg", {"bias_deg": 2.0}), ("bias -2 deg", {"bias_deg": -2.0}))
     button = Button(6, "bias", {"bias_deg": 3})
@@ -329,7 +334,8 @@ class Oscillatory(Gradual):
     """The surface oscillates about the position that its command requires."""
 
     properties = (("oscillation-amplitude-rad", 0.0), ("oscillation-frequency-rad_sec", 0.0))
-    truth, size = ("amplitude_deg", 1.0), ("by", "deg")
+    truth, size = "oscillation-amplitude-rad", ("by", "deg")
+    masks, replaces_like = ("oscillatory",), True
     in_words = growing(amplitude_deg="{:g} deg".format, frequency_rad_s="{:g} rad/s".format)
     examples = (
         ("oscillation 0.5 deg, 1 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 1.0}),
@@ -369,8 +375,9 @@ class Unanticipated(Gradual):
 
 __all__ = [
     "DAMAGE", "HEALTHY", "HOLDING", "MOST_FAULTS", "SENSOR_TYPES", "TYPES", "UNANTICIPATED", "Bias", "Damage",
-    "Fault", "FaultType", "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "fault_name",
-    "is_share", "of_a_sensor", "place_of",
+    "Fault", "FaultType", "LossOfEffectiveness", "Nameable", "SensorFault", "Unanticipated", "acting_at",
+    "fault_name", "is_share", "masking", "of_a_sensor", "place_of", "size_at",
+    "without_effect",
 ]  # fmt: skip
 
 UNANTICIPATED, DAMAGE = "unanticipated", "damage"
@@ -402,7 +409,60 @@ HOLDING = tuple(row.holds for row in TYPES.values() if row.holds)
 
 def place_of(fault: Any) -> str:
     """What a fault is of: a surface, a sensor, else its type: `unanticipated`, `damage`."""
-    return str(getattr(fault, "sensor", getattr(fault, "actuator", fault.type)))
+    return str(getattr(fault, "sensor", None) or getattr(fault, "actuator", None) or fault.type)
+
+
+def masking(fault: Any, faults: Iterable[Any], t_s: float) -> Any:
+    """Of `faults`, one of the same surface because of which a fault does not act at t_s, or None. A jam, for
+    instance, masks an oscillation. Of two alike that begin at once, the first in the list is the earlier."""
+    is_earlier = True
+    for other in faults:
+        if other is fault:
+            is_earlier = False
+            continue
+        row = TYPES.get(other.type)
+        if row is None or place_of(other) != place_of(fault) or fault.type not in row.masks:
+            continue
+        began_first = other.at_s < fault.at_s or (other.at_s == fault.at_s and is_earlier)
+        is_first_to_act = other.type != fault.type or began_first != row.replaces_like
+        if is_first_to_act and is_in_force(other, t_s):
+            return other
+    return None
+
+
+def acting_at(faults: Sequence[Any], t_s: float) -> list[Any]:
+    """The faults that are in force at t_s and that no other one masks."""
+    return [one for one in faults if is_in_force(one, t_s) and masking(one, faults, t_s) is None]
+
+
+def without_effect(faults: Sequence[Any]) -> Iterator[tuple[int, str]]:
+    """The place of each fault that another one masks from its beginning, and what is wrong with that."""
+    for i, fault in enumerate(faults):
+        other = masking(fault, faults, fault.at_s)
+        if other is not None:
+            until = "" if other.end_s is None else f", or from {other.end_s:g} s on"
+            allowed = f"allowed: before {other.at_s:g} s{until}, or on another surface"
+            what = f"{fault.type} of {place_of(fault)} has no effect at {fault.at_s:g} s"
+            yield i, f"{what}, while this surface has the fault {other.type}, {allowed}"
+
+
+def size_at(kind: str | None, faults: Sequence[Any], t_s: float) -> float | None:
+    """The true size, at t_s, of what an estimate of this type is of: theta, or rad, of all faults of one
+    surface together. None for a type without a size, and where the flight alone shows it.
+
+    faults: with the keys of their type as the mapping `size`.
+    """
+    row = TYPES.get(kind or "")
+    acting = [fault for fault in acting_at(faults, t_s) if fault.type in TYPES]
+    alike = [fault for fault in acting if fault.type == kind]
+    if row is None or not row.truth or (row.stays_where_it_is and not (alike and alike[0].size)):
+        return None
+    properties = dict(HEALTHY)
+    for fault in sorted(acting, key=lambda fault: fault.at_s):
+        known = {"at_s": fault.at_s, "profile": fault.profile, **(fault.size or {})}
+        declared = TYPES[fault.type].model_construct(**known)
+        declared.strike(properties, grown_share(declared, t_s), Past())
+    return properties[row.truth] - HEALTHY[row.truth]
 
 
 def is_share(kind: str | None) -> bool:

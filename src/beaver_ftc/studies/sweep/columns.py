@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
-from beaver_ftc.results.model import Metrics, without_none
+from beaver_ftc.results.model import Metrics, Window, without_none
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -23,7 +23,8 @@ NAMES = (
     "isolation.type_correct", "isolation.type_delay_s", "isolation.estimate_deg",
     "isolation.frequency_rad_s", "isolation.estimate_interval.low", "isolation.estimate_interval.high",
     "isolation.probing_s.from", "isolation.probing_s.to", "isolation.so_far", "isolation.premature",
-    "isolation.withdrawn", "isolation.candidates", "isolation.faults", "false_alarm",
+    "isolation.withdrawn", "isolation.candidates", "isolation.faults", "windows.detected",
+    "windows.correct", "false_alarm",
     "worst_residual_ratio", "tracking.pre_fault_rms_deg_s.p", "tracking.pre_fault_rms_deg_s.q",
     "tracking.pre_fault_rms_deg_s.r", "tracking.post_fault_rms_deg_s.p", "tracking.post_fault_rms_deg_s.q",
     "tracking.post_fault_rms_deg_s.r", "tracking.surface_travel_deg.*", "tracking.surface_energy_deg2_s.*",
@@ -44,6 +45,11 @@ def _faults(found: Metrics, flight: "Landing") -> str:
     """surface:type of each fault that was named, of several at once."""
     named = (one for one in found.isolation.faults if one.fault)
     return " ".join(f"{one.fault}:{one.type or 'open'}" for one in named)
+
+
+def _of_each_window(holds: Callable[[Window], bool]) -> Getter:
+    """`yes` or `no` of each window, in the order of time; empty without windows."""
+    return lambda found, flight: " ".join("yes" if holds(one) else "no" for one in found.windows or ())
 
 
 def _first_entry(mode: str) -> Getter:
@@ -73,6 +79,13 @@ _ELSEWHERE: dict[str, tuple[str, Getter]] = {
     "isolation.faults": ("text", _faults),
     "isolation.withdrawn": (
         "text", lambda found, flight: " ".join(gone.fault for gone in found.isolation.withdrawn),
+    ),
+    "windows.detected": ("text", _of_each_window(lambda window: window.detected)),
+    "windows.correct": (
+        "text",
+        _of_each_window(
+            lambda window: all(one.correct and one.type_correct is not False for one in window.isolation)
+        ),
     ),
     "supervisor.mode": ("text", lambda found, flight: found.supervisor[-1].mode),
     "supervisor.adaptive_at_s": ("float", _first_entry("adaptive")),

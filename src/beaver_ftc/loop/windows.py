@@ -1,0 +1,45 @@
+"""The windows of a flight: spells in which the same faults are in force, and what was found in each.
+
+A diagnosis latches its alarm, and a name stands until it is contradicted. Of a fault that comes and goes, or
+of two after each other, the end of the flight therefore shows little. So what the diagnosis says is read at
+the end of each window, in its last frame, and the first frame of it is noted in which a detector was beyond
+its threshold.
+"""
+
+from typing import Any
+
+from beaver_ftc.loop.outcome import found_so_far
+
+
+class Windows:
+    """Those of a flight, of a `loop.Loop`."""
+
+    def __init__(self, loop: Any) -> None:
+        self._loop = loop
+        self._closed: list[dict[str, Any]] = []
+        self._from_frame = 0
+        self._in_force: tuple[bool, ...] = ()
+
+    def turn_to(self, k: int, in_force: tuple[bool, ...]) -> None:
+        """End the window if other faults are in force in frame k, the next to fly; in_force: each of them."""
+        if in_force != self._in_force:
+            self._closed = self.until_now()
+            self._from_frame, self._in_force = k, in_force
+            self._loop.frames["accounts"]["beyond_threshold_at_s"] = -1.0
+
+    def until_now(self) -> list[dict[str, Any]]:
+        """Each window so far, the last one as far as it was flown: `from_s`, `to_s`, the first `alarm_s` in
+        it, None without one, and `found`, as a Landing has it."""
+        frame, rate_hz = self._loop.frames[0], self._loop.scenario.rate_hz
+        if not any(self._in_force) or frame["k"] <= self._from_frame:
+            return self._closed
+        alarm_s = float(frame["accounts"]["beyond_threshold_at_s"])
+        plugins = self._loop.plugin_frame
+        verdict = plugins.verdict if plugins and plugins.detector else None
+        window = {
+            "from_s": self._from_frame / rate_hz,
+            "to_s": int(frame["k"]) / rate_hz,
+            "alarm_s": alarm_s if alarm_s >= 0.0 else None,
+            "found": found_so_far(frame, self._loop.aircraft.surfaces, verdict),
+        }
+        return [*self._closed, window]

@@ -1,0 +1,187 @@
+"""What a diagnosis makes of a second fault: nothing that the first one taught follows a broken sensor."""
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.verdict import verdict_lines
+from beaver_ftc.scenario import load
+
+RATES = {
+    axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": f}}]
+    for axis, f in zip("pqr", (0.25, 0.2, 0.15), strict=True)
+}
+LOSS = {"type": "loss_of_effectiveness", "magnitude": 0.5}
+
+
+def flown(*faults, duration_s=30.0, **fdi):
+    """(metrics, log by column) of a flight with these faults."""
+    document = {
+        "name": "second-fault", "duration_s": duration_s, "reference": RATES, "faults": list(faults),
+        "fdi": {"fault_class": "all", **fdi},
+    }  # fmt: skip
+    loop = Loop(load(document))
+    log = np.concatenate([rows.copy() for rows in loop.chunks()])
+    return measure(loop.land()), dict(zip(loop.columns, log.T, strict=True))
+
+
+def text(found):
+    return " ".join(says for _, says in verdict_lines(found))
+
+
+@pytest.mark.parametrize(
+    ("surface", "sensor", "magnitude"),
+    [("elevator", "q", 2.0), ("elevator", "p", -2.0), ("rudder", "r", 2.0), ("elevator", "alpha", 2.0)],
+)
+def test_a_sensor_that_breaks_later_is_named_beside_the_surface(surface, sensor, magnitude):
+    """And the effectiveness in use stays what it was: nothing is learnt from an estimated reading."""
+    first = {"actuator": surface, "at_s": 8.0, **LOSS}
+    second = {"sensor": sensor, "type": "bias", "magnitude": magnitude, "at_s": 15.0}
+    found, log = flown(first, second, sensor_monitor="always")
+    named = [(one.fault, one.correct) for one in found.isolation.faults]
+    assert named == [(surface, True), (f"sensor {sensor}", True)]
+    assert found.isolation.names == (surface, f"sensor {sensor}")
+    assert found.isolation.withdrawn == ()
+    used = log[f"{surface}_effectiveness_used"][log["t_s"] > 25.0]
+    assert used == pytest.approx(0.5, abs=0.025)
+    assert found.isolation.estimate == pytest.approx(-0.5, abs=0.01)
+    assert 14.9 < found.isolation.estimate_at_s < 15.1
+    assert abs(log["airspeed_mps"][-1] - 45.0) < 8.0
+
+
+def test_where_sensors_count_as_sound_the_name_is_withdrawn_and_the_reason_said():
+    first, second = {"actuator": "rudder", "at_s": 8.0, **LOSS}, {"sensor": "q", "type": "bias"}
+    found, _ = flown(first, second | {"magnitude": 2, "at_s": 15.0}, sensor_monitor="never")
+    (gone,) = found.isolation.withdrawn
+    assert (gone.fault, gone.type, gone.to_s) == ("rudder", "loss_of_effectiveness", 15.0)
+    assert gone.because == "no fault of it explains the measurements"
+    assert gone.because in text(found)
+    assert found.isolation.fault == "unanticipated"
+
+
+def test_a_loss_then_a_jam_is_flown_whole_and_the_type_withdrawn():
+    jam = {"actuator": "rudder", "type": "stuck", "at_s": 18.0}
+    found, log = flown({"actuator": "rudder", "at_s": 8.0, **LOSS}, jam)
+    held = log["rudder_effective_rad"][log["t_s"] > 18.02]
+    assert np.ptp(held) == 0.0
+    assert held[0] == pytest.approx(0.5 * log["rudder_pos_rad"][-1])
+    (gone,) = found.isolation.types_withdrawn
+    assert (gone.fault, gone.type) == ("rudder", "loss_of_effectiveness")
+    assert 18.0 <= gone.to_s < 19.0
+    assert "type named before: rudder (loss of effectiveness)" in text(found)
+
+
+def test_an_intermittent_fault_is_scored_window_by_window():
+    spells = [(8.0, 13.0, 0.5), (16.0, 21.0, 0.3)]
+    faults = [
+        {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": m, "at_s": a, "end_s": b}
+        for a, b, m in spells
+    ]
+    found, _ = flown(*faults)
+    assert [(w.from_s, w.to_s) for w in found.windows] == [(a, b) for a, b, _ in spells]
+    for i, (window, (_, end_s, magnitude)) in enumerate(zip(found.windows, spells, strict=True)):
+        (named,) = window.isolation
+        assert window.faults == (i,)
+        assert (window.detected, named.fault, named.correct) == (True, "elevator", True)
+        assert 0.0 <= window.delay_s < 0.1
+        assert 0.0 <= named.delay_s < 0.1
+        assert named.estimate_at_s == pytest.approx(end_s - 0.01)
+        if named.estimate is not None:
+            assert named.true_size == pytest.approx(-magnitude)
+    assert "(true 0 %)" in text(found)  # at the end of the flight, not amid it
+    assert "-0 %" not in text(found)
+
+
+def test_of_two_losses_at_once_the_truth_is_their_product_at_the_instant_of_the_estimate():
+    halves = [{"actuator": "elevator", "at_s": at_s, **LOSS} for at_s in (8.0, 16.0)]
+    found, _ = flown(*halves)
+    first, second = (window.isolation[0] for window in found.windows)
+    assert (first.true_size, second.true_size) == (-0.5, -0.75)
+    assert first.estimate == pytest.approx(-0.5, abs=0.01)
+    assert "at 29.99 s (true 75 %)" in text(found)
+
+
+def test_of_a_growing_loss_the_truth_is_that_of_the_same_instant():
+    loss = {"profile": "incipient", "kappa_per_s": 0.15, **LOSS}
+    found, _ = flown({"actuator": "elevator", "at_s": 8.0, **loss})
+    share = 1.0 - np.exp(-0.15 * (29.99 - 8.0))
+    assert f"at 29.99 s (true {50 * share:.3g} %)" in text(found)
+
+
+def test_a_jam_after_a_loss_that_two_faults_do_not_explain_is_not_left_named():
+    jam = {"actuator": "elevator", "type": "stuck", "at_s": 18.0}
+    loss = {"actuator": "elevator", "at_s": 8.0, **LOSS, "magnitude": 0.4}
+    found, _ = flown(loss, jam, pairs=True, duration_s=40.0)
+    assert found.isolation.fault != "elevator"
+    gone = [one for one in found.isolation.withdrawn if one.fault == "elevator"]
+    assert gone[-1].because == "no fault type explains the measurements"
+
+
+def test_a_flight_with_one_fault_to_its_end_has_no_windows():
+    found, _ = flown({"actuator": "elevator", "at_s": 8.0, **LOSS}, duration_s=12.0)
+    assert found.windows is None
+    assert not {"windows", "estimate_at_s"} & (set(found.document()) | set(found.document()["isolation"]))
+
+
+MASKED = [("stuck", "oscillatory"), ("float", "bias"), ("stuck", "rate_limit"), ("stuck", "stuck")]
+KEYS = {
+    "oscillatory": {"amplitude_deg": 2, "frequency_rad_s": 6}, "bias": {"bias_deg": 2}, "stuck": {},
+    "rate_limit": {"scale": 0.02}, "float": {}, "hardover": {"direction": 1},
+    "loss_of_effectiveness": {"magnitude": 0.4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("first", "second"), MASKED)
+def test_a_fault_that_another_one_masks_as_it_begins_is_refused(first, second):
+    faults = [
+        {"actuator": "elevator", "type": kind, "at_s": at_s, **KEYS[kind]}
+        for kind, at_s in ((first, 8.0), (second, 8.0 if first == "stuck" else 9.0))
+    ]
+    with pytest.raises(bf.BadInput, match=r"faults\[1\].at_s: .*no effect.*allowed: before 8 s"):
+        load({"name": "masked", "faults": faults})
+    faults[0]["end_s"], faults[1]["at_s"] = 12.0, 12.0
+    load({"name": "in-turn", "faults": faults})
+    sim = bf.Simulation({"name": "by-hand"}, log=False)
+    sim.step()
+    sim.inject({"actuator": "elevator", "type": first, **KEYS[first]})
+    sim.step()
+    with pytest.raises(bf.BadInput, match="no effect"):
+        sim.inject({"actuator": "elevator", "type": second, **KEYS[second], **_elsewhere(second)})
+
+
+def _elsewhere(kind):
+    return {"position_deg": 3.0} if kind == "stuck" else {}  # the same jam again is no second one
+
+
+AGAIN = KEYS | {
+    "stuck": {"position_deg": 5}, "hardover": {"direction": -1}, "bias": {"bias_deg": -3},
+    "oscillatory": {"amplitude_deg": 3, "frequency_rad_s": 4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("second", KEYS)
+@pytest.mark.parametrize("first", KEYS)
+def test_a_second_fault_is_refused_or_acts_from_its_beginning(first, second):
+    """A surface with both moves otherwise than with the first alone; but a loss of what gives no moment."""
+    faults = [
+        {"actuator": "aileron", "type": first, "at_s": 2.0, **KEYS[first]},
+        {"actuator": "aileron", "type": second, "at_s": 2.1, **AGAIN[second]},
+    ]
+    document = {"name": "both", "duration_s": 5.0, "reference": RATES, "control": {"law": "nominal"}}
+    alone = effective(load(document | {"faults": faults[:1]}))
+    try:
+        both = effective(load(document | {"faults": faults}))
+    except bf.BadInput:
+        assert first in ("stuck", "float")
+        assert second not in ("stuck", "loss_of_effectiveness") or second == first == "stuck"
+        return
+    assert (both != alone).any() != ((first, second) == ("float", "loss_of_effectiveness"))
+
+
+def effective(scenario):
+    """The deflection that acts in each frame until the end, or the loss of the aircraft, rad."""
+    loop = Loop(scenario)
+    log = np.concatenate([rows.copy() for rows in loop.chunks()])
+    return log[:300, loop.columns.index("aileron_effective_rad")]

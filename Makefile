@@ -89,6 +89,7 @@ nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 $(PYTEST) $(addprefix --ignore=,tests/acceptance $(PLAIN))
 	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
 	$(MAKE) core-test
+	$(BIN)/python -m tools.arithmetics
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
 

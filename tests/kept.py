@@ -6,8 +6,8 @@ before they were kept. `pytest --keep` writes anew what differs; read the differ
 
 import json
 import re
-from collections.abc import Iterator, Mapping
-from math import isclose, isfinite
+from collections.abc import Callable, Iterator, Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,10 @@ import numpy as np
 FOLDER = Path(__file__).with_name("kept")
 RELATIVE, ABSOLUTE, DIGITS = 1e-6, 1e-9, 9
 _EMBEDDED = re.compile(r"data:[a-z/+-]+;base64,[A-Za-z0-9+/=]+")
+TOLD: list[Callable[[str, Any, Any, float | None], None]] = []
+"""Who is told of each kept value that is not found again to the last digit: its path, what is kept, what is
+found, and the difference of two numbers as a share of the tolerance.
+"""
 _INNERMOST = re.compile(r"\[\n[^\[\]{}]*\n *\]")  # lists of numbers or words, as JSON writes them
 
 
@@ -31,7 +35,11 @@ def differences(name: str, found: Any, anew: bool = False) -> list[str]:
         return []
     if not file.exists():
         return [f"{name}: nothing is kept; pytest --keep"]
-    return list(_differences(json.loads(file.read_text()), found))
+    return list(_differences(json.loads(file.read_text()), found, name))
+
+
+class Fields(dict[str, Any]):
+    """Numbers of a record by their paths. One that is absent is zero."""
 
 
 def _on_a_line(found: re.Match[str]) -> str:
@@ -41,6 +49,8 @@ def _on_a_line(found: re.Match[str]) -> str:
 def _plain(value: Any) -> Any:
     """A document of JSON's own types; floats rounded, those that are none by name."""
     match value:
+        case Fields():
+            return Fields({key: _plain(inner) for key, inner in value.items()})
         case Mapping():
             return {str(key): _plain(inner) for key, inner in value.items()}
         case list() | tuple() | set() | frozenset():
@@ -52,21 +62,38 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, int | None) else str(value)
 
 
-def _differences(kept: Any, found: Any, path: str = "") -> Iterator[str]:
+def _differences(kept: Any, found: Any, path: str = "", size: float = 0.0) -> Iterator[str]:
+    """size: of the largest number beside it, in the unit of the number."""
     if isinstance(kept, dict) and isinstance(found, dict):
         for key in kept | found:
-            yield from _differences(kept.get(key, "-"), found.get(key, "-"), f"{path}.{key}")
+            absent = _zero(kept.get(key, found.get(key))) if isinstance(found, Fields) else "-"
+            yield from _differences(kept.get(key, absent), found.get(key, absent), f"{path}.{key}")
     elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
+        size = max((abs(one) for one in kept if isinstance(one, float) and isfinite(one)), default=0.0)
         for i, (before, now) in enumerate(zip(kept, found, strict=True)):
-            yield from _differences(before, now, f"{path}[{i}]")
-    elif not _same(kept, found):
-        yield f"{path}: {str(kept)[:200]} -> {str(found)[:200]}"
+            yield from _differences(before, now, f"{path}[{i}]", size)
+    elif kept != found or type(kept) is not type(found):
+        share = _share(kept, found, size)
+        for told in TOLD:
+            told(path, kept, found, share)
+        if share is None or share > 1.0:
+            yield f"{path}: {str(kept)[:200]} -> {str(found)[:200]}"
 
 
-def _same(kept: Any, found: Any) -> bool:
-    if isinstance(kept, float) and isinstance(found, float):
-        return isclose(kept, found, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
-    return type(kept) is type(found) and kept == found
+def _zero(like: Any) -> Any:
+    """What an array or number that is zero to the last digit would have been kept as. An array whose sums are
+    zero was kept because not all of it is finite.
+    """
+    if isinstance(like, list):
+        return [0.0, 0.0, like[-1]] if any(like[:2]) else "-"
+    return type(like)(0)
+
+
+def _share(kept: Any, found: Any, size: float) -> float | None:
+    """The difference as a share of the tolerance; None if these are not two numbers."""
+    if not (isinstance(kept, float) and isinstance(found, float)):
+        return None
+    return abs(kept - found) / max(ABSOLUTE * max(1.0, size), RELATIVE * max(abs(kept), abs(found)))
 
 
 def in_short(array: Any) -> list[float]:
@@ -80,18 +107,18 @@ def in_short(array: Any) -> list[float]:
     return [float(weighted[numbers > 0].sum()), float(weighted[numbers < 0].sum()), int(finite.sum())]
 
 
-def of_record(record: np.ndarray, path: str = "") -> dict[str, Any]:
+def of_record(record: np.ndarray, path: str = "") -> Fields:
     """Every field of a record that is not zero, by its path: a number as it is, an array in short."""
     if record.dtype.names:
-        return {
-            key: value
+        return Fields(
+            (key, value)
             for name in record.dtype.names
             for key, value in of_record(record[name], f"{path}.{name}" if path else name).items()
-        }
+        )
     array = np.asarray(record)
     if not array.any():
-        return {}
-    return {path: array.item() if array.size == 1 else in_short(array)}
+        return Fields()
+    return Fields({path: array.item() if array.size == 1 else in_short(array)})
 
 
 _WORDS = ("title", "description", "discriminator")

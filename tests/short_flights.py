@@ -12,7 +12,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import SERVICES, entries
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import load
-from kept import in_short, of_record
+from kept import Fields, in_short, of_record
 
 _ALL = yaml.safe_load_all((Path(__file__).parent / "data" / "short_flights.yaml").read_text())
 _DERIVES = "derive" in entries(SERVICES)  # without, no aircraft of the jsbsim package flies
@@ -31,5 +31,7 @@ def flown(document: dict[str, Any]) -> dict[str, Any]:
     return {
         "metrics": measured,
         "log": {name: in_short(column) for name, column in zip(loop.columns, log.T, strict=True)},
-        "record": {path: value for path, value in record.items() if not path.endswith(OF_THE_MACHINE)},
+        "record": Fields(
+            (path, value) for path, value in record.items() if not path.endswith(OF_THE_MACHINE)
+        ),
     }

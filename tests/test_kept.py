@@ -83,6 +83,23 @@ def test_a_record_is_told_field_by_field_and_zeros_are_left_out():
     assert found["many.x"][1:] == [0.0, 3]
 
 
+def test_a_field_that_is_zero_is_compared_with_the_size_of_what_is_kept(folder):
+    """Exactly zero here, a rounding on another machine, or the other way round."""
+
+    def record(x, many):
+        made = np.zeros(1, [("x", float), ("many", float, 3), ("always", float)])
+        made["x"], made["many"], made["always"] = x, many, 3.0
+        return {"record": kept.of_record(made[0])}
+
+    zero, rounding = record(0.0, 0.0), record(-2.6e-17, [0.0, 3e-17, -1e-18])
+    assert not kept.differences("here/zero", zero, anew=True)
+    assert not kept.differences("here/rounding", rounding, anew=True)
+    assert not kept.differences("here/zero", rounding)
+    assert not kept.differences("here/rounding", zero)
+    assert len(kept.differences("here/zero", record(1e-6, [0.0, 0.0, -1e-6]))) == 2
+    assert len(kept.differences("here/zero", record(0.0, [0.0, 0.0, np.nan]))) == 1
+
+
 def test_a_picture_is_told_by_what_it_shows():
     from matplotlib.figure import Figure
 

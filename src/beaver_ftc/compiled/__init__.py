@@ -1,7 +1,8 @@
 """How this package compiles its per-frame maths: once per machine, by fixed floating-point rules.
 
 Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a
-frame instead of every operation doing so. No fast-math: the same flight gives the same bits.
+frame instead of every operation doing so. No fast-math: on one machine and build the same flight
+gives the same bits.
 
 Compiled code is kept in the user's cache, each kernel under what its code follows from: an edit compiles
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is

@@ -149,7 +149,7 @@ def bound_of(fault_class="all", bounds=None, **keys):
     """{path: value} of what is set up of the bounds of a flight."""
     given = {"name": "x", "fdi": {"fault_class": fault_class, "bounds": bounds or {}}, **keys}
     flight, record = scenario(given), np.zeros(1, bound_dtype(4))[0]
-    bound_kernels.configure_uncertainty_bound(record, flight, Declared.of(flight), design_record()[0])
+    bound_kernels.configure_uncertainty_bound(record, Declared.of(flight), design_record()[0])
     return dict(not_zero(record))
 
 

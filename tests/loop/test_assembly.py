@@ -222,7 +222,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         before["config"]["diagnoses_all_types"],
     )
     assert switches == (1, 1, 1)
-    plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
+    plugin_frame.plugged(frames, scenario, Trim(np.zeros(3), Y, TRIM, TRIM), RlsMonitor(), None)
     fdi = frames["fdi"][0]
     off = (
         fdi["config"]["enabled"],
@@ -238,7 +238,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     scenario = Scenario.model_validate(pairs)
     frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
     assert frames["fdi"]["types"]["pair"]["enabled"][0] == 1
-    plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
+    plugin_frame.plugged(frames, scenario, Trim(np.zeros(3), Y, TRIM, TRIM), RlsMonitor(), None)
     assert frames["fdi"]["types"]["pair"]["enabled"][0] == 0
 
 

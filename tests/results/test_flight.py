@@ -58,7 +58,7 @@ class TestFlown:
         said = repr(flight)
         assert said.startswith("test: FAILED\n")
         assert "isolated fault rudder, got elevator" in said
-        assert len(said.splitlines()) < 12
+        assert len(said.splitlines()) < 14
         assert "<b>test: FAILED</b>" in flight._repr_html_()
 
     def test_without_a_log_there_is_the_verdict_alone(self, flight, tmp_path):

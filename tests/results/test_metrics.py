@@ -7,9 +7,9 @@ from synthetic import Expect, Fault, Flight, Scenario
 from beaver_ftc.results.metrics import as_json, metrics
 
 KEYS = [
-    "scenario", "seed", "frames", "flight", "fault", "faults", "detection", "isolation", "false_alarm",
-    "fault_free_s", "tracking", "supervisor", "changes", "mode_changes_left_out", "envelope_exits",
-    "envelope", "departure",
+    "scenario", "seed", "frames", "flight", "fault", "faults", "assumes", "outside_class", "detection",
+    "isolation", "false_alarm", "fault_free_s", "tracking", "supervisor", "changes", "mode_changes_left_out",
+    "envelope_exits", "envelope", "departure",
     "authority", "engine_power", "profile", "arrival", "limits", "saturation_s", "hints",
     "expectations", "passed", "versions",
 ]  # fmt: skip

@@ -62,6 +62,7 @@ FLIGHTS = {
     "an-instrument": {
         "duration_s": 8, "reference": RATES,
         "faults": [{"sensor": "p", "type": "bias", "magnitude": 4, "at_s": 4.0}],
+        "fdi": {"sensor_monitor": "always"},
     },
     "by-chance": {
         "duration_s": 9, "reference": RATES,
@@ -108,6 +109,10 @@ class Flown:
     def broken(self):
         """Instruments that break."""
         return [fault["sensor"] for fault in self.faults if "sensor" in fault]
+
+    @property
+    def diagnoses(self):
+        return self.given.get("fdi", {}).get("scheme") != "none"
 
     @property
     def at_s(self):
@@ -179,6 +184,15 @@ def meant_s(flown, name, time_s):
     if name == "unanticipated" and not own and second and time_s >= second[0] - DUST_S:
         own = second
     return own[0] if own else None
+
+
+def is_outside(fault, fdi):
+    """Whether the class does not have a fault: of an instrument, or other than a loss of a leader."""
+    everything = fdi.get("fault_class") == "all"
+    if "sensor" in fault:
+        return fdi.get("sensor_monitor", "always" if everything else "never") == "never"
+    loss = fault["type"] == "loss_of_effectiveness" and fault["actuator"] != "flap"
+    return "actuator" in fault and not everything and not loss
 
 
 def name_of(fault):
@@ -415,6 +429,11 @@ OF_LOG = {
     "scenario": lambda f: f.scenario.name,
     "seed": lambda f: f.given.get("seed", 1),
     "frames": lambda f: len(f.t),
+    "assumes": lambda f: ["sensors-sound"] * (f.diagnoses and not f.has("watch_share")),
+    "outside_class": lambda f: [
+        f"{name_of(fault)} {fault['type'].replace('_', ' ')} at {fault['at_s']:g} s"
+        for fault in f.given["faults"] if f.diagnoses and is_outside(fault, f.given.get("fdi", {}))
+    ],
     "flight": lambda f: {
         "airspeed_mps": f.given.get("initial", {}).get("airspeed_mps", 45.0),
         "altitude_m": 1828.8, "rate_hz": 100.0, "flown_s": f.end_s,

@@ -92,9 +92,21 @@ NAMED = {
     "type": "stuck", "candidates": ["stuck"], "estimate": None, "estimate_deg": None,
 }  # fmt: skip
 FAULTS = [
-    {"actuator": "rudder", "type": "stuck", "size": {"position_deg": 9.0}},
-    {"actuator": "elevator", "type": "stuck", "size": {"position_deg": 3.0}},
-    {"actuator": "elevator", "type": "loss_of_effectiveness", "size": {"magnitude": 0.4}},
+    {"actuator": "rudder", "type": "stuck", "at_s": 4.0, "profile": "abrupt", "size": {"position_deg": 9.0}},
+    {
+        "actuator": "elevator",
+        "type": "stuck",
+        "at_s": 4.0,
+        "profile": "abrupt",
+        "size": {"position_deg": 3.0},
+    },
+    {
+        "actuator": "elevator",
+        "type": "loss_of_effectiveness",
+        "at_s": 4.0,
+        "profile": "abrupt",
+        "size": {"magnitude": 0.4},
+    },
 ]
 
 
@@ -136,7 +148,10 @@ FAULTS = [
     ],
 )
 def test_a_named_fault_in_words(changes, said):
-    assert verdict._isolation_text(Metrics.of({"isolation": NAMED | changes, "faults": FAULTS})) == said
+    named = NAMED | changes
+    faults = [FAULTS[0], *(fault for fault in FAULTS[1:] if fault["type"] == named["type"])]
+    found = {"isolation": named, "faults": faults, "flight": {"flown_s": 30.0, "rate_hz": 100.0}}
+    assert verdict._isolation_text(Metrics.of(found)) == said
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ class PluginFrame:
         law: Law | None,
         begun: "PluginFrame | None",
     ) -> None:
-        self.detector, self.law, self.verdict, self._t_s = detector, law, Verdict(), 0.0
+        self.detector, self.law, self.verdict, self.t_s = detector, law, Verdict(), 0.0
         self._direct: dict[Any, Any] = {}  # machine code of stages: for flights of records of one shape
         self._surfaces = surfaces = scenario.airframe.surfaces
         self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
@@ -101,7 +101,7 @@ class PluginFrame:
         if status == NOT_FINITE:
             return status
         row, measured = int(frame["row"]), measured_of(frame)
-        self._t_s = measured.t_s
+        self.t_s = measured.t_s
         self._diagnose(frames, measured)
         self._stage(stages.decide, frames)
         self._command(frames, references[row], measured)
@@ -144,7 +144,7 @@ class PluginFrame:
             self._blame(name, f"{question.__name__} raised {type(error).__name__}: {reason}")
 
     def _blame(self, name: str, what: str) -> None:
-        raise SimulationFailed(f"plug-in {name} at {self._t_s:g} s: {what[:500]}")
+        raise SimulationFailed(f"plug-in {name} at {self.t_s:g} s: {what[:500]}")
 
     def _checked(self, verdict: Any, taken: np.void) -> Verdict:
         """A verdict that is one, put into the record that compiled code reads."""

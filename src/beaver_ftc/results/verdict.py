@@ -321,9 +321,11 @@ def _assumptions_text(metrics: Metrics) -> str:
 def _outside_class_text(metrics: Metrics) -> str:
     """The faults that the diagnosis cannot name, as its class does not have them."""
     outside = " and ".join(metrics.outside_class or ())
+    if not outside:
+        return ""
     wider = "fault_class: all" if metrics.flight.fault_class != "all" else "sensor_monitor: always"
     says = f"outside the declared class, so that it cannot be named; set fdi.{wider}"
-    return f"{outside}: {says}" if outside else ""
+    return f"{outside}: {says}"
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:

@@ -593,7 +593,7 @@ def test_all_that_a_monitor_is_set_up_with_and_no_more(noise_deg, share):
 
 def test_a_monitor_that_is_off_has_found_nothing_and_holds_no_more():
     monitor = np.zeros(1, SENSOR_MONITOR_RECORD)[0]
-    redundancy.configure_sensor_monitor(monitor, None, None, None, False)
+    redundancy.configure_sensor_monitor(monitor, Declared.of(Scenario(name="x")), None, None)
     assert {path: value.item() for path, value in not_zero(monitor)} == {
         "output.alarmed_at_s": -1.0, "output.isolated_sensor": -1, "output.isolated_at_s": -1.0,
     }  # fmt: skip

@@ -26,6 +26,7 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
         -1,
     )
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
+    fdi["types"]["pair"]["first_pitch_fault_surface"] = -1
     fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - PITCH_SURFACE_GROUP
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_SURFACE_GROUP

@@ -84,7 +84,7 @@ def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
     plugins, is_false = loop.plugin_frame, Truth.of(loop.scenario).onset.is_false
 
     def after_frame() -> None:
-        if plugins is not None and plugins.verdict.detected and is_false(float(loop.frames["t"][0])):
+        if plugins is not None and plugins.verdict.detected and is_false(plugins.t_s):
             raise _FalseAlarm
 
     loop.after_frame = after_frame if plugins is not None else None

@@ -63,6 +63,7 @@ def draw(rng: np.random.Generator, bounds: str, turbulent: bool) -> dict[str, An
         "environment": {"turbulence": "dryden", "severity": "light"} if turbulent else {},
         "fdi": {
             "fault_class": str(rng.choice(["published", "all"])),
+            "sensor_monitor": "always",
             "bounds": {"sensors": bounds, "turbulence": "light" if turbulent else "none"},
         },
         "control": {"law": str(rng.choice(["fault-tolerant", "nominal", "fault-tolerant-published"]))},
@@ -148,6 +149,7 @@ def draw_at_start(rng: np.random.Generator, aircraft: str, later: bool) -> dict[
         "environment": {"turbulence": "dryden", "severity": turbulent} if turbulent != "none" else {},
         "fdi": {
             "fault_class": str(rng.choice(["published", "all"])),
+            "sensor_monitor": "always",
             "bounds": {"sensors": sizes_of(sensors), "turbulence": turbulent},
         },
         "control": {"law": str(rng.choice(["fault-tolerant", "nominal", "lqr"]))},

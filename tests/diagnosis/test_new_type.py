@@ -174,7 +174,7 @@ CERTIFIED = """
 import json
 import beaver_ftc as bf
 jam = dict(
-    name="jam", duration_s=1.2, rate_hz=50, fdi=dict(fault_class="all"),
+    name="jam", duration_s=1.2, rate_hz=50, fdi=dict(fault_class="all", sensor_monitor="never"),
     reference={axis: [dict(sine=dict(amplitude_deg_s=3, frequency_hz=0.3))] for axis in "pqr"},
     faults=[dict(actuator="aileron", type="stuck", position_deg=5, at_s=0.5)],
 )
@@ -230,7 +230,8 @@ import json
 import beaver_ftc as bf
 def flown(law, duration_s):
     return bf.fly(dict(
-        name="worn", duration_s=duration_s, rate_hz=25, fdi=dict(fault_class="all"), control=dict(law=law),
+        name="worn", duration_s=duration_s, rate_hz=25, control=dict(law=law),
+        fdi=dict(fault_class="all", sensor_monitor="never"),
         reference=dict(p=[dict(sine=dict(amplitude_deg_s=6, frequency_hz=0.3))]),
         faults=[dict(actuator="aileron", type="overdrive", growth_per_deg=0.02, at_s=2)],
         expect=dict(isolated_as="aileron", isolated_type="overdrive"),

@@ -4,12 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
+from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import json_schema
 from beaver_ftc.scenario.sensors import QUANTITIES
 from tools.drawn.array import CoveringArray, Row
@@ -34,6 +36,17 @@ COUNTS = {"one": (1, 2), "two": (2, 3), "many": (3, 7)}
 
 
 @dataclass(frozen=True)
+def _is_masked(fault: Words, faults: list[Words]) -> bool:
+    """Whether another fault of its surface leaves nothing of a fault as it begins, which is refused."""
+    for other in faults:
+        same = other is not fault and "actuator" in fault and other.get("actuator") == fault["actuator"]
+        if same and other["at_s"] <= fault["at_s"] < other.get("end_s", inf):
+            row = TYPES[other["type"]]
+            if fault["type"] in row.masks and not (other["type"] == fault["type"] and row.replaces_like):
+                return True
+    return False
+
+
 class Kind:
     """Of an array. declared: every error of the truth is. only: what a factor is restricted to."""
 
@@ -219,7 +232,7 @@ class Composer:
         kind = self._row["sensor fault"]
         if kind != LEFT_OUT:
             broken.append(self._sensor_fault(kind))
-        words["faults"] = broken
+        words["faults"] = [fault for fault in broken if not _is_masked(fault, broken)]
 
     def _another(self) -> Words:
         kind = str(self._rng.choice(list(fault_types(self._schema))))

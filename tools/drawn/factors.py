@@ -126,7 +126,8 @@ def grows(schema: Node, kind: str) -> bool:
 # What goes with the published scheme.
 _AS_PUBLISHED = {
     "detector": ("worst-case",), "fdi.fault_class": (LEFT_OUT, "published"),
-    "fdi.pairs": (LEFT_OUT, "false"), "fdi.sensor_monitor": (LEFT_OUT, "auto"), "fdi.probing": (LEFT_OUT,),
+    "fdi.pairs": (LEFT_OUT, "false"), "fdi.sensor_monitor": (LEFT_OUT, "auto", "never"),
+    "fdi.probing": (LEFT_OUT,),
     "fdi.thresholds": (LEFT_OUT, "published"), "fdi.sharpen": (LEFT_OUT, "none"),
 }  # fmt: skip
 MOVING_AIR = ("air", "gusts", "environment.wind_mps")
@@ -187,9 +188,7 @@ class Together:
     @staticmethod
     def _promises_nothing(name: str, level: str, other: str, there: str) -> bool:
         """A gust is not declared to the watch of the instruments, and `never` watches none."""
-        watched = (other, there) == ("fdi.sensor_monitor", "always") or (
-            other == "sensor fault" and there != LEFT_OUT
-        )
+        watched = (other, there) in (("fdi.sensor_monitor", "always"), ("fdi.fault_class", "all"))
         if name == "gusts" and level != LEFT_OUT:
             return watched
         return (

@@ -178,7 +178,7 @@ def _instrument(
 ) -> Iterator[str]:
     """One broken instrument, watched since before it broke: no surface and no other instrument is named."""
     fault, named = sensors[0], metrics["isolation"]["fault"]
-    watched = scenario.fdi.sensor_monitor != "never" and _began_s(metrics) < fault.at_s
+    watched = scenario.fdi.monitors_sensors and _began_s(metrics) < fault.at_s
     if surfaces or len(sensors) > 1 or not watched:
         return
     if named is not None and not DeclaredFault.of(fault).is_named_by(named):

@@ -26,7 +26,6 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
-from beaver_ftc.plant.channels import signal_places, truth_channels
 from beaver_ftc.plant.trim import TrimPoint, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Environment
 from beaver_ftc.scenario.builtin import texts_of
@@ -164,10 +163,12 @@ def known_trim(scenario: Scenario) -> KnownTrim:
             _known_trims.clear()
         plant, point = ready(nominal)
         take_off(plant, nominal, point)
-        channels = truth_channels(aircraft)
+        from beaver_ftc.plant import channels as compiled  # needs the compiler, which only flights load
+
+        channels = compiled.truth_channels(aircraft)
         readings = np.array([plant.read(name) * factor for _, name, factor in channels])
         give_back(plant)
-        y = readings[signal_places(aircraft.n, len(aircraft.signals))]
+        y = readings[compiled.signal_places(aircraft.n, len(aircraft.signals))]
         _known_trims[key] = KnownTrim(readings[:3], y, np.array(list(point.surfaces_rad.values())))
     return _known_trims[key]
 

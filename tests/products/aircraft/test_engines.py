@@ -133,7 +133,7 @@ def test_what_they_cannot_give_is_not_integrated(jet):
 
 def test_without_engines_as_effectors_nothing_is_moved():
     record = np.zeros(1, engines.ENGINES)[0]
-    engines.configure_engines(record, bf.load("fault-free"))
+    engines.configure_engines(record, Declared.of(bf.load("fault-free")))
     assert record["config"]["n"] == 0
     assert not record["config"]["B"].any()
 

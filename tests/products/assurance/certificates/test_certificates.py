@@ -38,6 +38,8 @@ GYROS = {"p": GYRO, "q": GYRO, "r": GYRO}
 COARSE = dict.fromkeys("pqr", GYRO | {"quantum_deg_s": 0.02})
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.5, "at_s": 0.5}
 STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
+SOUND = {"fault_class": "all", "sensor_monitor": "never"}
+DOUBTED = {"sensor_monitor": "always"}
 FLIGHTS = {
     "loss": {"faults": [LOSS]},
     "loss with release": {"faults": [LOSS | {"end_s": 0.8}]},
@@ -50,9 +52,9 @@ FLIGHTS = {
         "fdi": {"thresholds": "published", "sharpen": "none"},
     },
     "abrupt loss": {"faults": [LOSS | {"magnitude": 0.1}], "fdi": {"fault_profile": "abrupt"}},
-    "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": {"fault_class": "all"}},
-    "any type": {"faults": [STUCK], "fdi": {"fault_class": "all"}},
-    "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": {"fault_class": "all"}},
+    "substeps": {"faults": [STUCK], "substeps": 3, "rate_hz": 50, "fdi": SOUND},
+    "any type": {"faults": [STUCK], "fdi": SOUND},
+    "any type with release": {"faults": [STUCK | {"end_s": 0.9}], "fdi": SOUND},
     "gyros": {"faults": [LOSS], "sensors": COARSE, "fdi": {"bounds": {"sensors": COARSE}}},
     "filters begun long ago": {  # what a fault can have done to them before the frames kept counts
         "faults": [LOSS | {"actuator": "rudder", "magnitude": 0.6, "at_s": 1.0}],
@@ -61,7 +63,7 @@ FLIGHTS = {
     },
     "tolerances": {
         "faults": [STUCK],
-        "fdi": {"fault_class": "all", "bounds": {"coefficients": 0.05, "inertia": 0.02}},
+        "fdi": SOUND | {"bounds": {"coefficients": 0.05, "inertia": 0.02}},
     },
     "another aircraft": {
         "aircraft": "jsbsim:c172p",
@@ -96,14 +98,20 @@ FLIGHTS = {
             "bounds": {"sensors": GYROS, "turbulence": "light"},
         },
     },
-    "an altimeter": {"faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}]},
-    "a roll angle": {"faults": [{"sensor": "phi", "type": "bias", "magnitude": 0.1, "at_s": 1.0}]},
+    "an altimeter": {
+        "faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}],
+        "fdi": DOUBTED,
+    },
+    "a roll angle": {
+        "faults": [{"sensor": "phi", "type": "bias", "magnitude": 0.1, "at_s": 1.0}],
+        "fdi": DOUBTED,
+    },
     "blocks": {
         "faults": [STUCK],
         "sensors": GYROS,
-        "fdi": {"fault_class": "all", "bounds": {"sensors": GYROS}},
+        "fdi": SOUND | {"bounds": {"sensors": GYROS}},
     },
-    "no vane": {"faults": [{"sensor": "alpha", "type": "lost", "at_s": 1.0}]},
+    "no vane": {"faults": [{"sensor": "alpha", "type": "lost", "at_s": 1.0}], "fdi": DOUBTED},
     "no fault": {},
 }
 CHANCE = [name for name in FLIGHTS if name.startswith("chance")]
@@ -587,7 +595,7 @@ def test_whatever_fails_while_results_are_written_the_log_is_kept(
 
 
 def test_a_fault_in_the_first_row_has_a_certificate():
-    given = {"name": "zero", "duration_s": 0.5, "reference": SINES, "fdi": {"fault_class": "all"}}
+    given = {"name": "zero", "duration_s": 0.5, "reference": SINES, "fdi": SOUND}
     proof = bf.fly(given | {"faults": [STUCK | {"at_s": 0}]}).proof()
     certificate = json.loads(as_text(proof.certificate))
     assert certificate["statements"][0]["frame"] == 1

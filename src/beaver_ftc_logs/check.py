@@ -15,6 +15,12 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
+from beaver_ftc_logs.known_commands import (
+    command_names,
+    is_command_name,
+    missing_commands_text,
+    multicopter_reason,
+)
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
     NAMES_OF_READERS_OF_WANTED_COLUMNS,
@@ -23,7 +29,12 @@ from beaver_ftc_logs.readers import (
     read_parts,
     reader_name_for_path,
 )
-from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers_of_column
+from beaver_ftc_logs.readers.table import (
+    TIME_COLUMN,
+    column_names,
+    first_cells_of_column,
+    text_of_column_phrase,
+)
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
 from beaver_ftc_logs.units import (
@@ -40,8 +51,10 @@ def _rate_name_pattern(rate_name: str, angle: str, axis: str, vector_index: int)
     """Return a pattern of the names of a body rate: ours, by its angle, by its axis, by its place in a
     vector."""
     return "|".join((
-        f"{rate_name}_rad_s", rate_name, rf"(.*\.)?{angle}_?(rate|speed)\w*", rf".*gyr(o|_)?_?{axis}\w*",
-        rf".*gyro_rad\[{vector_index}\]", f"w{axis}", f"omega_?{axis}", rf"rate\.{angle[0]}",
+        rf"(.*_)?{rate_name}_(rad|deg)_?s(ec)?", rate_name, rf"(.*\.)?{angle}_?(rate|speed)\w*",
+        rf".*gyr(o|_)?_?{axis}\w*", rf".*gyro_?(rad|adc)\[{vector_index}\](_deg_s)?",
+        rf"(.*[._])?ang(ular)?_?vel(ocity)?_?({axis}|{rate_name})(_\w+)?", f"w{axis}",
+        f"omega_?{axis}", rf"rate\.{angle[0]}",
         rf".*velocity\.({axis}|xyz\[{vector_index}\])",
     ))  # fmt: skip
 
@@ -54,13 +67,15 @@ _COLUMN_NAME_PATTERNS = {
     "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
     "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
     "airspeed": r"(.*\.)?(true_)?(airspeed|[kect]?[tice]as)(_\w+)?",
-    "time": r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
+    "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
+    r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
-_COMMAND_NAME_PATTERN = (
-    r"^d(elta_?)?[aer]$|cmd|command|control\[|setpoint|_sp$|^srfc|^rcou|servo|actuator|"
-    r"aileron|elevator|rudder|elevon"
+_NOT_MEASURED_NAME_PATTERN = (
+    r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
+    r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
-_NOT_A_COMMAND_NAME_PATTERN = r"truth|effectiveness|position|_pos|feedback|measured|error|failure"
+"""Names of what others derive from a quantity, or want of it: none of these is the quantity."""
+_ANGLE_DERIVATIVE_PATTERN = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _RATE_UNIT_BY_NAME_PART = {
     "rad_s": "rad/s",
     "rad/s": "rad/s",
@@ -208,22 +223,35 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
         name for name, column in recording.columns.items() if np.isfinite(column.values).any()
     ]
     column_name_by_quantity = {
-        quantity: _shortest_matching_column_name(pattern, names_with_numbers)
+        quantity: _shortest_matching_column_name(
+            pattern,
+            [
+                name
+                for name in names_with_numbers
+                if quantity not in ("roll", "pitch")
+                or not re.search(_ANGLE_DERIVATIVE_PATTERN, _snake_case_name(name))
+            ],
+        )
         for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
     if not mixing.surfaces:
-        _guess_surfaces(mixing, recording, names_with_numbers, column_name_by_quantity)
+        rotors = multicopter_reason(recording.parameters, names_in_log)
+        if rotors is not None:
+            remarks.append(
+                f"{path}: is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of "
+                "an aircraft with surfaces"
+            )
+            return None
+        _guess_surfaces(mixing, recording, names_with_numbers)
     missing_axes = [axis for axis in "pqr" if column_name_by_quantity[axis] is None]
     if missing_axes or not mixing.surfaces:
         problem = (
-            f"no column looks like the rate {missing_axes[0]}"
+            f"no column looks like the rate {missing_axes[0]}, allowed: a vehicle file that names it"
             if missing_axes
-            else "no column looks like a command"
+            else missing_commands_text(names_in_log)
         )
         nearest_text = nearest_names_text("rate" if missing_axes else "command", names_in_log)
-        remarks.append(
-            f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest_text}"
-        )
+        remarks.append(f"{path}: {problem}; the log has {nearest_text}")
         return None
     return _propose_vehicle(
         path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, mixing
@@ -288,10 +316,9 @@ def _guess_surfaces(
     mixing: Mixing,
     recording: RecordedFlight,
     names_with_numbers: Sequence[str],
-    column_name_by_quantity: dict[str, str | None],
 ) -> None:
-    """Make a surface of each column that is named like a command."""
-    for name in _command_column_names(names_with_numbers, column_name_by_quantity):
+    """Make a surface of each column that is known to carry a command."""
+    for name in command_names(names_with_numbers, recording.parameters)[:_MAX_PROPOSED_COMMANDS]:
         mixing.entry_by_column[name] = _vehicle_file_command_entry(name, recording.columns[name].values)
         mixing.surfaces[_as_vehicle_or_surface_name(name)] = {name: 1.0}
 
@@ -316,16 +343,9 @@ def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _M
     """Columns that may be something: a log with many is not read whole."""
     pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
     names_like_quantity_or_command = [
-        name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or _is_name_like_command(name)
+        name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or is_command_name(name)
     ]
     return names_like_quantity_or_command[:max_columns]
-
-
-def _is_name_like_command(column_name: str) -> bool:
-    return bool(
-        re.search(_COMMAND_NAME_PATTERN, column_name.lower())
-        and not re.search(_NOT_A_COMMAND_NAME_PATTERN, column_name.lower())
-    )
 
 
 def _snake_case_name(column_name: str) -> str:
@@ -333,7 +353,7 @@ def _snake_case_name(column_name: str) -> str:
     name_with_unit_suffix = re.sub(
         r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower()
     )
-    return re.sub(r"[\s/]+", "_", name_with_unit_suffix)
+    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", name_with_unit_suffix).strip("_")
 
 
 def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | None:
@@ -341,16 +361,10 @@ def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | 
     matching_names = [
         name
         for name in names
-        if re.fullmatch(pattern, _snake_case_name(name)) and not _is_name_like_command(name)
+        if re.fullmatch(pattern, _snake_case_name(name))
+        and not re.search(_NOT_MEASURED_NAME_PATTERN, _snake_case_name(name))
     ]
     return min(matching_names, key=lambda name: (len(name), name), default=None)
-
-
-def _command_column_names(names: Sequence[str], column_name_by_quantity: dict[str, str | None]) -> list[str]:
-    names_of_other_quantity_columns = set(column_name_by_quantity.values())
-    return [
-        name for name in names if _is_name_like_command(name) and name not in names_of_other_quantity_columns
-    ][:_MAX_PROPOSED_COMMANDS]
 
 
 def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
@@ -361,13 +375,13 @@ def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, 
         for name in table_column_names
         if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
     ]
+    text_phrases: list[str] = []
     for name in sorted(names_like_time, key=lambda name: name != TIME_COLUMN):
-        first_stamps = first_numbers_of_column(path, name)
-        median_step = (
-            float(np.median(np.diff(first_stamps[np.isfinite(first_stamps)][:50])))
-            if len(first_stamps) > 1
-            else 0.0
-        )
+        first_cells = first_cells_of_column(path, name)
+        first_stamps = first_cells.numbers[name][np.isfinite(first_cells.numbers[name])]
+        if text_phrase := text_of_column_phrase(first_cells, name):
+            text_phrases.append(f"{name} holds {text_phrase.removeprefix(', but ')}")
+        median_step = float(np.median(np.diff(first_stamps[:50]))) if len(first_stamps) > 1 else 0.0
         plausible_units = [
             unit
             for unit, seconds_per_unit in SECONDS_PER_TIME_UNIT.items()
@@ -382,8 +396,9 @@ def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, 
                 remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
     allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
+    text_phrase = f" ({'; '.join(text_phrases)})" if text_phrases else ""
     raise BadInput(
-        f"{path}: no column of time, allowed: {allowed_text}; it has "
+        f"{path}: no column of time{text_phrase}, allowed: {allowed_text}; it has "
         f"{nearest_names_text(TIME_COLUMN, table_column_names)}"
     )
 

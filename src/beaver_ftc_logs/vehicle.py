@@ -39,7 +39,7 @@ from beaver_ftc_logs.units import (
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_SETTABLE_FALSE_ALARMS_PER_HOUR = 1000.0
-_STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
+STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -369,7 +369,7 @@ class Vehicle(Section):
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
         is_air_still = self.moving_air is False or (self.moving_air is None and self.labels)
-        default_hz = _STILL_AIR_MAX_RATE_HZ if is_air_still else _MOVING_AIR_MAX_RATE_HZ
+        default_hz = STILL_AIR_MAX_RATE_HZ if is_air_still else _MOVING_AIR_MAX_RATE_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:

@@ -1,5 +1,6 @@
 """Readers of recorded flights, by name. A new format is one file here and one line in `READER_NAMES`."""
 
+import re
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -25,6 +26,23 @@ _READER_NAME_BY_SUFFIX = {
     ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
 }  # fmt: skip
 
+
+_BLACKBOX_PHRASE = (
+    "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
+)
+_WAY_TO_TABLE_BY_SUFFIX = {
+    ".tlog": "a telemetry log (MAVLink messages that a ground station received), allowed: the autopilot's "
+    "own log (.bin, .ulg), or a table of the telemetry, which pymavlink writes: `mavlogdump.py --format csv "
+    "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
+    ".bbl": _BLACKBOX_PHRASE, ".bfl": _BLACKBOX_PHRASE,
+}  # fmt: skip
+"""Logs that another program turns into a table: what they are, and how."""
+_POINTER_BYTES = 200
+_LARGE_FILE_STORES = {
+    rb"version https?://(git-lfs|hawser)\.github\.com/spec/": ("Git LFS", "git lfs pull"),
+    rb"(\.\./|/)*(\.git/)?annex/objects/": ("git-annex", "git annex get FILE"),
+}
+"""How pointers begin: the name of the store, and the command that fetches the file."""
 
 _TIME_COLUMN_AND_UNIT_BY_READER = {
     "alfa": ("%time", "ns"),
@@ -126,15 +144,32 @@ def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
 
 
 def check_exists(path: Path) -> None:
-    """Raise BadInput where there is no log."""
+    """Raise BadInput where there is no log, or only a pointer to one."""
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
+    check_is_log_itself(path)
+
+
+def check_is_log_itself(path: Path) -> None:
+    """Raise BadInput for the few bytes that stand in a repository for a large file kept elsewhere."""
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        first_bytes = file.read(_POINTER_BYTES)
+    for pattern, (store, command) in _LARGE_FILE_STORES.items():
+        if re.match(pattern, first_bytes):
+            raise BadInput(
+                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: the log "
+                f"itself, which `{command}` fetches"
+            )
 
 
 def reader_name_for_path(path: Path) -> str:
     """The reader that a path asks for by its form. Raises BadInput where none does."""
     if path.is_dir():
         return "alfa"
+    if path.suffix.lower() in _WAY_TO_TABLE_BY_SUFFIX:
+        raise BadInput(f"{path}: is {_WAY_TO_TABLE_BY_SUFFIX[path.suffix.lower()]}")
     reader_name = _READER_NAME_BY_SUFFIX.get(path.suffix.lower())
     if reader_name is None:
         raise BadInput(

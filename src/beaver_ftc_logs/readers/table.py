@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.readers import MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE
+from beaver_ftc_logs.readers import MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
 from beaver_ftc_logs.readers.text import (
     TableCells,
     TableLayout,
@@ -74,7 +74,7 @@ def read_parts(
                 f"{note_of_column[column]}\n{remark}" if column in note_of_column else remark
             )
         t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[time_unit]
-        is_row_kept, left_out_row_notes = _timed_row_mask_and_notes(path, time_column, t_s)
+        is_row_kept, left_out_row_notes = _timed_row_mask_and_notes(path, time_column, t_s, cells)
         row_selection = slice(None) if is_row_kept is None else is_row_kept
         t_s = t_s[row_selection]
         check_row_count_and_time(path, t_s, time_column, cells.n_rows_before)
@@ -97,19 +97,31 @@ def _with_unread_columns_as_nan(all_columns: Sequence[str], cells: TableCells) -
     return {name: cells.numbers.get(name, nan_values) for name in all_columns}
 
 
-def _timed_row_mask_and_notes(path: Path, time_column: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
+def _timed_row_mask_and_notes(
+    path: Path, time_column: str, t_s: Floats, cells: TableCells
+) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
     n_without_time = int(np.isnan(t_s).sum())
     if not n_without_time:
         return None, []
     if n_without_time > len(t_s) // 2:
+        text_phrase = text_of_column_phrase(cells, time_column)
         raise BadInput(
-            f"{path}: {time_column}: {n_without_time} of {len(t_s)} rows hold no number, "
+            f"{path}: {time_column}: {n_without_time} of {len(t_s)} rows hold no number{text_phrase}, "
             "allowed: increasing time"
         )
     return np.isfinite(t_s), [
         f"{time_column}: rows without a number, left out: {n_without_time} of {len(t_s)}"
     ]
+
+
+def text_of_column_phrase(cells: TableCells, name: str) -> str:
+    """`, but text such as '7 ticks'` for a column with cells of text, else nothing."""
+    return (
+        f", but text such as {cells.text_cell_summaries[name][2][:30]!r}"
+        if (name in cells.text_cell_summaries)
+        else ""
+    )
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
@@ -125,9 +137,9 @@ def column_names(path: Path) -> list[str]:
     return _column_names_and_parts(path, [], None)[0]
 
 
-def first_numbers_of_column(path: Path, name: str) -> Floats:
-    """The first numbers of a column."""
-    return next(_column_names_and_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
+def first_cells_of_column(path: Path, name: str) -> TableCells:
+    """The first cells of a column."""
+    return next(_column_names_and_parts(path, [name], _BATCH_ROWS)[1])[0]
 
 
 def _text_table_layout(path: Path) -> TableLayout:
@@ -167,7 +179,10 @@ def check_row_count_and_time(
 def _column_names_and_parts(
     path: Path, columns: Collection[str] | None, rows_per_part: int | None
 ) -> tuple[list[str], Iterator[TablePart]]:
-    """The names of a table's columns, and its parts of so many rows; the whole where None."""
+    """The names of a table's columns, and its parts of so many rows; the whole where None.
+
+    Raises BadInput for a wanted name that several columns have."""
+    check_is_log_itself(path)
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
     with _convert_read_errors_to_bad_input(path):
         names, readable_columns = (
@@ -175,8 +190,15 @@ def _column_names_and_parts(
             if layout is None
             else (list(layout.column_names), list(layout.column_names))
         )
-    _check_names_unique(path, names)
-    wanted_columns = [name for name in readable_columns if columns is None or name in columns]
+    doubled_names = layout.doubled_names if layout else _repeated_names(names)
+    used_doubled_names = sorted(name for name in doubled_names if columns is not None and name in columns)
+    if used_doubled_names:
+        raise BadInput(f"{path}: has two columns {used_doubled_names[0]}, allowed: one of a name")
+    wanted_columns = [
+        name
+        for name in readable_columns
+        if name not in doubled_names and (columns is None or name in columns)
+    ]
     blocks = (
         _read_parquet_batches(path, wanted_columns)
         if layout is None
@@ -247,10 +269,8 @@ def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCel
     yield TableCells({name: np.empty(0) for name in names}, 0, n_rows_read)
 
 
-def _check_names_unique(path: Path, names: Sequence[str]) -> None:
-    duplicate_name = next((name for name, n_of_name in Counter(names).items() if n_of_name > 1), None)
-    if duplicate_name is not None:
-        raise BadInput(f"{path}: has two columns {duplicate_name}, allowed: one of a name")
+def _repeated_names(names: Sequence[str]) -> frozenset[str]:
+    return frozenset(name for name, n_of_name in Counter(names).items() if n_of_name > 1)
 
 
 def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ many cells costs itself; both are counted.
 
 import csv as csv_lines
 import re
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc_logs.readers.time_text import DayCount, is_clock, seconds_of_text
 from beaver_ftc_logs.recording import Floats
 
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
@@ -26,12 +28,16 @@ _MAX_BROKEN_LINE_SHARE = 0.1
 
 @dataclass(frozen=True)
 class TableLayout:
-    """How a table is written: the place of the line with the names, what is between cells and in numbers."""
+    """How a table is written: the place of the line with the names, what is between cells and in numbers.
+
+    column_names: each once. Columns that share a name, one of doubled_names, have their places with it:
+    `p (column 2)`."""
 
     header_line_index: int
     column_names: tuple[str, ...]
     delimiter: str
     decimal_mark: str
+    doubled_names: frozenset[str] = frozenset()
 
 
 @dataclass
@@ -91,7 +97,7 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
     for line_index, header_cells in enumerate(lines_of_cells):
         first_rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
         if not first_rows_below and line_index == 0 and len(header_cells) > 1:
-            return TableLayout(line_index, tuple(header_cells), delimiter, ".")  # a table of no rows
+            return _layout_of_header(line_index, header_cells, delimiter, ".")  # a table of no rows
         has_as_many_cells_as_header = [len(row) == len(header_cells) for row in first_rows_below]
         if (
             len(header_cells) < 2
@@ -108,9 +114,20 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
         ]
         if number_cells:
             has_decimal_comma = delimiter != "," and any("," in cell for cell in number_cells)
-            column_names = tuple(name.strip() for name in (header_cells[0].lstrip("# "), *header_cells[1:]))
-            return TableLayout(line_index, column_names, delimiter, "," if has_decimal_comma else ".")
+            return _layout_of_header(line_index, header_cells, delimiter, "," if has_decimal_comma else ".")
     return None
+
+
+def _layout_of_header(
+    line_index: int, header_cells: Sequence[str], delimiter: str, decimal_mark: str
+) -> TableLayout:
+    names = [name.strip() for name in (header_cells[0].lstrip("# "), *header_cells[1:])]
+    doubled_names = frozenset(name for name, n_of_name in Counter(names).items() if n_of_name > 1)
+    unique_names = (
+        f"{name} (column {place})".strip() if name in doubled_names else name
+        for place, name in enumerate(names, 1)
+    )
+    return TableLayout(line_index, tuple(unique_names), delimiter, decimal_mark, doubled_names)
 
 
 def _split_cells(line: str, delimiter: str) -> list[str]:
@@ -152,11 +169,14 @@ def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -
         "convert_options": _all_text_conversion(layout.column_names, wanted_columns),
     }
     n_rows_read = 0
+    days_by_column: defaultdict[str, DayCount] = defaultdict(DayCount)
     with csv.open_csv(path, **options) as blocks:
         for block in blocks:
             cells = TableCells({}, block.num_rows, n_rows_read)
             cells.numbers = {
-                name: _convert_column_and_record_text(block[name], layout.decimal_mark, name, cells)
+                name: _convert_column_and_record_text(
+                    block[name], layout.decimal_mark, name, cells, days_by_column[name]
+                )
                 for name in wanted_columns
             }
             cells.broken_line_beginnings, broken_line_beginnings[:] = broken_line_beginnings[:], []
@@ -201,9 +221,9 @@ def _all_text_conversion(column_names: Sequence[str], wanted_columns: Sequence[s
 
 
 def _convert_column_and_record_text(
-    cells: Any, decimal_mark: str, column_name: str, table_cells: TableCells
+    cells: Any, decimal_mark: str, column_name: str, table_cells: TableCells, days: DayCount
 ) -> Floats:
-    """A block's column as numbers; text in it is counted."""
+    """A block's column as numbers, a time in words as its seconds; other text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
 
@@ -214,15 +234,24 @@ def _convert_column_and_record_text(
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
         is_number_or_null = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
-        _record_text_cells(column_name, cells, is_number_or_null, table_cells)
         numbers = compute.cast(compute.if_else(is_number_or_null, cells, None), pa.float64())
+        values = numbers.to_numpy(zero_copy_only=False).copy()
+        text_rows = np.flatnonzero(~is_number_or_null.to_numpy(zero_copy_only=False)).tolist()
+        for row in text_rows:
+            text = cells[row].as_py()
+            values[row] = days.continued(seconds_of_text(text)) if is_clock(text) else seconds_of_text(text)
+        _record_text_cells(
+            column_name, cells, [row for row in text_rows if np.isnan(values[row])], table_cells
+        )
+        return np.where(np.isfinite(values), values, np.nan)
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _record_text_cells(column_name: str, cells: Any, is_number_or_null: Any, table_cells: TableCells) -> None:
-    rows_without_number = np.flatnonzero(~is_number_or_null.to_numpy(zero_copy_only=False))
-    text_rows = [row for row in rows_without_number.tolist() if cells[row].as_py()]
+def _record_text_cells(
+    column_name: str, cells: Any, rows_without_number: Sequence[int], table_cells: TableCells
+) -> None:
+    text_rows = [row for row in rows_without_number if cells[row].as_py()]
     if text_rows:
         table_cells.text_cell_summaries[column_name] = (
             len(text_rows),

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.mixing import load_vehicle_for_logs, mixing_of_log
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.regression import group_surfaces_by_commands
@@ -284,12 +285,14 @@ def test_without_the_commands_of_the_surfaces_they_stay_out():
     assert mixing_of_log("table", {"SERVO1_FUNCTION": (77.0,)}, ["RCOU.C1"]).lines == []
 
 
-def test_a_log_without_parameters_says_so_and_gets_a_guess(tmp_path):
+def test_of_outputs_without_parameters_nothing_is_guessed(tmp_path):
+    """An output may be a motor's."""
     pytest.importorskip("pymavlink")
     path = write_bin(tmp_path / "bare.bin", {"C1": wave(1200.0, 1700.0, 0.8)}, ())
-    vehicle, lines = proposed(path)
-    assert lines[:2] == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
-    assert vehicle["surfaces"] == {"RCOU_C1": {"RCOU.C1": 1.0}}
+    found = check_log(path, None, None)
+    assert (found["usable"], found["vehicle"]) == (False, None)
+    assert found["lines"][:2] == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
+    assert "RCOU.C1 and its like are outputs to servos and to motors" in found["lines"][2]
 
 
 @pytest.mark.parametrize("suffix", ["bin", "log"])

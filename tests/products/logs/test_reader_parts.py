@@ -307,11 +307,15 @@ def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_fil
         [*table.read_parts(path, rows_per_part=20)]
 
 
-def test_two_columns_of_a_name_are_refused(tmp_path):
+def test_two_columns_of_a_name_are_refused_if_used_and_have_their_places_as_names(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("t_s,p,p\n0,1,2\n1,2,3\n")
     with pytest.raises(BadInput, match="has two columns p, allowed: one of a name"):
-        read_flight(path)
+        read_flight(path, columns=["p"])
+    columns = read_flight(path).columns
+    assert {name: column.values.tolist() for name, column in columns.items()} == {
+        "p (column 2)": [1.0, 2.0], "p (column 3)": [2.0, 3.0],
+    }  # fmt: skip
 
 
 class Footer:

@@ -1,0 +1,57 @@
+"""Times that are written as text: a number with its unit, a clock, a date with a clock (ISO 8601)."""
+
+import re
+from datetime import UTC, datetime
+from math import nan
+
+_NUMBER_WITH_UNIT_PATTERN = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(s|secs?|seconds?|ms|msecs?|milliseconds?|us|usecs?|"
+    r"microseconds?|ns|min|minutes?)\.?"
+)
+_SECONDS_PER_UNIT_BEGINNING = {
+    "ms": 1e-3, "mil": 1e-3, "us": 1e-6, "mic": 1e-6, "ns": 1e-9, "min": 60.0, "s": 1.0,
+}  # fmt: skip
+_CLOCK_PATTERN = re.compile(r"(?:(\d{1,2}):)?(\d{1,2}):(\d{2}(?:[.,]\d+)?)")
+_DATE_PATTERN = re.compile(
+    r"\d{4}([-/]?)\d{2}\1\d{2}[T ]\d{2}:?\d{2}(:?\d{2}([.,]\d+)?)?\s*(Z|[+-]\d{2}(:?\d{2})?)?"
+)
+_S_PER_DAY = 86400.0
+
+
+def seconds_of_text(text: str) -> float:
+    """The time that a cell states, s: `0.05 sec`; `12:30:01.5` since midnight; an ISO date since 1970, UTC
+    where it names no zone. nan where it states none."""
+    text = text.strip()
+    if match := _NUMBER_WITH_UNIT_PATTERN.fullmatch(text):
+        factors = (
+            factor for unit, factor in _SECONDS_PER_UNIT_BEGINNING.items() if match[2].startswith(unit)
+        )
+        return float(match[1]) * next(factors)
+    if match := _CLOCK_PATTERN.fullmatch(text):
+        hours, minutes, seconds = int(match[1] or 0), int(match[2]), float(match[3].replace(",", "."))
+        return 3600.0 * hours + 60.0 * minutes + seconds if seconds < 61.0 else nan
+    if _DATE_PATTERN.fullmatch(text):
+        try:
+            moment = datetime.fromisoformat(text.replace("/", "-").replace(",", ".").replace(" Z", "Z"))
+        except ValueError:
+            return nan
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    return nan
+
+
+def is_clock(text: str) -> bool:
+    """Whether a cell states a time of day, which begins again at midnight."""
+    return _CLOCK_PATTERN.fullmatch(text.strip()) is not None
+
+
+class DayCount:
+    """The midnights that a column of clocks has passed: a step back by more than half a day is one."""
+
+    def __init__(self) -> None:
+        self._days, self._last = 0, nan
+
+    def continued(self, clock_s: float) -> float:
+        """The time since the first midnight, s, of clocks that come one after the other."""
+        self._days += clock_s < self._last - 0.5 * _S_PER_DAY
+        self._last = clock_s
+        return clock_s + _S_PER_DAY * self._days

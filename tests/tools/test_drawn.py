@@ -214,7 +214,7 @@ def test_an_alarm_is_held_against_the_diagnosis_that_raised_it(published):
 def test_an_instrument_is_held_against_the_diagnosis_that_has_watched_it():
     """One that was broken before the diagnosis began anew, with other sensors, may be taken for another."""
     fault = {"type": "bias", "sensor": "q", "at_s": 1.0, "magnitude": 4.0}
-    flight = bf.fly({"duration_s": 2.0, "faults": [fault]}, log=False)
+    flight = bf.fly({"duration_s": 2.0, "faults": [fault], "fdi": {"fault_class": "all"}}, log=False)
     wrong = altered(flight.metrics, isolation={"fault": "sensor theta"})
     change = {"time_s": 1.5, "law": None, "scheme": None, "sensors": True}
     for changes, misnamed in (([], True), ([change], True), ([{**change, "detection_time_s": 1.1}], False)):

@@ -36,17 +36,6 @@ COUNTS = {"one": (1, 2), "two": (2, 3), "many": (3, 7)}
 
 
 @dataclass(frozen=True)
-def _is_masked(fault: Words, faults: list[Words]) -> bool:
-    """Whether another fault of its surface leaves nothing of a fault as it begins, which is refused."""
-    for other in faults:
-        same = other is not fault and "actuator" in fault and other.get("actuator") == fault["actuator"]
-        if same and other["at_s"] <= fault["at_s"] < other.get("end_s", inf):
-            row = TYPES[other["type"]]
-            if fault["type"] in row.masks and not (other["type"] == fault["type"] and row.replaces_like):
-                return True
-    return False
-
-
 class Kind:
     """Of an array. declared: every error of the truth is. only: what a factor is restricted to."""
 
@@ -232,7 +221,10 @@ class Composer:
         kind = self._row["sensor fault"]
         if kind != LEFT_OUT:
             broken.append(self._sensor_fault(kind))
-        words["faults"] = [fault for fault in broken if not _is_masked(fault, broken)]
+        words["faults"] = kept = broken[:1]
+        for fault in broken[1:]:
+            if not (_is_masked(fault, kept) or any(_is_masked(one, [fault]) for one in kept)):
+                kept.append(fault)
 
     def _another(self) -> Words:
         kind = str(self._rng.choice(list(fault_types(self._schema))))
@@ -283,3 +275,14 @@ def put(words: Words, path: str, value: Any) -> None:
     for name in sections:
         words = words.setdefault(name, {})
     words[key] = value
+
+
+def _is_masked(fault: Words, faults: list[Words]) -> bool:
+    """Whether another fault of its surface leaves nothing of a fault as it begins, which is refused."""
+    for other in faults:
+        same = other is not fault and "actuator" in fault and other.get("actuator") == fault["actuator"]
+        if same and other["at_s"] <= fault["at_s"] < other.get("end_s", inf):
+            row = TYPES[other["type"]]
+            if fault["type"] in row.masks and not (other["type"] == fault["type"] and row.replaces_like):
+                return True
+    return False

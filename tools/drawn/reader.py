@@ -464,7 +464,7 @@ def _compared(said: Document, flight: Flight) -> list[tuple[float, float]]:
         pairs = [(low - command, high - commanded), (low, lowest), (highest, high)]
         return [(low - command, 0.0), *pairs, (above, first)] if kind == "bias that grows" else pairs
     if kind.startswith("hardover"):
-        known = flight.scenario["design_model"]["actuators"] or flight.scenario["actuators"]
+        known = flight.scenario["design_model"].get("actuators") or flight.scenario["actuators"]
         spare, actuator = 1 if flight.instants > 1 else 0, known[fault.surface]
         pace = 0.5 * (radians(actuator["rate_limit_deg_s"]) or pi / 3)
         if said["stops"] != [stops[1]] or not isclose(said["pace_rad_s"], pace) or up != kind.endswith("up"):

@@ -77,7 +77,11 @@ def type_is_not_excluded(surface, type_index):
 @kernel
 def any_constant_parameter_type_remains(surface):
     """Whether a type with a constant parameter is left."""
-    return not np.all(surface.feasible_sets.excluded[:N_CONSTANT_PARAMETER_TYPES])
+    # A loop: compiled code with np.all loads scipy.linalg, which takes longer than the flight.
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
+        if type_is_not_excluded(surface, type_index):
+            return True
+    return False
 
 
 @kernel

@@ -173,8 +173,8 @@ UNWISE = {
         "faults": [
             {"type": "float", "actuator": "flap", "at_s": 1},
             *(
-                {"type": "oscillatory", "actuator": "flap", "at_s": 1, "amplitude_deg": 1,
-                 "frequency_rad_s": of} for of in (62.8, 62.9)
+                {"type": "oscillatory", "actuator": surface, "at_s": 1, "amplitude_deg": 1,
+                 "frequency_rad_s": of} for surface, of in (("aileron", 62.8), ("rudder", 62.9))
             ),
         ],
     },

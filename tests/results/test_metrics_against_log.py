@@ -695,6 +695,7 @@ def test_the_flights_show_what_is_compared():
         empty = here if empty is None else empty & here
     assert {where for where in empty if not where.startswith("saturation_s.")} == {
         "mode_changes_left_out", "envelope.exits_left_out", "limits", "engine_power", "isolation.probing_s",
+        "outside_class",
         "isolation.frequency_rad_s", "isolation.estimate_deg",
     }  # fmt: skip
 

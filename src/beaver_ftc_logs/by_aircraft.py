@@ -67,7 +67,7 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
         return DiagnosedAircraft(aircraft)
     loaded_scenario = load_scenario(scenario)
     if loaded_scenario.fdi.sensor_monitor == "always":
-        reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: auto, never"
+        reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never"
         raise BadInput(f"--scenario {scenario}: {reason}")
     if loaded_scenario.fdi.scheme == "none":
         reason = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"

@@ -102,6 +102,7 @@ DECLARED = {
     "split": {"aircraft": "beaver-split", "fdi.fault_class": "all"},
     "pairs": {"fdi.fault_class": "all", "fdi.pairs": True, "fdi.sensor_monitor": "always"},
     "paper": {"fdi.scheme": "zhang2005", "control.law": "zhang2005"},
+    "servos": {"design_model.linearised": True, "actuators": "servo", "control.law": "adaptive"},
 }  # fmt: skip
 
 
@@ -187,10 +188,26 @@ def leaves(record):
 def test_nothing_is_configured_by_the_truth(name, truth):
     """Another truth may be trimmed by another command, which is known."""
     scenario = declared(name)
-    known = {"actuators": "ideal", "sensors": scenario.sensors.model_dump()}
+    known = {"actuators": scenario.actuators.model_dump(), "sensors": scenario.sensors.model_dump()}
     scenario = scenario.with_({f"design_model.{key}": value for key, value in known.items()})
     other = changed(scenario, TRUTHS[truth])
     if other is None:
         pytest.skip(f"{name}: has no such surface")
     found, otherwise = configured(scenario), configured(other)
     assert {field for field in found if found[field] != otherwise[field]} <= OF_THE_COMMAND
+
+
+def test_the_design_follows_the_servos_that_the_designer_knows():
+    known = {"bandwidth_rad_s": 12.0, "rate_limit_deg_s": 40.0, "rudder": {"travel_deg": [-14, 13]}}
+    base = declared("servos")
+    of_designer = configured(base.with_({"design_model.actuators": known}))
+    assert of_designer == configured(base.with_({"actuators": known})) != configured(base)
+
+
+def test_the_designers_trim_is_that_of_a_truth_as_declared():
+    nominal = declared("published")
+    off = nominal.with_({"uncertainty": {"coefficients": {"Cm_0": 1.2}, "inertia": {"Iy": 1.1}}})
+    as_declared, flown = Loop(nominal).trimmed, Loop(off).trimmed
+    assert (flown.y == as_declared.y).all()
+    assert (flown.u == as_declared.command).all()
+    assert np.abs(flown.command - flown.u).max() > 1e-3

@@ -242,9 +242,9 @@ def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
 def configure_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """A record in which every stage that needs no trim is configured: a copy of that of its design."""
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
-    rates, further = (scenario.rate_hz, scenario.substeps), truth_read(scenario)
+    rates, n_read = (scenario.rate_hz, scenario.substeps), len(truth_read(scenario))
     line = line_for(scenario)
-    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, further, line, initial, travel.tobytes()
+    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, n_read, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()

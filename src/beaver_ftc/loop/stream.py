@@ -35,7 +35,8 @@ class Diagnosis:
 
     - `aircraft`: the aircraft. Its file states the surfaces and their travel.
     - `rate_hz`: number of samples in a second. The samples are evenly spaced.
-    - `fdi`, `actuators`, `design_model`: contents of the sections with these names in a scenario file.
+    - `fdi`, `actuators`, `design_model`: contents of the sections with these names in a scenario file. The
+      sensors are assumed to be sound, whatever the fault class: `step` takes no accelerations.
     - `start`: three arrays in trim: rates (3,) rad/s, signals (4 + signals,), and deflections of the surfaces
       (surfaces,) rad. The linearised design model and the statistical detector need these values. By default
       the values of the first sample are used.
@@ -60,8 +61,11 @@ class Diagnosis:
     ) -> None:
         if not isinstance(aircraft, Aircraft):
             raise BadInput(f"aircraft: {aircraft!r:.60} is none, allowed: what aircraft() gives")
+        said = dict(fdi or {})
+        if said.get("sensor_monitor") in (None, "auto"):
+            said["sensor_monitor"] = "never"  # `step` takes no accelerations, which the monitor compares
         given = {
-            "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
+            "name": "stream", "rate_hz": rate_hz, "fdi": said, "actuators": actuators,
             "design_model": design_model or {},
         }  # fmt: skip
         with checked_against(aircraft):

@@ -23,7 +23,7 @@ from beaver_ftc.results.model import (
     Window,
     Withdrawn,
 )
-from beaver_ftc.scenario.declared import in_words
+from beaver_ftc.scenario.declared import in_words, wider
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -323,9 +323,8 @@ def _outside_class_text(metrics: Metrics) -> str:
     outside = " and ".join(metrics.outside_class or ())
     if not outside:
         return ""
-    wider = "fault_class: all" if metrics.flight.fault_class != "all" else "sensor_monitor: always"
-    says = f"outside the declared class, so that it cannot be named; set fdi.{wider}"
-    return f"{outside}: {says}"
+    cure = wider(metrics.flight.fault_class)
+    return f"{outside}: outside the declared class, so that it cannot be named; {cure}"
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:

@@ -580,8 +580,13 @@ def _outside_class(scenario: Any) -> Iterator[str]:
     """Faults that cannot be named, but where that is what is expected."""
     outside = outside_class(scenario)
     if outside and not _expects_unanticipated(scenario):
-        cure = "set fdi.fault_class: all" if scenario.fdi.sensor_monitor is None else "see fdi.sensor_monitor"
+        cure = wider(scenario.fdi.fault_class)
         yield f"faults: {' and '.join(outside)}: outside the declared class; {cure}"
+
+
+def wider(fault_class: str) -> str:
+    """What to set, so that a fault outside a class belongs to the declared one."""
+    return f"set fdi.{'sensor_monitor: always' if fault_class == 'all' else 'fault_class: all'}"
 
 
 def _former(scenario: Any) -> Iterator[str]:

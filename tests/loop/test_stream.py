@@ -21,9 +21,9 @@ CASES = {
     "unanticipated": {"faults": [{"type": "unanticipated", "at_s": 1.0}], "initial": {"airspeed_mps": 46}},
     "of every type": {
         "faults": [{"type": "bias", "actuator": "flap", "bias_deg": 3, "at_s": 1.0}],
-        "fdi": {"fault_class": "all"},
+        "fdi": {"fault_class": "all", "sensor_monitor": "never"},
     },
-    "two at once": {"faults": PAIR, "fdi": {"fault_class": "all", "pairs": True}},
+    "two at once": {"faults": PAIR, "fdi": {"fault_class": "all", "pairs": True, "sensor_monitor": "never"}},
     "slow actuators": {
         "faults": [loss("aileron", at_s=1.0)],
         "actuators": {"bandwidth_rad_s": 20, "rate_limit_deg_s": 60},

@@ -42,7 +42,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.schema import load_text
-from beaver_ftc.studies.compare.replay import Recording, aware_of_the_air, record, trace
+from beaver_ftc.studies.compare.replay import Recording, record, trace
 from beaver_ftc.studies.present.tables import markdown_table
 
 M_PER_FT = 0.3048
@@ -60,9 +60,8 @@ EACH_HEAD = ["flight", "case", "ours, s", "ratio", "level", "beyond, deviations"
 
 
 def recorded(given: Document) -> Recording:
-    """A flight as a detector sees it that takes off the gust as ours does."""
-    recording = record(load_text(json.dumps(given)))
-    return recording if recording.air is None else aware_of_the_air(recording)
+    """A flight as a detector sees it."""
+    return record(load_text(json.dumps(given)))
 
 
 def healthy(seed: int, k: int) -> Document:

@@ -36,8 +36,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.informed_test import detection_probability
+from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.scenario.airframe import find_aircraft
-from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
+from beaver_ftc.studies.compare.replay import Recording, Trace, record, trace
 from beaver_ftc.studies.power.probabilities import level_for
 from beaver_ftc.studies.power.survey import (
     BOTH,
@@ -96,9 +97,11 @@ def _past(z: np.ndarray) -> np.ndarray:
 
 
 def unexplained(recording: Recording) -> np.ndarray:
-    """What the design model leaves of each frame's acceleration, (frames - 1, 3) rad/s2."""
+    """What design model and vanes' gust leave of each frame's acceleration, (frames - 1, 3) rad/s2."""
+    gust = VaneGust(recording.context)
+    seen = [gust.subtracted(measured) for measured, _ in recording.seen]
     x, expected = (
-        np.array([getattr(m, of_it) for m, _ in recording.seen]) for of_it in ("x", "acceleration")
+        np.array([getattr(measured, of_it) for measured in seen]) for of_it in ("x", "acceleration")
     )
     return np.diff(x, axis=0) / recording.context.dt_s - expected[1:]
 
@@ -149,11 +152,10 @@ class Survey:
     published: bool = False
 
     def flown(self, block: Block, duration_s: float, faults: list[dict]) -> Recording:
-        """A flight as shown to plug-ins, the vanes' view of the air included where they have one."""
+        """A flight as shown to plug-ins."""
         flight = scenario_of(block, duration_s, faults, {"aircraft": self.aircraft})
         own_alone = {} if self.published or self.aircraft == DEFAULT else OWN_ALONE
-        recording = record(with_fdi(flight, BOTH).with_(own_alone))
-        return recording if recording.air is None else aware_of_the_air(recording)
+        return record(with_fdi(flight, BOTH).with_(own_alone))
 
     def block(self, excitation_deg_s: float, number: int) -> Block:
         return Block(Condition("tactical-grade", self.turbulence), excitation_deg_s, self.seed + number)

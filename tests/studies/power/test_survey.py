@@ -15,7 +15,15 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
-from beaver_ftc.studies.power.probabilities import document_of, level_at, level_for, limit, rows_of, summary
+from beaver_ftc.studies.power.probabilities import (
+    JUDGED_S,
+    document_of,
+    level_at,
+    level_for,
+    limit,
+    rows_of,
+    summary,
+)
 from beaver_ftc.studies.power.shown import as_text, comparison, run_power
 from beaver_ftc.studies.power.survey import (
     BUILT_IN,
@@ -191,10 +199,12 @@ class TestCounts:
         both = [watched(seed, **{ours: 0.3, "x": None}) for seed in range(9) for _ in range(2)]
         quiet = [replace_traces(watched(1_000_000, **{ours: None, "x": None}))]
         document, _ = document_of(SMALL, quiet, both)
-        (duel,) = [duel for duel in document["comparison"] if duel["ours"] == ours]
+        (duel,) = [
+            duel for duel in document["comparison"] if (duel["ours"], duel["within_s"]) == (ours, JUDGED_S)
+        ]
         assert (duel["seeds_ours"], duel["seeds_theirs"], duel["verdict"]) == (9, 0, "better")
         assert duel["p"] == pytest.approx(2 / 512)
-        assert "is better than x: rudder" in comparison(document)[0]
+        assert "is better than x within 1 s: rudder" in comparison(document)[0]
 
 
 def replace_traces(one):

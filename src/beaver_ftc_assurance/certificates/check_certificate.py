@@ -735,7 +735,7 @@ def course_pairs(said, frames, declared):
     if comparison == "runaway":
         require(sign == stop, "the surface runs the other way")
         require(said["stops"] == [ends[1]], "the stop is not that of the log")
-        known = declared.scenario["design_model"].get("actuators") or declared.scenario["actuators"]
+        known = declared.scenario.get("design_model", {}).get("actuators") or declared.scenario["actuators"]
         rate = radians(known[surface]["rate_limit_deg_s"]) or pi / 3
         require(is_same(said["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
         went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late_frames)

@@ -48,7 +48,7 @@ PLAIN = Situation(
 
 def ambiguous(**more):
     """A flight that ends while two candidates are left."""
-    fdi = {"fault_class": "all", **more.pop("fdi", {})}
+    fdi = {"fault_class": "all", "sensor_monitor": "never", **more.pop("fdi", {})}
     return bf.load(
         {"name": "open", "duration_s": 1.1, "fdi": fdi, "reference": SMALL, "faults": [STUCK_AILERON], **more}
     )

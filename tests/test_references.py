@@ -5,7 +5,8 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-KEY = re.compile(r"(?<=[\[ ])([A-Z][A-Za-z]*\d{2,4}|FDC|JAWA|MIL-F-8785C|MPU-9250)(?=[\],])")
+# A10 and A11 are assumptions, as A1 to A9.
+KEY = re.compile(r"(?<=[\[ ])(?!A\d\d\b)([A-Z][A-Za-z]*\d{2,4}|FDC|JAWA|MIL-F-8785C|MPU-9250)(?=[\],])")
 BRACKET = re.compile(r"\[[A-Z][\w, .-]*\]|\[[A-Z][\w-]*,")  # one key or several, perhaps with a place in it
 PLACES = (
     "README.md", "CONTRIBUTING.md", "src/**/*.py", "src/**/*.yaml", "src/**/*.json", "aircraft/**/*.xml",

@@ -142,17 +142,13 @@ def command_names(names: Sequence[str], parameters: Parameters) -> list[str]:
     return [name for name in commands if name.partition(".")[0] == first_message]
 
 
-_OUTPUT_PATTERN = r"RCO[U234]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_RAW\."
+_OUTPUT_PATTERN = r"RCO[2-4U]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_RAW\."
 
 
 def missing_commands_text(names: Collection[str]) -> str:
     """Which known command messages are missing, and how a vehicle file names others."""
     examples = ", ".join(dict.fromkeys(f"{known.example} ({known.ecosystem})" for known in KNOWN_COMMANDS))
-    outputs = [
-        name
-        for name in names
-        if re.match(r"(RCO[U234]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_RAW\.)", name)
-    ]
+    outputs = [name for name in names if re.match(_OUTPUT_PATTERN, name)]
     outputs_text = (
         f"; {outputs[0]} and its like are outputs to servos and to motors, and the log does not state which "
         "moves a surface"

@@ -122,7 +122,8 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 for fault_class in ("published", "all"):
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 0.5}
-    fly(Scenario(name="short", duration_s=1, faults=[loss], fdi={"fault_class": fault_class, "sensor_monitor": "never"}))
+    fdi = {"fault_class": fault_class, "sensor_monitor": "never"}
+    fly(Scenario(name="short", duration_s=1, faults=[loss], fdi=fdi))
     print(*(f"{name[0].rpartition('.')[2]}.{name[1]}" for name, _ in target._found))
 """
 

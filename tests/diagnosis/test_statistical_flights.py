@@ -227,7 +227,8 @@ def test_small_oscillations_are_named_in_turbulence_by_sound_sensors(surface, am
     }  # fmt: skip
     flight, _ = flown(
         duration_s=16, seed=2, actuators="servo", faults=[fault],
-        fdi=_fdi(bounds={**DECLARED, "coefficients": 0.05}, fault_class="all", sensor_monitor="never"), **NOISY,
+        fdi=_fdi(bounds={**DECLARED, "coefficients": 0.05}, fault_class="all", sensor_monitor="never"),
+        **NOISY,
     )  # fmt: skip
     assert flight.detection_time_s > 4.0
     assert flight.isolated == surface

@@ -314,6 +314,7 @@ def test_an_engine_at_idle_takes_the_thrust_that_it_has_in_trim(monkeypatch, sig
     bound = np.array([[0.02, 0.03, 0.05], [9.0, 9.0, 9.0]])
     effects = np.array([[0.01, -0.02], [0.0, 0.004], [-0.5, 0.6]])
     monkeypatch.setattr(detectability, "ENGINE_SIGNALS", ("other_m_s2", "yaw_by_engines_m_s2"))
+    monkeypatch.setattr(detectability.Declared, "of", lambda of: of)
     monkeypatch.setattr(detectability, "effects_of_engines", lambda of: effects)
     monkeypatch.setattr(detectability, "excitation", lambda of: Excitation({}, bound, 0.01))
     loop = SimpleNamespace(trim=trim, release=lambda: released.append(True))

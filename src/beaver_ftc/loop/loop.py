@@ -193,7 +193,7 @@ class Loop:
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
         self._inside = 0  # JSBSim frames of the coming frame that have been flown already
-        self.windows = Windows(self)
+        self.windows = Windows()
         self.after_frame: Callable[[], None] | None = None  # called once a frame has been flown
         expect(self._kernels)
         self.fly_with(self.plugin_frame)
@@ -249,7 +249,7 @@ class Loop:
     def land(self, scenario: Scenario | None = None) -> Landing:
         """What the flight has yielded so far; scenario: another that says what was flown."""
         verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
-        replaced, windows = self.changing.replaced if self.changing else (), self.windows.until_now()
+        replaced, windows = self.changing.replaced if self.changing else (), self.windows.until_now(self)
         return landing_of(
             scenario or self.scenario, self.frames[0], self.columns, verdict, tuple(replaced), tuple(windows)
         )
@@ -296,7 +296,7 @@ class Loop:
 
     def turn_to(self, k: int) -> int:
         """Bring faults, gusts and changes to frame k, the next to fly; returns when to call again."""
-        self.windows.turn_to(k, (*self.schedule.in_force(k), *self.sensor_schedule.in_force(k)))
+        self.windows.turn_to(self, k, (*self.schedule.in_force(k), *self.sensor_schedule.in_force(k)))
         parts: tuple[Any, ...] = (self.schedule, self.sensor_schedule, self.gust)
         for part in parts:
             part.apply(k)

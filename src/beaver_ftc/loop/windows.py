@@ -12,34 +12,33 @@ from beaver_ftc.loop.outcome import found_so_far
 
 
 class Windows:
-    """Those of a flight, of a `loop.Loop`."""
+    """Those of a flight. Each method is given its `loop.Loop`, which owns the windows."""
 
-    def __init__(self, loop: Any) -> None:
-        self._loop = loop
+    def __init__(self) -> None:
         self._closed: list[dict[str, Any]] = []
         self._from_frame = 0
         self._in_force: tuple[bool, ...] = ()
 
-    def turn_to(self, k: int, in_force: tuple[bool, ...]) -> None:
+    def turn_to(self, loop: Any, k: int, in_force: tuple[bool, ...]) -> None:
         """End the window if other faults are in force in frame k, the next to fly; in_force: each of them."""
         if in_force != self._in_force:
-            self._closed = self.until_now()
+            self._closed = self.until_now(loop)
             self._from_frame, self._in_force = k, in_force
-            self._loop.frames["accounts"]["beyond_threshold_at_s"] = -1.0
+            loop.frames["accounts"]["beyond_threshold_at_s"] = -1.0
 
-    def until_now(self) -> list[dict[str, Any]]:
+    def until_now(self, loop: Any) -> list[dict[str, Any]]:
         """Each window so far, the last one as far as it was flown: `from_s`, `to_s`, the first `alarm_s` in
         it, None without one, and `found`, as a Landing has it."""
-        frame, rate_hz = self._loop.frames[0], self._loop.scenario.rate_hz
+        frame, rate_hz = loop.frames[0], loop.scenario.rate_hz
         if not any(self._in_force) or frame["k"] <= self._from_frame:
             return self._closed
         alarm_s = float(frame["accounts"]["beyond_threshold_at_s"])
-        plugins = self._loop.plugin_frame
+        plugins = loop.plugin_frame
         verdict = plugins.verdict if plugins and plugins.detector else None
         window = {
             "from_s": self._from_frame / rate_hz,
             "to_s": int(frame["k"]) / rate_hz,
             "alarm_s": alarm_s if alarm_s >= 0.0 else None,
-            "found": found_so_far(frame, self._loop.aircraft.surfaces, verdict),
+            "found": found_so_far(frame, loop.aircraft.surfaces, verdict),
         }
         return [*self._closed, window]

@@ -131,10 +131,10 @@ class SubmittedCode:
         return self
 
     def reset(self, context: Context) -> None:
-        """Start it with what a plug-in is given; the design model is asked on this line."""
+        """Start it with what a plug-in is given, but for options; the design model is asked on this line."""
         self._model, self.surfaces = context.model, context.surfaces
         self._sizes = context.trim_y.size, len(context.surfaces)
-        self._start(replace(context, model=None))  # type: ignore[arg-type]
+        self._start(replace(context, model=None, options={}))  # type: ignore[arg-type]
         self._answer(pilot.BEGUN, 0, LOAD_S)
 
     def _start(self, context: Context | None) -> None:

@@ -55,6 +55,8 @@ def test_every_metric_has_a_column(short):
         "hints",
         "changes",
         "limits",
+        "assumes",
+        "outside_class",
     }
     shared = {"flight", "envelope", "profile", "mode_changes_left_out"}  # the flight's own document has them
     missing = {

@@ -281,6 +281,7 @@ def test_the_row_of_a_made_flight(changed):
     document["supervisor"] = [{"mode": mode, "time_s": at_s} for mode, at_s in modes]
     document |= {"envelope": {"exits": 3, "outside_s": 1.5}, "envelope_exits": []}
     document["expectations"] = [{"name": n, "passed": n == "b"} for n in "abc"]
+    document["windows"] = [{"detected": True, "correct": None}, {"detected": True, "correct": True}]
     flight = SimpleNamespace(
         frames=250, worst_residual_ratio=0.875,
         scenario=SimpleNamespace(rate_hz=50.0, airframe=SimpleNamespace(surfaces=load().surfaces)),

@@ -149,20 +149,19 @@ class Told:
     """As a context: what a plug-in may know, and what is kept from it."""
 
     model: object = "the truth's"
-    seed: int = 4711
     options: dict[str, float] = field(default_factory=lambda: {"gain": 2.0})
     surfaces: tuple[str, ...] = ("aileron", "flap")
     trim_y: np.ndarray = field(default_factory=lambda: np.arange(5.0))
 
 
-def test_a_flight_begins_without_model_seed_and_options(monkeypatch):
+def test_a_flight_begins_without_model_and_options(monkeypatch):
     code, told, asked = line.SubmittedDetector("source", "name", line.Allowance(10.0)), Told(), []
     monkeypatch.setattr(code, "_start", asked.append)
     monkeypatch.setattr(code, "_answer", lambda *of: asked.append(of))
     code.reset(told)
     shown, begins = asked
     assert begins == (pilot.BEGUN, 0, line.LOAD_S)
-    assert (shown.model, shown.seed, shown.options) == (None, 0, {})
+    assert (shown.model, shown.options) == (None, {})
     assert (shown.surfaces, shown.trim_y is told.trim_y) == (told.surfaces, True)
     assert (code._model, code.surfaces, code._sizes) == (told.model, told.surfaces, (5, 2))
 

@@ -266,7 +266,10 @@ def test_a_saved_flight_is_said_and_its_report_is_to_be_drawn(session, tmp_path,
 
 def test_a_saved_flight_says_of_each_fault_who_broke_it(tmp_path, monkeypatch):
     """Those of the scenario come before, between and after those of the guests, and not in their order."""
-    own = [{"type": "float", "actuator": "flap", "at_s": at_s} for at_s in (0.06, 0.11, 0.01)]
+    own = [
+        {"type": "float", "actuator": "flap", "at_s": at_s, "end_s": at_s + 0.02}
+        for at_s in (0.06, 0.11, 0.01)
+    ]
     session, saved = Session(bf.load({"name": "own", "faults": own}), tmp_path), []
     monkeypatch.setattr(bf.Flight, "save", lambda flight, out, report: saved.append(flight) or out / "x")
     for by, surface in (("Ada", "rudder"), ("", "aileron"), ("Bo", "elevator")):

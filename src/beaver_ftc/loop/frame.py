@@ -362,6 +362,8 @@ def monitor_sensors(frame):
     )
     if monitor.output.alarmed and not (before or monitor.output.keeps_surface_conclusion):
         reset_surface_diagnosis(fdi)
+    if fdi.statistical.attitude.enabled:
+        sensor_monitor.add_turn_beyond_gyros(monitor, fdi.statistical.attitude, frame.measured.signal)
 
 
 @kernel

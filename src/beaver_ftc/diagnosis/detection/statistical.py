@@ -47,6 +47,7 @@ from beaver_ftc.diagnosis.bounds import (
     moment_axis_of_term,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
+from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, configure_attitude
 from beaver_ftc.diagnosis.detection.forces import (
     MEASURED_FORCES_RECORD,
     RatesReadingsDeflections,
@@ -274,6 +275,16 @@ def configure_statistical_detector(
             _configure_inertial_gust_estimate(statistical, declared)
         configure_parity_views(statistical, aircraft)
     _configure_drift_correlation_lengths(statistical, airspeed_mps, rate_hz)
+    monitor_config = fdi["sensor_monitor"]["config"]
+    if monitor_config["enabled"] and monitor_config["attitude_is_noisy"]:
+        configure_attitude(
+            statistical["attitude"],
+            monitor_config["rate_damping_per_s"],
+            max(sensor_errors[angle].random for angle in ("phi", "theta", "psi")),
+            max(sensor_errors[rate].random for rate in AXES),
+            float(test_config["isolation_llr_margin"]),
+            dt_s,
+        )
     if gust_estimate["output"]["accounts_for_gusts"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
@@ -692,6 +703,7 @@ def statistical_dtype(record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) ->
         n_views=int, views=(parity_view_dtype(record_size.view_block_capacity), record_size.n_views),
         tone_test_config=TONE_CONFIG_RECORD,
         forces=MEASURED_FORCES_RECORD, gust=GUST_RECORD, inertial_gust=GUST_RECORD,
+        attitude=attitude_dtype(record_size.rate_block_capacity),
     )  # fmt: skip
 
 

@@ -51,6 +51,7 @@ The direction of the spurious velocity, which the residuals add up to, says whic
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import advance_residual_bound, bank_alarm_axis
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     initial_error_explains_exceeded_tests,
@@ -479,6 +480,17 @@ def check_sensors_and_replace_readings(
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
     store_sample_as_previous(redundancy, readings, measured.force)
     memory.substep = (memory.substep + 1) % monitor.config.substeps
+
+
+@kernel
+def add_turn_beyond_gyros(monitor, att, readings):
+    """Add to the comparison of attitude and rates what the attitude has turned beyond the gyros in this
+    sample; near the vertical it shows no turn."""
+    if pitch_is_too_steep(monitor.redundancy, readings):
+        attitude.restart(att)
+        return
+    for i in range(3):
+        att.turn[i] += monitor.redundancy.test[FIRST_TURN_TEST + i].residual
 
 
 @kernel

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from beaver_ftc.compiled import apart, kernel, one_of
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
-from beaver_ftc.diagnosis.detection import filters, forces, parity, statistical
+from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
 from beaver_ftc.diagnosis.model_prediction import (
     fill_surface_effects_with_previous_G,
@@ -410,6 +410,12 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         has_statistical_alarm_been_raised,
         may_loss_end,
     )
+    if statistical_detector.attitude.enabled:
+        attitude.compare_attitude(
+            statistical_detector.attitude, blocks, uncertainty_bound_rad_s2, test_config.uses_regressors, dt
+        )
+        if fdi.verdict.detected and statistical_detector.attitude.score > 1.0:
+            fdi.sensor_monitor.memory.gyros_excluded = 1
     parity.set_view_use_directions_signatures(
         parity_view_records,
         forces_record,

@@ -1,0 +1,214 @@
+"""Whether the attitude shows the turn that the rates show: then no gyro is broken.
+
+About each body axis let xi, rad/s, be the true rate less that of the gyro, and psi, rad, its integral:
+
+    psi' = xi      xi' = d + phi - nu - D xi      measured: A = psi + v
+
+nu, rad/s2, is the innovation of the rates; d, rad/s2, the drift of the whitening filters (likelihood.py);
+D, 1/s, the damping of the rates; A, rad, the turn of the attitude beyond that of the gyros; v, rad, the noise
+of the attitude; phi, rad/s2, a fault of a surface. An error of a gyro is part of nu whatever its course. So
+the Kalman filter of (psi, xi, d) with the input nu predicts A with a broken gyro, too, and its innovation g,
+of variance S, is white. A fault of a surface is part of nu as well, but the attitude turns with the gyro: g
+contains its response.
+
+Two kinds of sums gather what g contains. Leaky sums z suit any course of a fault. N is the correlation with
+the response g_s to a loss of surface s, summed over roll and yaw:
+
+    z <- a z + g / sqrt S          N <- b N + g_s g / S      M <- b M + g_s^2 / S
+
+Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the coefficients, the bounded
+uncertainty, the damping. Through the same filter they add z_j and R_j to the sums. Without a fault of a
+surface
+
+    (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
+
+are at most standard normal. If one exceeds the margin of isolation, no gyro is the cause.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.diagnosis.detection.likelihood import (
+    LATERAL_BLOCK,
+    PITCH_BLOCK,
+    PRIOR_DRIFT_STD_RAD_S2,
+    BlockCapacity,
+)
+from beaver_ftc.diagnosis.state import LOSS
+
+LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
+MEMORIES_OF_LOSS_S = (2.0, 10.0)
+DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
+N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
+
+
+@sized
+def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
+    """The comparison of attitude and rates, for the capacity of a block of the rates."""
+    n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
+    n_b = len(MEMORIES_OF_LOSS_S)
+    return record(
+        enabled=int, level=float,  # level of both sums, standard deviations
+        D=(3, 3), R=float, a=n_a, b=n_b,  # 1/s; variance of v, rad2; leaks per frame
+        P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
+        turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
+        s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
+        r=n, g_j=n, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
+        R_j=(3, n_h, n, n_b),
+        score=float,  # the larger sum of the frame, over its level
+    )  # fmt: skip
+
+
+def configure_attitude(
+    att: np.void, D: np.ndarray, attitude_std_rad: float, gyro_std_rad_s: float, margin: float, dt_s: float
+) -> None:
+    """Fill the comparison; D (3, 3) 1/s. margin: difference of log-likelihood ratios that names a surface."""
+    att["enabled"], att["level"] = 1, sqrt(2.0 * margin)
+    att["D"], att["R"] = D, attitude_std_rad**2
+    att["a"], att["b"] = np.exp(-dt_s / np.array(LEAK_TIMES_S)), np.exp(-dt_s / np.array(MEMORIES_OF_LOSS_S))
+    att["P_start"] = attitude_std_rad**2, gyro_std_rad_s**2, PRIOR_DRIFT_STD_RAD_S2**2
+    for i in range(3):
+        np.fill_diagonal(att["P"][i], att["P_start"])
+
+
+@kernel
+def restart(att):
+    """Forget what was compared: the attitude shows no turn now."""
+    att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
+    att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
+    att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        for k in range(3):
+            att.P[i, k, k] = att.P_start[k]
+
+
+@kernel
+def compare_attitude(att, blocks, eta, uses_regressors, dt):
+    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score`.
+
+    eta (3,) rad/s2: bound of the uncertainty.
+    """
+    for i in range(3):
+        block = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
+        advance_axis(att, i, block, i // 2, eta[i], uses_regressors, dt)
+    pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
+    att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
+    for i in range(3):
+        att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
+
+
+@kernel
+def advance_axis(att, i, block, row, eta, uses_regressors, dt):
+    """Advance filter, responses and sums of axis i, in this row of its block."""
+    K0, K1, K2, S = advance_covariance(att, i, block, row, dt)
+    D, a, n = att.D[i, i], block.drift_decay_factor, block.n_regressors
+    att.A[i] += att.turn[i]
+    att.turn[i] = 0.0
+    for j in range(n):
+        att.r[j] = block.regressor[j, row] if uses_regressors else 0.0
+    att.r[n] = eta
+    u = -block.frame_innovation[row]
+    for j in range(3):
+        att.r[n + 1 + j] = att.D[i, j] * att.s[j, 1]
+        if j != i:
+            u -= att.r[n + 1 + j]
+    std = np.sqrt(S)
+    g = respond(att.s[i], att.A[i], u, D, a, K0, K1, K2, dt) / std
+    leak(att.z[i], att.a, g)
+    for j in range(n + N_FURTHER):
+        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K0, K1, K2, dt) / std
+        leak(att.z_j[i, j], att.a, att.g_j[j])
+    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
+        if hypothesis.kind == LOSS:
+            g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
+            leak(att.N[i, h], att.b, g_s * g)
+            leak(att.M[i, h], att.b, g_s * g_s)
+            for j in range(n + N_FURTHER):
+                leak(att.R_j[i, h, j], att.b, g_s * att.g_j[j])
+
+
+@kernel
+def tolerance(block, j):
+    """tol_j of a constant: of a coefficient, of the bounded uncertainty, or of the damping."""
+    if j < block.n_regressors:
+        return block.regressor_tolerance[j]
+    return 1.0 if j == block.n_regressors else DAMPING_TOLERANCE
+
+
+@kernel
+def largest_sum(att, block, i):
+    """The largest leaky sum of axis i that no constant explains, over the level."""
+    largest = 0.0
+    for m, a in enumerate(att.a):
+        excess = abs(att.z[i, m])
+        for j in range(block.n_regressors + N_FURTHER):
+            excess -= tolerance(block, j) * abs(att.z_j[i, j, m])
+        largest = max(largest, excess * np.sqrt(1.0 - a * a))
+    return largest / att.level
+
+
+@kernel
+def largest_correlation(att, block, first, step):
+    """The largest correlation with a loss, over the axes of a block, every step-th from the first on, that no
+    constant explains, over the level."""
+    largest = 0.0
+    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
+        if hypothesis.kind != LOSS:
+            continue
+        for m in range(att.b.size):
+            N, M, excess = 0.0, 0.0, 0.0
+            for i in range(first, 3, step):
+                N += att.N[i, h, m]
+                M += att.M[i, h, m]
+            for j in range(block.n_regressors + N_FURTHER):
+                R = 0.0
+                for i in range(first, 3, step):
+                    R += att.R_j[i, h, j, m]
+                excess -= tolerance(block, j) * abs(R)
+            excess += abs(N)
+            if M > 0.0:
+                largest = max(largest, excess / np.sqrt(M))
+    return largest / att.level
+
+
+@kernel
+def respond(s, A, u, D, a, K0, K1, K2, dt):
+    """Advance a state s (psi, xi, d) by one frame of acceleration u, rad/s2, and measurement A, rad; the
+    innovation g, rad."""
+    psi, xi, d = s[0] + dt * s[1], s[1] + dt * (s[2] + u - D * s[1]), a * s[2]
+    g = A - psi
+    s[0], s[1], s[2] = psi + K0 * g, xi + K1 * g, d + K2 * g
+    return g
+
+
+@kernel
+def leak(z, a, v):
+    """z <- a z + v: filters of leaks a (m,) on a number v."""
+    for m in range(a.size):
+        z[m] = a[m] * z[m] + v
+
+
+@kernel
+def advance_covariance(att, i, block, row, dt):
+    """Gains K of the frame for axis i, and S, rad2: P <- F P F' + Q, then P <- P - K P[0]."""
+    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], block.drift_decay_factor
+    for c in range(3):
+        F_P[0, c] = P[0, c] + dt * P[1, c]
+        F_P[1, c] = (1.0 - dt * D) * P[1, c] + dt * P[2, c]
+        F_P[2, c] = a * P[2, c]
+    for c in range(3):
+        P[c, 0] = F_P[c, 0] + dt * F_P[c, 1]
+        P[c, 1] = (1.0 - dt * D) * F_P[c, 1] + dt * F_P[c, 2]
+        P[c, 2] = a * F_P[c, 2]
+    P[1, 1] += dt * dt * block.model_noise_variance[row]
+    P[2, 2] += dt * block.drift_intensity[row, row]
+    S = P[0, 0] + att.R
+    K0, K1, K2 = P[0, 0] / S, P[1, 0] / S, P[2, 0] / S
+    for c in range(3):
+        first = P[0, c]
+        P[0, c] -= K0 * first
+        P[1, c] -= K1 * first
+        P[2, c] -= K2 * first
+    return K0, K1, K2, S

@@ -1,0 +1,100 @@
+"""With sensors in doubt, a surface is named once the attitude shows its turn; a broken gyro is no surface."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import beaver_ftc as bf
+from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, compare_attitude, configure_attitude
+from beaver_ftc.diagnosis.detection.likelihood import N_FILTER_BLOCKS, BlockCapacity, block_dtype
+from beaver_ftc.loop.loop import Loop
+
+SWEEPS = Path(__file__).parents[3] / "scenarios" / "sweeps"
+SWEEP = yaml.safe_load((SWEEPS / "robust-elevator-all.yaml").read_text(encoding="utf-8"))
+DT_S, N = 0.01, 300
+D = np.array([[5.0, 0.1, -2.0], [0.0, 3.0, 0.0], [0.3, 0.0, 0.7]])
+
+
+def compared(gyro_error, fault, std=1e-3):
+    """Largest score after each frame: gyro_error (N, 3) rad/s, fault (N, 3) rad/s2.
+
+    Rates and attitude are exact but for the gyros; they follow x' = phi - D x."""
+    capacity = BlockCapacity(1, 1)
+    att, blocks = np.zeros(1, attitude_dtype(capacity)), np.zeros(N_FILTER_BLOCKS, block_dtype(capacity))
+    configure_attitude(att[0], D, std, 1e-3, 16.0, DT_S)
+    for block, axes in zip(blocks, ((1, 0), (0, 2), (0, 2)), strict=True):
+        block["axes"], block["n_axes"], block["drift_decay_factor"] = axes, len(set(axes)), 1.0
+        block["drift_intensity"] = 1e-6 * np.eye(2)
+    x, found = np.zeros(3), []
+    for e, e_before, phi in zip(gyro_error, [np.zeros(3), *gyro_error[:-1]], fault, strict=True):
+        read, x = x + e_before, x + DT_S * (phi - D @ x)
+        nu = (x + e - read) / DT_S + D @ read
+        att["turn"] = -DT_S * e_before
+        blocks[0]["frame_innovation"][0], blocks[1]["frame_innovation"] = nu[1], nu[[0, 2]]
+        compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.zeros(3), False, DT_S)
+        found.append(float(att["score"][0]))
+    return np.array(found)
+
+
+@settings(max_examples=20, deadline=None)
+@given(axis=st.integers(0, 2), size=st.floats(0.01, 0.3), onset=st.integers(5, 100),
+       course=st.sampled_from(["step", "ramp", "sine", "noise"]))  # fmt: skip
+def test_an_error_of_a_gyro_leaves_nothing_whatever_its_course(axis, size, onset, course):
+    t = DT_S * np.arange(N - onset)
+    e = np.zeros((N, 3))
+    e[onset:, axis] = size * {
+        "step": np.ones_like(t), "ramp": t, "sine": np.sin(6.0 * t),
+        "noise": np.random.default_rng(onset).normal(size=t.size),
+    }[course]  # fmt: skip
+    assert compared(e, np.zeros((N, 3))).max() < 0.01
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_fault_of_a_surface_is_left_and_grows_with_its_turn(axis):
+    phi = np.zeros((N, 3))
+    phi[50:, axis] = 0.1
+    score = compared(np.zeros((N, 3)), phi)
+    assert score[:50].max() < 1e-9
+    assert score.max() > 1.0
+    assert compared(np.zeros((N, 3)), 2.0 * phi).argmax() <= score.argmax()
+    assert np.flatnonzero(compared(np.zeros((N, 3)), 2.0 * phi) > 1.0)[0] < np.flatnonzero(score > 1.0)[0]
+
+
+def scenario(fault, **more):
+    """The declared errors of robust-elevator-all, with sensors in doubt."""
+    given = {key: of for key, of in SWEEP["set"].items() if key not in ("expect", "uncertainty")}
+    data = bf.load(SWEEP["base"]).model_dump(mode="json", by_alias=True, exclude_unset=True)
+    data = {**data, **given, "expect": {}, "duration_s": 14, "faults": [fault | {"at_s": 5.0}], **more}
+    return bf.load(data | {"fdi": given["fdi"] | {"sensor_monitor": "always"}})
+
+
+LOSS = {"type": "loss_of_effectiveness", "magnitude": 0.8}
+
+
+@pytest.mark.parametrize("surface", ["elevator", "rudder"])
+def test_a_loss_is_named_in_turbulence_with_sensors_in_doubt(surface):
+    assert bf.fly(scenario(LOSS | {"actuator": surface})).metrics["isolation"]["fault"] == surface
+
+
+def test_without_the_comparison_it_is_not_named():
+    loop = Loop(scenario(LOSS | {"actuator": "rudder"}))
+    loop.frames["fdi"]["statistical"]["attitude"]["enabled"] = 0
+    for _ in loop.chunks():
+        pass
+    landed = loop.land()
+    loop.release()
+    assert landed.detection_time_s is not None
+    assert landed.isolated is None
+
+
+@pytest.mark.parametrize("sensor", ["p", "q", "r", "alpha", "beta"])
+@pytest.mark.parametrize("magnitude", [0.5, 2.0])
+def test_a_broken_sensor_is_no_surface(sensor, magnitude):
+    fault = {"type": "bias", "sensor": sensor, "magnitude": magnitude}
+    flight = bf.fly(scenario(fault, seed=11))
+    isolation = flight.metrics["isolation"]
+    assert not {"elevator", "rudder", "aileron", "flap"} & {*isolation["names"], isolation["fault"]}

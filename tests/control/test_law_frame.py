@@ -127,7 +127,7 @@ def test_what_is_done_about_each_kind_of_fault(measure):
         surface["last_observation"]["position_low"],
         surface["last_observation"]["position_high"],
     ) = 0.05, 0.3, 0.34
-    loss = fdi["layout"]["loss_estimator"][RUDDER]
+    loss = fdi["layout"]["loss"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
     target = {SCALE_COMMAND: 0.7, GIVE_UP: 0.0}.get(measure, 1.0)
@@ -165,7 +165,7 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["alarm_authority"] = known, WORST_CASE_DETECTOR
+    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
     fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
     fdi["bank"]["output"]["threshold"] = 0.1
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score

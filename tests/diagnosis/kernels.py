@@ -12,13 +12,13 @@ DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 
 def new_fdi():
     fdi = np.zeros(1, fdi_dtype(4)).view(np.recarray)[0]
-    fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["decay_factor"][:3] = (
+    fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["a"][:3] = (
         DT,
         3,
         np.exp(-POLES * DT),
     )
     fdi["types"]["config"]["dt"] = DT
-    fdi["isolation"]["config"]["forgetting_factor"], fdi["isolation"]["config"]["filter_decay"] = (
+    fdi["isolation"]["config"]["forget"], fdi["isolation"]["config"]["a"] = (
         0.98,
         np.exp(-np.array([3.0, 4.0, 5.0]) * DT),
     )
@@ -40,12 +40,12 @@ def fill(record, **values):
 
 # Short names of fields, for cases that say a few of them.
 SHORT = {
-    "whole": "frame_shows_single_instant", "length": "frames_per_block", "thresholds": "threshold_kind",
-    "memory": "uses_reach_test", "shared": "shares_theta_across_axes", "membership": "narrows_theta_sets",
-    "forgetting": "forgetting_factor", "instants": "n_substeps",
+    "whole": "frame_shows_single_instant", "length": "frames_per_block", "thresholds": "mu_kind",
+    "memory": "reach", "shared": "shared", "membership": "narrows",
+    "forgetting": "forget", "instants": "n_substeps",
 }  # fmt: skip
 WHERE = {
-    **dict.fromkeys(("enabled", "alarm_authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
+    **dict.fromkeys(("enabled", "authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
     **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
     **dict.fromkeys(("eta_bar", "noise"), "bound"),
 }
@@ -92,7 +92,7 @@ OF_SURFACE = {
     "n_frames_without_sign_of_fault": ("accommodation", "n_frames_without_sign_of_fault"),
     "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "can_be_at_fault_basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
-    "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),
+    "type": ("status", "fault_type"), "type_at_s": ("status", "typed_at_s"),
 }  # fmt: skip
 
 
@@ -113,28 +113,28 @@ def of_stages(fdi, kernel):
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
     later = "deflection" in kernel.__name__
     return {
-        "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
+        **dict.fromkeys(("c", "cfg", "config"), types["config"] if whole else fdi["config"]), "types": types, "surfs": types["surface"],
         **dict.fromkeys(("pair", "pair_record"), types["pair"]),
-        **dict.fromkeys(("conclusion", "surface_conclusion", "previous_conclusion"), fdi["verdict"]),
+        **dict.fromkeys(("conclusion", "done", "found", "past"), fdi["verdict"]),
         "layout": fdi["layout"],
-        "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
+        **dict.fromkeys(("iso", "isolation"), fdi["isolation"]), **dict.fromkeys(("est", "fies", "estimators"), fdi["isolation"]["estimator"]),
         **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(
             ("shared", "shared_by_axes", "axes_share_theta"),
-            fdi["isolation"]["config"]["shares_theta_across_axes"],
+            fdi["isolation"]["config"]["shared"],
         ),
         **dict.fromkeys(("abrupt", "fault_is_declared_constant"), fdi["config"]["abrupt"]),
-        "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
+        **dict.fromkeys(("all_types", "diagnoses_all_types"), fdi["config"]["diagnoses_all_types"]),
         "n_substeps": fdi["config"]["n_substeps"],
         **dict.fromkeys(("bank", "filter_bank", "detection_filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
-        **dict.fromkeys(("innovation", "innovation_by_axis"), fdi["bank"]["output"]["innovation"]),
+        **dict.fromkeys(("nu", "innovation", "innovation_by_axis"), fdi["bank"]["output"]["innovation"]),
         **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
         **dict.fromkeys(
-            ("innovation_bound", "innovation_bound_by_axis"), fdi["bound"]["frame_innovation_bound"]
+            ("nu_max", "innovation_bound", "innovation_bound_by_axis"), fdi["bound"]["nu_max"]
         ),
-        **dict.fromkeys(("noise", "changing_gyro_error_bound"), fdi["bound"]["changing_gyro_error_bound"]),
+        **dict.fromkeys(("noise", "n", "n_gyro"), fdi["bound"]["n_gyro"]),
         "dt": fdi["config"]["dt"],
-        **dict.fromkeys(("statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),
+        **dict.fromkeys(("alarm", "statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),
         **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
     }  # fmt: skip
 
@@ -158,7 +158,7 @@ def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):
     fdi["isolation"]["config"]["n_estimators"] = max(int(fdi["isolation"]["config"]["n_estimators"]), 1)
     fie = fdi["isolation"]["estimator"][0]
     fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = kind, surface, low, high
-    fie["feasible_theta_min"], fie["feasible_theta_max"] = low, high
+    fie["set_lo"], fie["set_hi"] = low, high
     return fie
 
 

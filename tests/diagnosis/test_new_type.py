@@ -95,7 +95,7 @@ WORN = '''
 """A surface that moves further than it is told, by a factor that never becomes smaller: p = g u, g >= 1."""
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.isolation import consistent_theta_interval
+from beaver_ftc.diagnosis.isolation import consistent_theta
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     SUBTRACT_OFFSET,
@@ -119,7 +119,7 @@ def consistent_interval(config, surface, type_index, k):
     seen, worn = surface.judged_observation, surface.overdrive
     low, high = seen.position_low, seen.position_high
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = consistent_theta_interval(middle, slack, seen.healthy_position, worn.least, MOST)
+    low, high = consistent_theta(middle, slack, seen.healthy_position, worn.least, MOST)
     if low > high:
         return EMPTY_SET
     worn.least = max(worn.least, low)

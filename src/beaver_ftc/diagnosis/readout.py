@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.diagnosis.detection.likelihood import N_ONSET_SLOTS
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
 
 
@@ -83,7 +83,7 @@ class DeclaredBounds(NamedTuple):
     eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
     changing part of a gyro's error. inertia_coupling_error_share, constant_part_of_error_bound_rad_s2: terms
     of eta_bar. earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest +
-    gyro_error_bound_per_rate |rate|, of the first what does not change, constant_gyro_error_bound; zero where
+    gyro_error_bound_per_rate |rate|, of the first what does not change, steady; zero where
     none is declared.
     """
 
@@ -130,7 +130,7 @@ class StatisticalHypothesis(NamedTuple):
 
 
 class HypothesisTestsByOnset(NamedTuple):
-    """By hypothesis and onset (hypotheses, N_ONSET_SLOTS): score, direction of the loss that is tested (0:
+    """By hypothesis and onset (hypotheses, N_SLOTS): score, direction of the loss that is tested (0:
     either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
 
     score: np.ndarray
@@ -159,14 +159,14 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
     residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
-    second of the sample. residual_per_gust_speed_change: effect on it of 1 m/s that a gust changes by.
+    second of the sample. gust_gain: effect on it of 1 m/s that a gust changes by.
     filtered_residual_by_pole, filtered_bound_by_pole (poles,): through the filters.
     """
 
     residual: float
     bound_per_s: float
     bound_per_sample: float
-    residual_per_gust_speed_change: float
+    gust_gain: float
     filtered_residual_by_pole: np.ndarray
     filtered_bound_by_pole: np.ndarray
 
@@ -174,26 +174,26 @@ class SensorTest(NamedTuple):
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; has_raised_alarm: an alarm of its own stands.
 
-    worst_test_index: of the test with the largest ratio of residual to bound; worst_residual_bound_ratio:
+    worst_test_index: of the test with the largest ratio of residual to bound; top_ratio:
     that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
     is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
     filtered_gust_change_bound_by_pole_mps (poles,): bound on the changes of a gust through the filters.
-    predicted_reading, reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm,
+    predicted_reading, reading_bound (sensors,): SI. engine_commands (2,): engine speed rpm,
     manifold pressure inHg, which the engine's sensors should read.
     """
 
     enabled: bool
     has_raised_alarm: bool
     worst_test_index: int
-    worst_residual_bound_ratio: float
+    top_ratio: float
     worst_test: SensorTest
     isolated_sensor_index: int
     is_reading_unused: np.ndarray
     sample_time_s: float
     filtered_gust_change_bound_by_pole_mps: np.ndarray
     predicted_reading: np.ndarray
-    reading_error_bound: np.ndarray
-    commanded_engine_readings: np.ndarray
+    reading_bound: np.ndarray
+    engine_commands: np.ndarray
 
 
 class DiagnosisReadout:
@@ -235,7 +235,7 @@ class DiagnosisReadout:
     @cached_property
     def layout(self) -> LayoutOfAllSurfaces:
         """Axes and estimators of the surfaces."""
-        field_names = ("dominant_axis", "loss_estimator", "position_estimator")
+        field_names = ("dominant_axis", "loss", "position")
         return LayoutOfAllSurfaces(*(tuple(self._fdi["layout"][name].tolist()) for name in field_names))
 
     @cached_property
@@ -274,20 +274,20 @@ class DiagnosisReadout:
         """The declared uncertainty."""
         bound_record = self._fdi["bound"]
         declared_errors = bound_record["declared_errors"]
-        has_declared_errors = bool(declared_errors["has_declared_errors"])
+        has_declared_errors = bool(declared_errors["given"])
         gyro_error_bound_at_rest, constant_gyro_error_bound, gyro_error_bound_per_rate = (
             declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
             for name in (
-                "signal_error_bound_at_zero",
-                "constant_gyro_error_bound",
-                "signal_error_bound_per_unit",
+                "e0",
+                "steady",
+                "e1",
             )
         )
         return DeclaredBounds(
             eta_bar_rad_s2=bound_record["eta_bar"].copy(),
-            changing_gyro_error_bound_rad_s=bound_record["changing_gyro_error_bound"].copy(),
+            changing_gyro_error_bound_rad_s=bound_record["n_gyro"].copy(),
             inertia_coupling_error_share=bound_record["inertia_coupling_error_share"].copy(),
-            constant_part_of_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
+            constant_part_of_error_bound_rad_s2=bound_record["const"].copy(),
             earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
             gyro_error_bound_at_rest_rad_s=gyro_error_bound_at_rest,
             constant_gyro_error_bound_rad_s=constant_gyro_error_bound,
@@ -299,9 +299,9 @@ class DiagnosisReadout:
         """Gusts as the vanes see them."""
         gust_output = self._fdi["statistical"]["gust"]["output"]
         return GustReadout(
-            bool(gust_output["accounts_for_gusts"]),
-            bool(gust_output["is_gust_measured"]),
-            gust_output["angular_acceleration_by_gust"].copy(),
+            bool(gust_output["gusty"]),
+            bool(gust_output["measured"]),
+            gust_output["acc"].copy(),
         )
 
     @cached_property
@@ -309,19 +309,19 @@ class DiagnosisReadout:
         """The design model's error here, where the aircraft maps it."""
         error_map = self._fdi["bound"]["error_map"]
         return ModelErrorMapReadout(
-            not error_map["is_outside_all_boxes"],
-            error_map["error_bound_now"].copy(),
+            not error_map["outside"],
+            error_map["e_now"].copy(),
         )
 
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_by_input_noise"])
+        return np.array(self._fdi["statistical"]["noise"]["Q"])
 
     @cached_property
     def statistical_alarm_level(self) -> float:
         """Statistic at which the statistical detector raises its alarm, standard deviations."""
-        return float(self._fdi["statistical"]["test_config"]["alarm_level"])
+        return float(self._fdi["statistical"]["test"]["alarm_level"])
 
     @cached_property
     def statistical_filters(self) -> tuple[StatisticalBlock, ...]:
@@ -342,7 +342,7 @@ def estimator_records(fdi: np.void) -> np.ndarray:
 
 def switch_statistical_tests(fdi: np.void, is_enabled: bool) -> None:
     """Switch the statistical tests on or off, for every scheme."""
-    fdi["statistical"]["test_config"]["enabled"] = is_enabled
+    fdi["statistical"]["test"]["enabled"] = is_enabled
 
 
 def disable_surface_and_sensor_diagnosis(fdi: np.void) -> None:
@@ -364,10 +364,10 @@ def certificate_arrays_of_every_frame(
     """
     estimators, surface_records = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     array_by_name = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["changing_gyro_error_bound"],
-        "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
-        "slope": estimators["frame_mean_effect"]["regressor"],
-        "spread": estimators["frame_mean_effect"]["error_bound"], "excluded": estimators["excluded"],
+        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["n_gyro"],
+        "offset": estimators["effect"]["base"],
+        "slope": estimators["effect"]["regressor"],
+        "spread": estimators["effect"]["e"], "excluded": estimators["excluded"],
         "types": surface_records["feasible_sets"]["excluded"],
     }  # fmt: skip
     if diagnoses_all_types:
@@ -386,9 +386,9 @@ def certificate_arrays_of_every_frame(
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
 RECORDED_BLOCK_FIELDS = (
-    "drift_decay_factor", "uncertainty_change_over_bound_per_frame", "state", "P_xx", "P_xd", "P_dd",
-    "drift_intensity", "model_noise_variance", "gyro_noise_variance", "predictable_innovation_in_calm_air",
-    "coarse_gust_response", "regressor_filter_state", "regressor_response",
+    "a", "eta_rate", "state", "P_xx", "P_xd", "P_dd",
+    "Q_d", "Q_x", "R_y", "p",
+    "g_c", "x_Z", "g_Z",
 )  # fmt: skip
 
 
@@ -403,8 +403,8 @@ def current_certificate_arrays(
     """
     estimators = fdi["isolation"]["estimator"][:n_estimators]
     array_by_name = {
-        "reach_low": estimators["reachable_bank_residual_low"],
-        "reach_high": estimators["reachable_bank_residual_high"],
+        "reach_low": estimators["reach_lo"],
+        "reach_high": estimators["reach_hi"],
     }
     if has_statistical_detector:
         statistical_detector = fdi["statistical"]
@@ -412,11 +412,11 @@ def current_certificate_arrays(
         array_by_name |= {name: block_records[name] for name in RECORDED_BLOCK_FIELDS}
         array_by_name |= {
             "signature": block_records["hypothesis"]["signature"],
-            "bounded": statistical_detector["noise"]["uncertainty_bound"],
+            "bounded": statistical_detector["noise"]["eta"],
         }
         array_by_name |= {
-            "air": gust_output["mean_angular_acceleration_by_gust"],
-            "leap": gust_output["acceleration_variance_by_axes_turn"],
+            "air": gust_output["acc_mean"],
+            "leap": gust_output["var_turn"],
         }
     return array_by_name
 
@@ -427,7 +427,7 @@ def surface_and_sensor_alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
 
 
 def _read_estimator(fie: np.void) -> IsolationEstimator:
-    active_axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
+    active_axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
     theta_range = float(fie["theta_min"]), float(fie["theta_max"])
     return IsolationEstimator(
         int(fie["hypothesis_kind"]),
@@ -451,21 +451,21 @@ def _read_surface(surface_record: np.void) -> SurfaceFaultTypes:
 
 
 def _read_block(block_record: np.void) -> StatisticalBlock:
-    hypotheses = tuple(map(_read_hypothesis, block_record["hypothesis"][: block_record["n_hypotheses"]]))
+    hypotheses = tuple(map(_read_hypothesis, block_record["hypothesis"][: block_record["n_h"]]))
     n_hypotheses = len(hypotheses)
     hypothesis_tests_by_onset = (
-        block_record["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
+        block_record["tests"][name].reshape(-1, N_SLOTS)[:n_hypotheses].copy()
         for name in (
             "score",
             "supporting_correlation_sign",
-            "correlation_by_calm_air",
+            "N_p",
             "correlation_from_coarse_gust",
         )
     )
     return StatisticalBlock(
-        tuple(block_record["axes"][: block_record["n_axes"]].tolist()),
-        float(block_record["drift_correlation_length_m"]), float(block_record["gust_drift_intensity_factor"]),
-        block_record["regressor_tolerance"][: block_record["n_regressors"]].copy(),
+        tuple(block_record["axes"][: block_record["n"]].tolist()),
+        float(block_record["drift_correlation_length_m"]), float(block_record["Q_scale"]),
+        block_record["tol"][: block_record["n_Z"]].copy(),
         hypotheses, HypothesisTestsByOnset(*hypothesis_tests_by_onset),
     )  # fmt: skip
 
@@ -477,7 +477,7 @@ def _read_hypothesis(hypothesis_record: np.void) -> StatisticalHypothesis:
         int(hypothesis_record["axis"]),
     )
     return StatisticalHypothesis(
-        *kind_surface_axis, bool(hypothesis_record["raises_alarm"]), float(hypothesis_record["score"])
+        *kind_surface_axis, bool(hypothesis_record["alarms"]), float(hypothesis_record["score"])
     )
 
 
@@ -490,13 +490,13 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     worst_sensor_test = SensorTest(
         float(worst_test_record["residual"]), float(worst_test_record["bound_per_s"]),
         float(worst_test_record["bound_per_sample"]),
-        float(worst_test_record["residual_per_gust_speed_change"]),
-        worst_test_record["filtered_residual"].copy(), worst_test_record["filtered_bound"].copy(),
+        float(worst_test_record["gust_gain"]),
+        worst_test_record["r"].copy(), worst_test_record["B"].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,
-        float(output["worst_residual_bound_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
+        float(output["top_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
         output["is_reading_unused"].astype(bool), float(config["sample_time_s"]),
-        config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
-        memory["reading_error_bound"].copy(), memory["commanded_engine_readings"].copy(),
+        config["gust_change"].copy(), memory["predicted_reading"].copy(),
+        memory["reading_bound"].copy(), memory["engine_commands"].copy(),
     )  # fmt: skip

@@ -86,12 +86,12 @@ class FrameReadout:
     @cached_property
     def mean_G(self) -> np.ndarray:
         """The same, mean over the elapsed frame."""
-        return np.array(self._frame["prediction"]["frame_means"]["G"])
+        return np.array(self._frame["prediction"]["means"]["G"])
 
     @cached_property
     def model_rad_s2(self) -> np.ndarray:
         """f + G u by the design model, mean over the elapsed frame, (3,) rad/s2."""
-        return np.array(self._frame["prediction"]["frame_means"]["predicted_acceleration"])
+        return np.array(self._frame["prediction"]["means"]["F"])
 
     @cached_property
     def inertia(self) -> InertiaCoefficients:
@@ -171,8 +171,8 @@ def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[s
     """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
     acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
     `diagnosis.readout.recorded_always`."""
-    means = frame["prediction"]["frame_means"]
-    own = {"x": frame["measured"]["x"], "model": means["predicted_acceleration"]}
+    means = frame["prediction"]["means"]
+    own = {"x": frame["measured"]["x"], "model": means["F"]}
     return own | of_diagnosis.certificate_arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
 
 

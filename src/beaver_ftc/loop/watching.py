@@ -8,11 +8,11 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.diagnosis.model_prediction import (
-    evaluate_bound_and_frame_means,
-    evaluate_design_model,
-    store_command_and_move_healthy_surfaces,
+    evaluate_design,
+    evaluate_frame,
+    move_surfaces,
 )
-from beaver_ftc.loop.frame import accommodate, advance_clock, estimated_theta_of_isolated_loss, start_clock
+from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
@@ -31,10 +31,10 @@ def take(frames, x, y, command, attitude):
     prediction, measured = frame.prediction, frame.measured
     start_clock(frame)
     if frame.k > 0:
-        store_command_and_move_healthy_surfaces(prediction, command)
+        move_surfaces(prediction, command)
     take_sample(measured, x, y, attitude)
-    evaluate_design_model(prediction, measured)
-    evaluate_bound_and_frame_means(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
+    evaluate_design(prediction, measured)
+    evaluate_frame(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
 
 
@@ -59,7 +59,7 @@ def accommodate_and_advance(frames):
 def theta(frames):
     """The estimate of the isolated loss of effectiveness, of the published class."""
     fdi = frames[0].fdi
-    return estimated_theta_of_isolated_loss(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
+    return isolated_theta(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
 
 
 @kernel
@@ -72,9 +72,7 @@ def news(frames, known):
     changed = replace(known, 0, fdi.verdict.detected)
     if not fdi.verdict.detected:
         return changed
-    changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(
-        known, 2, fdi.verdict.isolated_estimator
-    )
+    changed |= replace(known, 1, fdi.verdict.axis) | replace(known, 2, fdi.verdict.isolated_estimator)
     excluded = 0
     for i in range(fdi.isolation.config.n_estimators):
         excluded = 2 * excluded + fdi.isolation.estimator[i].excluded

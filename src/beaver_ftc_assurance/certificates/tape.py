@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis import estimator_names
-from beaver_ftc.diagnosis.detection import N_ONSET_SLOTS
+from beaver_ftc.diagnosis.detection import N_SLOTS
 from beaver_ftc.loop import (
     FrameReadout,
     Loop,
@@ -24,7 +24,7 @@ from beaver_ftc.loop import (
 from beaver_ftc.scenario import Scenario
 
 FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
-STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_ONSET_SLOTS + 2  # with the statistical detector: its oldest onset
+STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
 KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
 MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm
 FIRST_ROOM_AFTER_ALARM = 1 << 10  # frames for which there is room at first; doubled when it is used up

@@ -96,13 +96,9 @@ def test_blocks_see_what_frames_do_not():
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
     known, estimator = (
         plant.fdi["types"]["surface"][2],
-        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_estimator"][2]],
+        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position"][2]],
     )
-    of_a_frame = (
-        2
-        * plant.fdi["bound"]["frame_innovation_bound"][2]
-        / abs(estimator["frame_mean_effect"]["regressor"][2])
-    )
+    of_a_frame = 2 * plant.fdi["bound"]["nu_max"][2] / abs(estimator["effect"]["regressor"][2])
     assert (
         known["last_observation"]["position_high"] - known["last_observation"]["position_low"]
         < 0.5 * of_a_frame

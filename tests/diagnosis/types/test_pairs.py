@@ -107,17 +107,17 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
     frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
     for column, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]["frame_mean_effect"]
-        effect["regressor"][[0, 2]], effect["error_bound"][[0, 2]] = Z[:, column], spread[:, column]
+        effect = fdi["isolation"]["estimator"][fdi["layout"]["position"][s]]["effect"]
+        effect["regressor"][[0, 2]], effect["e"][[0, 2]] = Z[:, column], spread[:, column]
         fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = 0.02
-    fdi["bound"]["frame_innovation_bound"][[0, 2]] = frame
+    fdi["bound"]["nu_max"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
     locate_lateral_and_flag_unreachable(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],
         fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["frame_innovation_bound"],
+        fdi["bound"]["nu_max"],
     )
     e = frame + spread.sum(axis=1)
     signs = product((-1, 1), repeat=2)

@@ -8,7 +8,7 @@ from kernels import new_fdi, on, put, put_on
 
 from beaver_ftc.diagnosis import types
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
-from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, layout_dtype
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH_GROUP, layout_dtype
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
@@ -960,7 +960,7 @@ def test_all_that_types_are_set_up_with_by_scenario_surface_and_actuator(keys, f
     }  # fmt: skip
     types = np.zeros(1, registry.fault_types_dtype(4))[0]
     layout, prediction = np.zeros(1, layout_dtype(4))[0], np.zeros(1, prediction_dtype(4))[0]
-    layout["group"] = LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP
+    layout["group"] = LATERAL_GROUP, PITCH_GROUP, LATERAL_GROUP, PITCH_GROUP
     actuators = prediction["actuators"]
     actuators["real"], actuators["approach"] = 1, (0.2, 0.3, 0.4, 0.5)
     actuators["step"] = np.inf, np.radians(90.0) * instant_s, np.radians(2.5) * instant_s, np.inf

@@ -59,7 +59,7 @@ def new_case(**left):
     fdi["isolation"]["config"]["n_estimators"] = 8
     fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = 1, DT
     layout = fdi["layout"]
-    layout["loss_estimator"], layout["position_estimator"] = range(4), range(4, 8)
+    layout["loss"], layout["position"] = range(4), range(4, 8)
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
     fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["hypothesis_kind"][:8] = (
@@ -97,7 +97,7 @@ def new_case(**left):
 
 def locate(fdi, s, innovation, bound, effect):
     """`fill_last_observation_from_innovation` for surface s, with its estimator and its axis."""
-    fie = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]
+    fie = fdi["isolation"]["estimator"][fdi["layout"]["position"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
     types.shift_observations(surface)
@@ -282,7 +282,7 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
     fdi, surface = one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence)
     surface["oscillatory"]["n_half_cycles"] = half_cycles
     assert on(verdict.fault_type_on_surface, fdi, surface) == found
-    fdi["types"]["config"]["has_surface_term_errors"] = 1
+    fdi["types"]["config"]["has_eG"] = 1
     assert on(verdict.fault_type_on_surface, fdi, surface) == in_coarse_sets
 
 
@@ -335,7 +335,7 @@ def test_the_surface_at_fault():
 
 
 @pytest.mark.parametrize(
-    ("flap", "evidence", "has_surface_term_errors", "position_estimator_excluded"),
+    ("flap", "evidence", "has_eG", "position_estimator_excluded"),
     [
         ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
         ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
@@ -345,15 +345,15 @@ def test_the_surface_at_fault():
     ],
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(
-    flap, evidence, has_surface_term_errors, position_estimator_excluded
+    flap, evidence, has_eG, position_estimator_excluded
 ):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     (
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR],
-        fdi["types"]["config"]["has_surface_term_errors"],
+        fdi["types"]["config"]["has_eG"],
     ) = (
         evidence,
-        has_surface_term_errors,
+        has_eG,
     )
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
     assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == position_estimator_excluded
@@ -367,12 +367,12 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
 
 def conclude(fdi, kernel, *given, lead=()):
     """Hand a finding of the types to the conclusion."""
-    conclusion.record_isolation_and_accommodation(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+    conclusion.record_decision(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
 
 
 def take_lead(fdi, kernel, *given):
     """Keep a lead where the conclusion has it."""
-    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = on(kernel, fdi, *given)
+    fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"] = on(kernel, fdi, *given)
 
 
 def test_a_decision_notes_when_surface_and_type_became_certain():
@@ -381,19 +381,19 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
     conclude(fdi, verdict.decide_isolation_and_accommodation, 3.0)
     assert fdi["verdict"]["isolated_estimator"] == 4 + RUDDER  # its estimator of a position
     assert fdi["verdict"]["fault_type"] == STUCK
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 3.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["typed_at_s"]) == (3.0, 3.0)
     leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
     conclude(fdi, verdict.decide_isolation_and_accommodation, 4.0)
     assert fdi["verdict"]["isolated_estimator"] == RUDDER  # its estimator of a loss
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["typed_at_s"]) == (3.0, 4.0)
     conclude(fdi, verdict.decide_isolation_and_accommodation, 5.0)
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["typed_at_s"]) == (3.0, 4.0)
     fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = 1
     conclude(fdi, verdict.decide_isolation_and_accommodation, 6.0)
     assert fdi["verdict"]["isolated_estimator"] == UNANTICIPATED
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (6.0, 6.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["typed_at_s"]) == (6.0, 6.0)
     assert fdi["verdict"]["fault_type"] == -1
-    assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
+    assert fdi["verdict"]["target"] == NO_SURFACE
 
 
 def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
@@ -432,7 +432,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
     take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = (
         0.25,
@@ -441,15 +441,15 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
         take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
-    assert fdi["verdict"]["accommodated_surface"] == RUDDER
+    assert fdi["verdict"]["target"] == RUDDER
     take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
-    assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
+    assert fdi["verdict"]["target"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
     surface["last_observation"]["position_low"] = 0.1
     take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
     assert (
         surface["accommodation"]["n_frames_without_sign_of_fault"],
-        fdi["verdict"]["accommodated_surface"],
+        fdi["verdict"]["target"],
     ) == (
         0,
         RUDDER,
@@ -528,7 +528,7 @@ def test_orders_are_kept_for_the_frames_before():
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
     effect, surface = (
-        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+        fdi["isolation"]["estimator"][4 + RUDDER]["effect"],
         fdi["types"]["surface"][RUDDER],
     )
     effect["regressor"], surface["last_observation"]["weighted_mean_error_per_position_range"] = (
@@ -549,10 +549,10 @@ def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
     effect, surface = (
-        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+        fdi["isolation"]["estimator"][4 + RUDDER]["effect"],
         fdi["types"]["surface"][RUDDER],
     )
-    effect["regressor"], effect["acceleration_at_zero_theta"] = (
+    effect["regressor"], effect["base"] = (
         (0.5, 0.0, -2.0),
         (-0.05, 0.0, 0.2),
     )  # commanded to 0.1
@@ -655,9 +655,9 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
     fdi = new_case()
     surface, effect = (
         fdi["types"]["surface"][RUDDER],
-        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+        fdi["isolation"]["estimator"][4 + RUDDER]["effect"],
     )
-    effect["regressor"], effect["error_bound"], bound = (
+    effect["regressor"], effect["e"], bound = (
         (0.5, 0.0, -2.0),
         (9.0, 9.0, 0.02),
         np.array([9.0, 9.0, 0.08]),
@@ -701,7 +701,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert n_rest_frames(low=0.0, high=0.14)[1]["evidence"]["n_rest_frames"] == 0
     assert not n_rest_frames(frames=PATIENCE)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     assert n_rest_frames(frames=PATIENCE + 1)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert not n_rest_frames(frames=PATIENCE + 1, has_surface_term_errors=1)[1]["feasible_sets"]["excluded"][
+    assert not n_rest_frames(frames=PATIENCE + 1, has_eG=1)[1]["feasible_sets"]["excluded"][
         OSCILLATORY
     ]
     fdi, surface = n_rest_frames()
@@ -746,23 +746,23 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     Z[:, :, YAW] += 5.0
     for k in range(length):
         fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["changing_gyro_error_bound_before"], fdi["bound"]["changing_gyro_error_bound"] = (
+        fdi["bound"]["n_old"], fdi["bound"]["n_gyro"] = (
             noise[k],
             noise[k + 1],
         )
-        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][:8] = Z[k]
-        fdi["isolation"]["estimator"]["frame_mean_effect"]["acceleration_at_zero_theta"][:8] = offset[k]
-        fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][:8] = spread[k]
+        fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
+        fdi["isolation"]["estimator"]["effect"]["base"][:8] = offset[k]
+        fdi["isolation"]["estimator"]["effect"]["e"][:8] = spread[k]
         on(registry.advance_block_and_judge_previous, fdi)
         assert fdi["types"]["block"]["n_frames_so_far"] == (k + 1) % length
         assert fdi["types"]["frame_index"] == (k + 1 == length)
     assert fdi["types"]["block"]["mean_innovation"] == pytest.approx(innovation.mean(axis=0))
     ends = (noise[0] + noise[-1]) / (length * DT)
     assert fdi["types"]["block"]["mean_innovation_bound"] == pytest.approx(eta.mean(axis=0) + ends)
-    mean = fdi["isolation"]["estimator"][4 + RUDDER]["block_mean_effect"]
+    mean = fdi["isolation"]["estimator"][4 + RUDDER]["mean_effect"]
     assert mean["regressor"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
-    assert mean["acceleration_at_zero_theta"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
-    assert mean["error_bound"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
+    assert mean["base"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
+    assert mean["e"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
 
 
 # Two faults at once.
@@ -824,7 +824,7 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
         surface["status"]["is_isolated"],
         surface["status"]["fault_type"],
         surface["status"]["isolated_at_s"],
-        surface["status"]["type_decided_at_s"],
+        surface["status"]["typed_at_s"],
     ) == (
         1,
         STUCK,
@@ -832,14 +832,14 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
         3.0,
     )
     pairs.update_isolation_type_and_times(surface, 1, BIAS, 4.0)
-    assert (surface["status"]["isolated_at_s"], surface["status"]["type_decided_at_s"]) == (3.0, 4.0)
+    assert (surface["status"]["isolated_at_s"], surface["status"]["typed_at_s"]) == (3.0, 4.0)
     pairs.update_isolation_type_and_times(surface, 1, BIAS, 5.0)
-    assert surface["status"]["type_decided_at_s"] == 4.0
+    assert surface["status"]["typed_at_s"] == 4.0
     pairs.update_isolation_type_and_times(surface, 0, BIAS, 6.0)
     assert (
         surface["status"]["is_isolated"],
         surface["status"]["fault_type"],
-        surface["status"]["type_decided_at_s"],
+        surface["status"]["typed_at_s"],
     ) == (
         0,
         -1,
@@ -892,16 +892,16 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         elevator["last_observation"]["healthy_position"],
     ) = 0.1, 0.14, 0.0
     (
-        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][4 + ELEVATOR, PITCH],
-        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][4 + FLAP, PITCH],
+        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + ELEVATOR, PITCH],
+        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + FLAP, PITCH],
     ) = (
         -10.0,
         2.0,
     )
-    fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][4 + ELEVATOR, PITCH] = 0.01
-    fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][4 + FLAP, PITCH] = 0.02
+    fdi["isolation"]["estimator"]["effect"]["e"][4 + ELEVATOR, PITCH] = 0.01
+    fdi["isolation"]["estimator"]["effect"]["e"][4 + FLAP, PITCH] = 0.02
     (
-        fdi["bound"]["frame_innovation_bound"][PITCH],
+        fdi["bound"]["nu_max"][PITCH],
         fdi["bank"]["output"]["innovation"][PITCH],
         flap["last_observation"]["healthy_position"],
     ) = (
@@ -931,7 +931,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
     fdi = new_case()
     (
         fdi["types"]["pair"]["first_pitch_fault_surface"],
-        fdi["bound"]["frame_innovation_bound"],
+        fdi["bound"]["nu_max"],
         fdi["bank"]["output"]["innovation"],
     ) = (
         NO_SURFACE,
@@ -1076,7 +1076,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
     assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated_estimator"] == ELEVATOR
     assert (fdi["verdict"]["fault_type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (
         ELEVATOR,
         SCALE_COMMAND,
     )
@@ -1121,12 +1121,12 @@ def test_the_verdict_is_that_of_the_first_named():
     fdi = decided(aileron=None, rudder=None)
     fdi["types"]["surface"]["status"]["fault_type"][RUDDER] = STUCK
     (
-        fdi["types"]["surface"]["status"]["type_decided_at_s"][RUDDER],
+        fdi["types"]["surface"]["status"]["typed_at_s"][RUDDER],
         fdi["types"]["surface"]["status"]["isolated_at_s"][RUDDER],
     ) = 2.0, 1.5
     conclude(fdi, pairs.first_fault_estimator_type_and_times, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
-    assert (found["isolated_estimator"], found["fault_type"], found["type_decided_at_s"]) == (
+    assert (found["isolated_estimator"], found["fault_type"], found["typed_at_s"]) == (
         4 + RUDDER,
         STUCK,
         2.0,
@@ -1162,7 +1162,7 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
         SUBTRACT_OFFSET,
         -1,
     ]
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (
         AILERON,
         SCALE_COMMAND,
     )
@@ -1186,14 +1186,14 @@ def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lea
         -1,
         -1,
     ]
-    assert fdi["verdict"]["accommodated_surface"] == lead
+    assert fdi["verdict"]["target"] == lead
 
 
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
     take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (
         AILERON,
         SUBTRACT_OFFSET,
     )
@@ -1218,7 +1218,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     )
     take_lead(fdi, pairs.accommodate_isolated_surfaces_and_choose_lead)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -1229,10 +1229,10 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     spread, room = rng.uniform(0.01, 0.02, (2, 2)), np.array([0.03, 0.02])
     off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
     for k, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][4 + s]["frame_mean_effect"]
-        effect["regressor"][[ROLL, YAW]], effect["error_bound"][[ROLL, YAW]] = Z[:, k], spread[:, k]
+        effect = fdi["isolation"]["estimator"][4 + s]["effect"]
+        effect["regressor"][[ROLL, YAW]], effect["e"][[ROLL, YAW]] = Z[:, k], spread[:, k]
         fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = command[k]
-    fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame_innovation_bound"][[ROLL, YAW]] = (
+    fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["nu_max"][[ROLL, YAW]] = (
         Z @ off,
         room,
     )
@@ -1295,12 +1295,12 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
     for t in (3.0, 4.0):
         conclude(fdi, verdict.decide_isolation_and_accommodation, t)
         found = fdi["verdict"]
-        assert (found["isolated_estimator"], found["fault_type"], found["accommodated_surface"]) == (
+        assert (found["isolated_estimator"], found["fault_type"], found["target"]) == (
             AILERON,
             CONSTANT_LOSS,
             AILERON,
         )
-        assert (found["isolated_at_s"], found["type_decided_at_s"], found["accommodation_mode"]) == (
+        assert (found["isolated_at_s"], found["typed_at_s"], found["accommodation_mode"]) == (
             3.0,
             3.0,
             SCALE_COMMAND,
@@ -1318,9 +1318,9 @@ def test_the_one_named_is_acted_upon_though_others_are_possible():
 def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
     fdi["verdict"]["isolated_estimator"] = UNANTICIPATED
-    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, 2
+    fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"] = 2, 2
     take_lead(fdi, verdict.decide_accommodated_surface_and_mode, fdi["verdict"]["isolated_estimator"])
-    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
+    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
 
@@ -1337,7 +1337,7 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     surface = fdi["types"]["surface"][s]
     (
         surface["status"]["fault_type"],
-        surface["status"]["type_decided_at_s"],
+        surface["status"]["typed_at_s"],
         surface["status"]["isolated_at_s"],
     ) = (
         STUCK,
@@ -1353,4 +1353,4 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
         )
     else:
         assert (found["isolated_estimator"], found["isolated_at_s"]) == (4 + s, 3.0)
-        assert (found["fault_type"], found["type_decided_at_s"]) == (STUCK, 4.0)
+        assert (found["fault_type"], found["typed_at_s"]) == (STUCK, 4.0)

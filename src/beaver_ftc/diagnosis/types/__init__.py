@@ -341,12 +341,11 @@ def fill_last_observation_from_innovation(
     innovation_bound_by_axis (3,), rad/s2.
 
     fie: its estimator of a position; most_affected_axis: on which it has most effect;
-    fault_effect_record: what that supposes of the same frame or block, dtype FAULT_EFFECT_RECORD.
+    fault_effect_record: what that supposes of the same frame or block, dtype EFFECT_RECORD.
     """
     last_observation, command_record = surface.last_observation, surface.commands
     last_observation.healthy_position = (
-        -fault_effect_record.acceleration_at_zero_theta[most_affected_axis]
-        / fault_effect_record.regressor[most_affected_axis]
+        -fault_effect_record.base[most_affected_axis] / fault_effect_record.regressor[most_affected_axis]
     )
     last_observation.weighted_mean_error_per_position_range = (
         0.25
@@ -361,7 +360,7 @@ def fill_last_observation_from_innovation(
             and fault_effect_record.regressor[i] != 0.0
         ):
             continue  # over a block the axes weigh what varies differently
-        axis_position_low, axis_position_high = isolation.consistent_theta_interval_on_axis(
+        axis_position_low, axis_position_high = isolation.consistent_on(
             innovation_by_axis, innovation_bound_by_axis, fie, fault_effect_record, i
         )
         last_observation.position_low, last_observation.position_high = (
@@ -371,7 +370,7 @@ def fill_last_observation_from_innovation(
     mark_stops_that_can_hide_deflection(
         surface,
         2.0
-        * (innovation_bound_by_axis[most_affected_axis] + fault_effect_record.error_bound[most_affected_axis])
+        * (innovation_bound_by_axis[most_affected_axis] + fault_effect_record.e[most_affected_axis])
         / abs(fault_effect_record.regressor[most_affected_axis]),
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
-from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH, PITCH_SURFACE_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
@@ -50,7 +50,7 @@ from beaver_ftc.diagnosis.types.verdict import (
 def latch_group_alarms(pair_record, filter_bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for axis in range(3):
-        group_index = PITCH_SURFACE_GROUP if axis == PITCH else LATERAL_SURFACE_GROUP
+        group_index = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
         for filter_index in range(filter_bank.config.n_filters):
             if (
                 abs(filter_bank.output.residual[filter_index, axis])
@@ -66,22 +66,18 @@ def locate_lateral_and_flag_unreachable(
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
     innovation_by_axis (3,), |eta| <= innovation_bound_by_axis (3,) rad/s2."""
     aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
-    aileron_effect_record = estimators[layout.position_estimator[aileron_index]].frame_mean_effect
-    rudder_effect_record = estimators[layout.position_estimator[rudder_index]].frame_mean_effect
+    aileron_effect_record = estimators[layout.position[aileron_index]].effect
+    rudder_effect_record = estimators[layout.position[rudder_index]].effect
     aileron_roll_acceleration_per_rad = aileron_effect_record.regressor[ROLL]
     aileron_yaw_acceleration_per_rad = aileron_effect_record.regressor[YAW]
     rudder_roll_acceleration_per_rad = rudder_effect_record.regressor[ROLL]
     rudder_yaw_acceleration_per_rad = rudder_effect_record.regressor[YAW]
     roll_innovation, yaw_innovation = innovation_by_axis[ROLL], innovation_by_axis[YAW]
     roll_innovation_tolerance = (
-        innovation_bound_by_axis[ROLL]
-        + aileron_effect_record.error_bound[ROLL]
-        + rudder_effect_record.error_bound[ROLL]
+        innovation_bound_by_axis[ROLL] + aileron_effect_record.e[ROLL] + rudder_effect_record.e[ROLL]
     )
     yaw_innovation_tolerance = (
-        innovation_bound_by_axis[YAW]
-        + aileron_effect_record.error_bound[YAW]
-        + rudder_effect_record.error_bound[YAW]
+        innovation_bound_by_axis[YAW] + aileron_effect_record.e[YAW] + rudder_effect_record.e[YAW]
     )
     determinant = (
         aileron_roll_acceleration_per_rad * rudder_yaw_acceleration_per_rad
@@ -150,7 +146,7 @@ def flag_pitch_anomaly_or_locate_second(
         )
         return
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_SURFACE_GROUP:
+        if layout.group[s] == PITCH_GROUP:
             set_is_anomalous(surface, abs(innovation_by_axis[PITCH]) > innovation_bound_by_axis[PITCH])
 
 
@@ -161,8 +157,8 @@ def locate_second_pitch_or_deduce_healthy(
     """Find the position of the second surface, given the sets of the first."""
     first_fault_surface_index = types.pair.first_pitch_fault_surface
     second_surface_index = layout.partner[first_fault_surface_index]
-    first_effect_record = estimators[layout.position_estimator[first_fault_surface_index]].frame_mean_effect
-    second_effect_record = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
+    first_effect_record = estimators[layout.position[first_fault_surface_index]].effect
+    second_effect_record = estimators[layout.position[second_surface_index]].effect
     first_surface = types.surface[first_fault_surface_index]
     first_surface_min_deflection, first_surface_max_deflection = constant_parameter_types_deflection_range(
         types.config, first_surface, types.frame_index
@@ -181,9 +177,7 @@ def locate_second_pitch_or_deduce_healthy(
         * (first_surface_max_deflection - first_surface_min_deflection)
     )
     acceleration_tolerance += (
-        innovation_bound_by_axis[PITCH]
-        + first_effect_record.error_bound[PITCH]
-        + second_effect_record.error_bound[PITCH]
+        innovation_bound_by_axis[PITCH] + first_effect_record.e[PITCH] + second_effect_record.e[PITCH]
     )
     if not fill_observation_and_check_reach(
         types.surface[second_surface_index],
@@ -218,7 +212,7 @@ def update_isolation_type_and_times(surface, is_isolated, type_index, t):
     if is_isolated and not finding_record.is_isolated:
         finding_record.isolated_at_s = t
     if type_index != finding_record.fault_type:
-        finding_record.type_decided_at_s = t
+        finding_record.typed_at_s = t
     finding_record.is_isolated, finding_record.fault_type = is_isolated, type_index
 
 
@@ -240,7 +234,7 @@ def isolate_lateral_or_find_unanticipated(types, layout, t):
     types_do_not_explain_flight_yet = both_must_be_at_fault and not (
         verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
     )
-    can_isolate = pair_record.group_has_alarm[LATERAL_SURFACE_GROUP] == 1 and not (
+    can_isolate = pair_record.group_has_alarm[LATERAL_GROUP] == 1 and not (
         fault_is_outside_class or types_do_not_explain_flight_yet
     )
     update_isolation_type_and_times(
@@ -374,7 +368,7 @@ def decide_pitch_isolation(types, layout, t):
         return
     sole_surface_index = find_and_store_sole_pitch_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
-        if layout.group[surface_index] == PITCH_SURFACE_GROUP:
+        if layout.group[surface_index] == PITCH_GROUP:
             update_isolation_type_and_times(
                 surface,
                 surface_index == sole_surface_index,
@@ -390,7 +384,7 @@ def find_and_store_sole_pitch_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = (
         verdict.find_isolated_surface_or_unanticipated(types, layout)
-        if types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
+        if types.pair.group_has_alarm[PITCH_GROUP]
         else NO_SURFACE
     )
     if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
@@ -403,7 +397,7 @@ def find_and_store_sole_pitch_fault(types, layout):
 @kernel
 def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_isolation_and_accommodation`: its isolated estimator is of the one named first, the law
+    `conclusion.record_decision`: its isolated estimator is of the one named first, the law
     acts on all. previous_conclusion: that of the frame before."""
     lateral_fault_outside_class = isolate_lateral_or_find_unanticipated(types, layout, t)
     decide_pitch_isolation(types, layout, t)
@@ -447,7 +441,7 @@ def first_fault_estimator_type_and_times(
             isolated_estimator_index,
             finding_record.isolated_at_s,
             finding_record.fault_type,
-            finding_record.type_decided_at_s,
+            finding_record.typed_at_s,
         )
     isolated_estimator_index = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
     isolated_at_s = (
@@ -455,14 +449,14 @@ def first_fault_estimator_type_and_times(
         if isolated_estimator_index != previous_conclusion.isolated_estimator
         else previous_conclusion.isolated_at_s
     )
-    return isolated_estimator_index, isolated_at_s, -1, previous_conclusion.type_decided_at_s
+    return isolated_estimator_index, isolated_at_s, -1, previous_conclusion.typed_at_s
 
 
 @kernel
 def any_pitch_surface_is_isolated(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_SURFACE_GROUP and surface.status.is_isolated:
+        if layout.group[s] == PITCH_GROUP and surface.status.is_isolated:
             return True
     return False
 
@@ -473,9 +467,9 @@ def is_isolated_or_likeliest_in_pitch(types, layout, s):
     if types.surface[s].status.is_isolated:
         return True
     if (
-        layout.group[s] != PITCH_SURFACE_GROUP
+        layout.group[s] != PITCH_GROUP
         or any_pitch_surface_is_isolated(types, layout)
-        or not types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
+        or not types.pair.group_has_alarm[PITCH_GROUP]
     ):
         return False
     sole_possible_surface_index = verdict.sole_possible_surface(types.surface, True)

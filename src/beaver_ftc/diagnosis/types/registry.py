@@ -30,7 +30,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import PITCH_SURFACE_GROUP
+from beaver_ftc.diagnosis.state import PITCH_GROUP
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
@@ -273,7 +273,7 @@ SURFACE_FINDING_RECORD = record(
     is_isolated=int,
     isolated_at_s=float,
     fault_type=int,
-    type_decided_at_s=float,
+    typed_at_s=float,
 )
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
@@ -295,7 +295,7 @@ TYPES_CONFIG_RECORD = record(
     frame_shows_single_instant=int, n_substeps=int, released_surface_returns_via_actuator=int,
     slowest_half_cycle_frames=int,
     abrupt=int,
-    has_surface_term_errors=int, frames_per_block=int, block_duration_s=float,
+    has_eG=int, frames_per_block=int, block_duration_s=float,
     dt=float,
 )  # fmt: skip
 
@@ -389,9 +389,7 @@ def configure_fault_types(
         actuator_record["min_rate_limited_motion_per_substep"] = min(
             radians(config.slowest_rate_deg_s) * substep_s, actuator_record["max_motion_per_substep"]
         )
-        surface_record["status"]["may_be_sole_fault"] = (
-            not config.pairs or layout["group"][s] == PITCH_SURFACE_GROUP
-        )
+        surface_record["status"]["may_be_sole_fault"] = not config.pairs or layout["group"][s] == PITCH_GROUP
         surface_record["accommodation"]["mode"] = surface_record["status"]["fault_type"] = -1
 
 
@@ -470,16 +468,12 @@ def shift_observations_and_infer_positions(
 
     innovation_bound_by_axis (3,): on innovation_by_axis (3,) without a fault, rad/s2.
     """
-    innovation_exceeds_uncertainty = not isolation.uncertainty_explains_innovation(
-        innovation_by_axis, innovation_bound_by_axis
-    )
+    innovation_exceeds_uncertainty = not isolation.eta_explains(innovation_by_axis, innovation_bound_by_axis)
     for s, surface in enumerate(types.surface):
         shift_observations(surface)
         set_is_anomalous(surface, innovation_exceeds_uncertainty)
-        fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        mean_effect_record = (
-            fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
-        )
+        fie, axis = estimators[layout.position[s]], layout.dominant_axis[s]
+        mean_effect_record = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
         fill_last_observation_from_innovation(
             types.config, surface, fie, axis, innovation_by_axis, innovation_bound_by_axis, mean_effect_record
         )
@@ -551,20 +545,18 @@ def observe_frame_and_judge_previous(types, layout, estimators, innovation_by_ax
     if types.config.frames_per_block > 1:
         advance_block_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record)
         return
-    shift_observations_and_infer_positions(
-        types, layout, estimators, innovation_by_axis, bound_record.frame_innovation_bound
-    )
+    shift_observations_and_infer_positions(types, layout, estimators, innovation_by_axis, bound_record.nu_max)
     judge_previous_and_advance_frame(types)
 
 
 @kernel
-def begin_frame_block(types, layout, estimators, changing_gyro_error_bound_before):
-    """Begin a block with the elapsed frame; changing_gyro_error_bound_before (3,) rad/s: as it began."""
+def begin_frame_block(types, layout, estimators, n_bar_old):
+    """Begin a block with the elapsed frame; n_old (3,) rad/s: as it began."""
     block = types.block
     block.mean_innovation[:], block.mean_innovation_bound[:] = 0.0, 0.0
-    block.changing_gyro_error_bound_at_start[:] = changing_gyro_error_bound_before
-    for estimator_index in layout.position_estimator:
-        isolation.clear_mean_effect(estimators[estimator_index].block_mean_effect)
+    block.changing_gyro_error_bound_at_start[:] = n_bar_old
+    for estimator_index in layout.position:
+        isolation.clear_mean_effect(estimators[estimator_index].mean_effect)
 
 
 @kernel
@@ -574,10 +566,10 @@ def add_frame_to_block(types, layout, estimators, innovation_by_axis, eta_bar):
     for i in range(3):
         block.mean_innovation[i] += frame_share_of_block * innovation_by_axis[i]
         block.mean_innovation_bound[i] += frame_share_of_block * eta_bar[i]
-    for estimator_index in layout.position_estimator:
-        isolation.add_frame_to_block_mean_effect(
-            estimators[estimator_index].block_mean_effect,
-            estimators[estimator_index].frame_mean_effect,
+    for estimator_index in layout.position:
+        isolation.add_to_mean(
+            estimators[estimator_index].mean_effect,
+            estimators[estimator_index].effect,
             frame_share_of_block,
         )
 
@@ -587,7 +579,7 @@ def advance_block_and_judge_previous(types, layout, estimators, innovation_by_ax
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.n_frames_so_far == 0:
-        begin_frame_block(types, layout, estimators, bound_record.changing_gyro_error_bound_before)
+        begin_frame_block(types, layout, estimators, bound_record.n_old)
     add_frame_to_block(types, layout, estimators, innovation_by_axis, bound_record.eta_bar)
     block.n_frames_so_far += 1
     if block.n_frames_so_far < config.frames_per_block:
@@ -595,7 +587,7 @@ def advance_block_and_judge_previous(types, layout, estimators, innovation_by_ax
     block.n_frames_so_far = 0
     for i in range(3):
         block.mean_innovation_bound[i] += (
-            block.changing_gyro_error_bound_at_start[i] + bound_record.changing_gyro_error_bound[i]
+            block.changing_gyro_error_bound_at_start[i] + bound_record.n_gyro[i]
         ) / config.block_duration_s
     shift_observations_and_infer_positions(
         types, layout, estimators, block.mean_innovation, block.mean_innovation_bound
@@ -619,10 +611,7 @@ def count_rest_evidence_and_exclude_types(types, surface_index):
         ):
             increment_anomalous_frame_counts(each_surface)
     surface.evidence.n_rest_frames += 1
-    if (
-        surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
-        and not types.config.has_surface_term_errors
-    ):
+    if surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames and not types.config.has_eG:
         for type_index in range(N_TYPES):
             if MEANING_OF_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
                 mark_type_excluded(surface, type_index)

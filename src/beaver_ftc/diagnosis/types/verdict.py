@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_SURFACE_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     REST_HIDES_TYPE,
@@ -57,7 +57,7 @@ _TIME_TOLERANCE_S = 1e-9
 def record_position_estimator_exclusions(surfaces, layout, estimators):
     """Keep for every surface whether its estimator is excluded."""
     for s, surface in enumerate(surfaces):
-        surface.position_estimator_excluded = estimators[layout.position_estimator[s]].excluded
+        surface.position_estimator_excluded = estimators[layout.position[s]].excluded
 
 
 @kernel
@@ -257,7 +257,7 @@ def other_surfaces_can_be_dismissed(types, candidate_surface_index):
             and surface.status.may_be_sole_fault
             and estimator_or_deduction_allows_fault(surface)
         ):
-            if config.has_surface_term_errors and any_type_remains(surface):
+            if config.has_eG and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
                 return False
@@ -283,7 +283,7 @@ def fault_type_on_surface(config, surface):
         or short_anomaly_may_be_rest_hidden_type(config, surface)
     ):
         return TYPE_UNDECIDED
-    if config.has_surface_term_errors:
+    if config.has_eG:
         return sole_remaining_type_once_it_shows_itself(surface)
     types_have_had_time_to_show = types_would_have_shown(config, surface)
     if any_constant_parameter_type_remains(surface):
@@ -333,7 +333,7 @@ def sole_remaining_varying_parameter_type(surface, among_types_that_must_show):
 @kernel
 def decide_isolation_and_accommodation(types, previous_conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, for
-    `conclusion.record_isolation_and_accommodation`.
+    `conclusion.record_decision`.
 
     previous_conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
@@ -348,9 +348,7 @@ def decide_isolation_and_accommodation(types, previous_conclusion, layout, estim
         fault_type_on_surface(types.config, types.surface[surface_index]) if surface_index >= 0 else -1
     )
     isolated_at_s = t if surface_index != previous_surface_index else previous_conclusion.isolated_at_s
-    type_decided_at_s = (
-        t if fault_type != previous_conclusion.fault_type else previous_conclusion.type_decided_at_s
-    )
+    type_decided_at_s = t if fault_type != previous_conclusion.fault_type else previous_conclusion.typed_at_s
     isolated_estimator_index = (
         estimator_of_fault(layout, surface_index, fault_type) if surface_index >= 0 else surface_index
     )
@@ -371,9 +369,9 @@ def decide_isolation_and_accommodation(types, previous_conclusion, layout, estim
 def estimator_of_fault(layout, s, type_index):
     """The estimator that stands for a fault of this type (TYPE_UNDECIDED if open) on surface s."""
     return (
-        layout.loss_estimator[s]
+        layout.loss[s]
         if type_index >= 0 and ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND
-        else layout.position_estimator[s]
+        else layout.position[s]
     )
 
 
@@ -514,7 +512,7 @@ def remaining_effectiveness(types, layout, estimators, s):
                 surface, type_index
             ):
                 return feasible_set_midpoint(surface, type_index)
-    return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
+    return 1.0 + estimators[layout.loss[s]].theta[layout.dominant_axis[s]]
 
 
 FindingDict = dict[str, Any]
@@ -600,7 +598,7 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
     return {
         **_finding_on_surface(fdi, s, fault_type, surface_names),
         "isolation_time_s": isolated_at_s,
-        "type_time_s": float(fdi["verdict"]["type_decided_at_s"]) if fault_type >= 0 else None,
+        "type_time_s": float(fdi["verdict"]["typed_at_s"]) if fault_type >= 0 else None,
     }
 
 
@@ -611,7 +609,7 @@ def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Se
         "isolated": surface_names[s],
         "isolation_time_s": float(surface["status"]["isolated_at_s"]),
         "isolation_type": registry.TYPE_NAMES[fault_type] if fault_type >= 0 else None,
-        "type_time_s": float(surface["status"]["type_decided_at_s"]) if fault_type >= 0 else None,
+        "type_time_s": float(surface["status"]["typed_at_s"]) if fault_type >= 0 else None,
         "candidates": (registry.TYPE_NAMES[fault_type],)
         if fault_type >= 0
         else tuple(_remaining_type_names(fdi, s)),
@@ -659,7 +657,7 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
     constant_parameter_type_indices = [
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
-    if constant_parameter_type_indices and not fdi["types"]["config"]["has_surface_term_errors"]:
+    if constant_parameter_type_indices and not fdi["types"]["config"]["has_eG"]:
         anomaly_evidence = surface["evidence"]
         slowest_half_cycle_frames = fdi["types"]["config"]["slowest_half_cycle_frames"]
         anomaly_is_shorter_than_half_cycle = (
@@ -674,7 +672,7 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
             or _counts_with_constant_parameter_types(type_index, constant_parameter_type_indices)
         ]
     is_pitch_surface_assuming_pair = (
-        fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_SURFACE_GROUP
+        fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
     )
     if is_pitch_surface_assuming_pair and any(
         registry.ACCOMMODATION_MODE_BY_TYPE[type_index] == GIVE_UP

@@ -43,7 +43,7 @@ def effectiveness_interval_of_judged_frame(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
     position_low = surface.judged_observation.position_low
     position_high = surface.judged_observation.position_high
-    return isolation.consistent_theta_interval(
+    return isolation.consistent_theta(
         0.5 * (position_low + position_high),
         0.5 * (position_high - position_low),
         surface.judged_observation.healthy_position,
@@ -101,7 +101,7 @@ def effectiveness_minus_one_estimate(fdi: np.void, s: int, type_index: int) -> f
 
 def effectiveness_minus_one_from_estimator(fdi: np.void, s: int, type_index: int) -> float:
     """theta as the estimator of a loss has it."""
-    estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_estimator"][s])]
+    estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
@@ -147,7 +147,7 @@ def offset_interval_of_judged_frame(surface):
     healthy_position = surface.judged_observation.healthy_position
     command_record = surface.commands
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
-        return isolation.EMPTY_THETA_INTERVAL
+        return isolation.NO_THETA
     min_actual_position_within_frame = position_low - max(
         healthy_position - command_record.min_healthy_position[1], 0.0
     )

@@ -40,7 +40,7 @@ def fill(record, **values):
 
 # Short names of fields, for cases that say a few of them.
 SHORT = {
-    "whole": "frame_shows_single_instant", "length": "frames_per_block", "thresholds": "mu_kind",
+    "whole": "single_instant", "length": "frames_per_block", "thresholds": "mu_kind",
     "memory": "reach", "shared": "shared", "membership": "narrows",
     "forgetting": "forget", "instants": "n_substeps",
 }  # fmt: skip
@@ -63,34 +63,34 @@ def put(fdi, **values):
 
 # Fields of a surface's records by one name each, for cases that say a few of them.
 _ACTUATOR = {
-    **{name: name for name in ("travel_low", "travel_high", "reachable_low", "reachable_high")},
-    "min_runaway_rate": "min_runaway_rate",
-    "approach": "approach_share_per_substep", "step": "max_motion_per_substep",
-    "slowest_step": "min_rate_limited_motion_per_substep",
+    **{name: name for name in ("stop_lo", "stop_hi", "reach_lo", "reach_hi")},
+    "runaway": "runaway",
+    "approach": "approach_share", "step": "step",
+    "slowest_step": "slow_step",
 }  # fmt: skip
 _OBSERVED = {
-    "command": "healthy_position", "low": "position_low", "high": "position_high",
-    **{name: name for name in ("is_anomalous", "weighted_mean_error_per_position_range",
-    "stop_can_hide_deflection")},
+    "command": "u", "low": "lo", "high": "hi",
+    **{name: name for name in ("anomalous", "kappa",
+    "hides")},
 }  # fmt: skip
 _EVIDENCE = (
-    "n_rest_frames",
-    "n_anomalous_frames_since_stop_could_hide",
-    "first_anomalous_frame",
-    "first_anomalous_position_low",
-    "first_anomalous_position_high",
+    "n_rest",
+    "n_unhidden",
+    "k_first",
+    "first_lo",
+    "first_hi",
 )
 OF_SURFACE = {
     **{name: ("actuator", field) for name, field in _ACTUATOR.items()},
-    **{name: ("last_observation", field) for name, field in _OBSERVED.items()},
-    **{f"{name}_then": ("judged_observation", field) for name, field in _OBSERVED.items()},
+    **{name: ("last", field) for name, field in _OBSERVED.items()},
+    **{f"{name}_then": ("judged", field) for name, field in _OBSERVED.items()},
     **{
-        f"{name}_before": ("earlier_observation", _OBSERVED[name]) for name in ("low", "high", "is_anomalous")
+        f"{name}_before": ("earlier", _OBSERVED[name]) for name in ("low", "high", "anomalous")
     },
-    "evidence": ("evidence", "n_anomalous_frames"),
+    "evidence": ("evidence", "n_anomalous"),
     **{name: ("evidence", name) for name in _EVIDENCE},
-    "n_frames_without_sign_of_fault": ("accommodation", "n_frames_without_sign_of_fault"),
-    "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "can_be_at_fault_basis"),
+    "n_silent": ("accommodation", "n_silent"),
+    "in_question": ("status", "may_be_sole"), "standing": ("status", "basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
     "type": ("status", "fault_type"), "type_at_s": ("status", "typed_at_s"),
 }  # fmt: skip

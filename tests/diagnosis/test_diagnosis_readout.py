@@ -19,9 +19,9 @@ FLAGS = {
     "enabled": "config.enabled",
     "diagnoses_all_types": "config.diagnoses_all_types",
     "detected": "verdict.detected",
-    "types_config.frame_shows_single_instant": "types.config.frame_shows_single_instant",
-    "types_config.released_surface_returns_via_actuator":
-        "types.config.released_surface_returns_via_actuator",
+    "types_config.single_instant": "types.config.single_instant",
+    "types_config.returns_lagged":
+        "types.config.returns_lagged",
     "gust.is_turbulence_declared": "statistical.gust.output.gusty",
     "gust.subtracts_measured_gust": "statistical.gust.output.measured",
     "sensor_monitor.enabled": "sensor_monitor.config.enabled",
@@ -29,7 +29,7 @@ FLAGS = {
     "estimators.3.is_excluded": "isolation.estimator.3.excluded",
     "statistical_filters.2.hypotheses.3.may_raise_alarm": "statistical.block.2.hypothesis.3.alarms",
     "is_estimator_excluded.2": "isolation.estimator.2.excluded",
-    "surface_fault_types.1.is_type_excluded.2": "types.surface.1.feasible_sets.excluded.2",
+    "surface_fault_types.1.is_type_excluded.2": "types.surface.1.sets.excluded.2",
     "sensor_monitor.is_reading_unused.5": "sensor_monitor.output.is_reading_unused.5",
 }  # fmt: skip
 
@@ -46,18 +46,18 @@ NUMBERS = {
     "estimators.1.theta_max": "isolation.estimator.1.theta_max",
     "estimators.1.parity_direction": "isolation.estimator.1.parity_direction",
     "types_config.n_substeps": "types.config.n_substeps",
-    "types_config.slowest_half_cycle_blocks": "types.config.slowest_half_cycle_frames",
+    "types_config.slowest_half_cycle_blocks": "types.config.half_frames",
     "types_config.frames_per_block": "types.config.frames_per_block",
     "types_config.block_duration_s": "types.config.block_duration_s",
     "types_config.dt_s": "types.config.dt",
-    "n_frames_in_block_so_far": "types.block.n_frames_so_far",
-    "surface_fault_types.2.actuator.travel_low_rad": "types.surface.2.actuator.travel_low",
-    "surface_fault_types.2.actuator.travel_high_rad": "types.surface.2.actuator.travel_high",
-    "surface_fault_types.2.actuator.min_runaway_rate_rad_s": "types.surface.2.actuator.min_runaway_rate",
-    "surface_fault_types.2.actuator.min_rate_limited_motion_per_substep_rad":
-        "types.surface.2.actuator.min_rate_limited_motion_per_substep",
-    "surface_fault_types.2.actuator.approach_share_per_substep":
-        "types.surface.2.actuator.approach_share_per_substep",
+    "n_frames_in_block_so_far": "types.block.n_so_far",
+    "surface_fault_types.2.actuator.travel_low_rad": "types.surface.2.actuator.stop_lo",
+    "surface_fault_types.2.actuator.travel_high_rad": "types.surface.2.actuator.stop_hi",
+    "surface_fault_types.2.actuator.min_runaway_rate_rad_s": "types.surface.2.actuator.runaway",
+    "surface_fault_types.2.actuator.slow_step_rad":
+        "types.surface.2.actuator.slow_step",
+    "surface_fault_types.2.actuator.approach_share":
+        "types.surface.2.actuator.approach_share",
     "declared_bounds.eta_bar_rad_s2": "bound.eta_bar",
     "declared_bounds.changing_gyro_error_bound_rad_s": "bound.n_gyro",
     "declared_bounds.inertia_coupling_error_share": "bound.inertia_coupling_error_share",
@@ -82,12 +82,12 @@ NUMBERS = {
     "sensor_monitor.worst_test.bound_per_sample": "sensor_monitor.redundancy.test.2.bound_per_sample",
     "sensor_monitor.worst_test.gust_gain":
         "sensor_monitor.redundancy.test.2.gust_gain",
-    "sensor_monitor.worst_test.filtered_residual_by_pole":
+    "sensor_monitor.worst_test.filtered_residual":
         "sensor_monitor.redundancy.test.2.r",
-    "sensor_monitor.worst_test.filtered_bound_by_pole": "sensor_monitor.redundancy.test.2.B",
+    "sensor_monitor.worst_test.filtered_bound": "sensor_monitor.redundancy.test.2.B",
     "sensor_monitor.isolated_sensor_index": "sensor_monitor.output.isolated_sensor",
     "sensor_monitor.sample_time_s": "sensor_monitor.redundancy.config.sample_time_s",
-    "sensor_monitor.filtered_gust_change_bound_by_pole_mps":
+    "sensor_monitor.gust_change_mps":
         "sensor_monitor.redundancy.config.gust_change",
     "sensor_monitor.predicted_reading": "sensor_monitor.redundancy.memory.predicted_reading",
     "sensor_monitor.reading_bound": "sensor_monitor.redundancy.memory.reading_bound",
@@ -208,13 +208,13 @@ OF_EVERY_FRAME = {
     "offset": "isolation.estimator.effect.base",
     "slope": "isolation.estimator.effect.regressor",
     "spread": "isolation.estimator.effect.e",
-    "excluded": "isolation.estimator.excluded", "types": "types.surface.feasible_sets.excluded",
+    "excluded": "isolation.estimator.excluded", "types": "types.surface.sets.excluded",
 }  # fmt: skip
 OF_EVERY_TYPE = {
-    "command_low": "types.surface.commands.min_command",
-    "command_high": "types.surface.commands.max_command",
-    "least": "types.surface.commands.min_healthy_position",
-    "greatest": "types.surface.commands.max_healthy_position",
+    "command_low": "types.surface.commands.cmd_min",
+    "command_high": "types.surface.commands.cmd_max",
+    "least": "types.surface.commands.u_min",
+    "greatest": "types.surface.commands.u_max",
 }
 UNTIL_THE_ALARM = {
     "reach_low": "isolation.estimator.reach_lo",
@@ -242,22 +242,22 @@ def test_a_certificate_takes_each_array_from_its_own_field(fdi, more):
             assert np.array_equal(found[name], wanted), name
             assert np.shares_memory(found[name], fdi), name
 
-    every = readout.certificate_arrays_of_every_frame(fdi, 2, more)
+    every = readout.frame_arrays(fdi, 2, more)
     held(every, OF_EVERY_FRAME | (OF_EVERY_TYPE if more else {}))
-    early = readout.current_certificate_arrays(fdi, 2, more)
+    early = readout.alarm_arrays(fdi, 2, more)
     held(early, UNTIL_THE_ALARM | (OF_THE_STATISTICAL_DETECTOR if more else {}))
 
 
 def test_alarms_are_those_of_the_surfaces_and_of_the_sensors(fdi):
     fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"] = 1, 0
-    assert readout.surface_and_sensor_alarm_flags(fdi) == (1, 0)
+    assert readout.alarm_flags(fdi) == (1, 0)
 
 
 @pytest.mark.parametrize(("enabled", "scheme"), [(1, "none"), (0, None)])
 def test_a_diagnosis_that_is_stopped_is_none(fdi, enabled, scheme):
     """Of a plug-in, which goes on, the scheme stays what it is."""
     fdi["config"]["enabled"], before = enabled, int(fdi["config"]["scheme_number"])
-    readout.disable_surface_and_sensor_diagnosis(fdi)
+    readout.disable_diagnosis(fdi)
     assert fdi["config"]["scheme_number"] == (before if scheme is None else scheme_number(scheme))
     assert (fdi["config"]["enabled"], fdi["sensor_monitor"]["config"]["enabled"]) == (0, 0)
 

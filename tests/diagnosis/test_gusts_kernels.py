@@ -285,7 +285,7 @@ def test_the_force_is_as_measured_or_the_lift_of_this_bank_and_a_coarse_gust_is_
     assert record["memory"]["f"] == pytest.approx(force)
     rotation = np.array([[0.2, 0.3], [0.5, 0.6], [0.8, 0.9]]) @ [0.02, -0.03]
     effect, none = -record["output"]["rate_damping"] @ rotation, np.zeros(3)
-    found = [record["output"][f"angular_acceleration_by_{name}"] for name in ("gust", "coarse_gust")]
+    found = [record["output"][name] for name in ("acc", "acc_coarse")]
     is_measured = fields.get("measured", 1)
     assert np.array(found) == pytest.approx(np.array([effect, none] if is_measured else [none, effect]))
 

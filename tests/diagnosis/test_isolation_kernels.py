@@ -348,10 +348,10 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
 def test_every_type_starts_with_no_knowledge_of_any_surface():
     for (fault_class, _), row in adaptive_estimators.ISOLATION_VARIANTS.items():
         fdi = new_fdi()
-        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 7
+        fdi["types"]["surface"]["evidence"]["n_anomalous"] = 7
         row.begin_at_alarm(fdi)
         assert (
-            fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist()
+            fdi["types"]["surface"]["evidence"]["n_anomalous"].tolist()
             == [7 * (fault_class != "all")] * 4
         )
 
@@ -384,9 +384,9 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     fdi["layout"]["position"], fdi["layout"]["loss"] = range(4), range(4)
     fdi["layout"]["dominant_axis"] = (0, 1, 2, 1)
     fdi["isolation"]["config"]["n_estimators"] = 4
-    fdi["types"]["config"]["slowest_half_cycle_frames"] = 9
+    fdi["types"]["config"]["half_frames"] = 9
     fdi["config"]["n_substeps"] = 1
-    fdi["types"]["config"]["frame_shows_single_instant"] = 1
+    fdi["types"]["config"]["single_instant"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["hypothesis_kind"] = POSITION_HYPOTHESIS
         fie["surface"] = s
@@ -395,7 +395,7 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
         fie["effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     adaptive_estimators.ISOLATION_VARIANTS["all", "worst-case"].isolate(fdi, measured, 1.0, started)
-    assert (fdi["types"]["frame_index"], fdi["types"]["block"]["n_frames_so_far"]) == (frame, filled)
+    assert (fdi["types"]["frame_index"], fdi["types"]["block"]["n_so_far"]) == (frame, filled)
 
 
 def test_the_axes_of_a_shared_theta_agree_after_each_step():

@@ -220,7 +220,7 @@ def new_map(**fields):
     record["lo"][0, 0], record["hi"][0, 0] = -0.1, 0.1  # the inner box by roll rate
     record["lo"][1, 5], record["hi"][1, 5] = 30.0, 60.0  # the outer one by airspeed
     record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
-    record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
+    record["stop_lo"], record["stop_hi"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
     record["e"] = np.arange(record["e"].size).reshape(record["e"].shape) / 1000.0
     return fill(record, **fields)
 
@@ -239,7 +239,7 @@ def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, 
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
-    up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
+    up_only = new_map(stop_lo=(-0.4, -0.4, -0.2, 0.0))
     assert bounds.level_of_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
     assert bounds.level_of_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
     assert bounds.level_of_positions(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
@@ -259,9 +259,9 @@ SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [
 def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
     error_map = new_fdi()["bound"]["error_map"]
-    error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
+    error_map["stop_lo"][1], error_map["stop_hi"][1] = -0.2, 0.4
     assert bounds.share_used(error_map, 1, where, before, instants) == pytest.approx(share)
-    error_map["travel_low"][1], error_map["travel_high"][1] = 0.0, 0.0  # a travel that ends at neutral
+    error_map["stop_lo"][1], error_map["stop_hi"][1] = 0.0, 0.0  # a travel that ends at neutral
     beyond = float(where[0] < 0.0 or where[1] > 0.0)
     assert bounds.share_used(error_map, 1, where, 0.0, 1) == beyond
 
@@ -278,7 +278,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
         3,
         SHARE,
     )
-    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = (
+    bound["error_map"]["stop_lo"], bound["error_map"]["stop_hi"] = (
         -0.5,
         0.5,
     )
@@ -520,7 +520,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
         score,
     )
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
-    likely = conclusion.uses_statistical_estimates(fdi["statistical"]["test"], authority)
+    likely = conclusion.weighs_statistics(fdi["statistical"]["test"], authority)
     alarm = fdi["statistical"]["alarm"]
     found = schemes.detection_share(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)

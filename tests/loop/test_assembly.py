@@ -98,18 +98,18 @@ EXPECTED = {
     "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
     "fdi.config.diagnoses_all_types": 1, "fdi.types.config.frames_per_block": 1,
     "fdi.types.config.block_duration_s": DT,
-    "fdi.types.config.frame_shows_single_instant": 0, "fdi.config.n_substeps": 2,
-    "fdi.types.config.released_surface_returns_via_actuator": 1,
-    "fdi.types.config.slowest_half_cycle_frames": 131,
+    "fdi.types.config.single_instant": 0, "fdi.config.n_substeps": 2,
+    "fdi.types.config.returns_lagged": 1,
+    "fdi.types.config.half_frames": 131,
     # of 2.618 s
-    "fdi.types.pair.enabled": 0, "fdi.types.pair.first_pitch_fault_surface": -1,
-    "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
+    "fdi.types.pair.enabled": 0, "fdi.types.pair.first_pitch": -1,
+    "fdi.types.surface.0.actuator.stop_lo": -0.5, "fdi.types.surface.3.actuator.stop_hi": 1.0,
     "fdi.types.surface.1.accommodation.mode": -1,
-    "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.may_be_sole_fault": 1,
-    "fdi.types.surface.1.actuator.approach_share_per_substep": 1.0 - exp(-25.0 * DT / 2),
-    "fdi.types.surface.1.actuator.max_motion_per_substep": pi / 2 * DT / 2,
-    "fdi.types.surface.1.actuator.min_runaway_rate": pi / 4,
-    "fdi.types.surface.1.actuator.min_rate_limited_motion_per_substep": radians(3.0) * DT / 2,
+    "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.may_be_sole": 1,
+    "fdi.types.surface.1.actuator.approach_share": 1.0 - exp(-25.0 * DT / 2),
+    "fdi.types.surface.1.actuator.step": pi / 2 * DT / 2,
+    "fdi.types.surface.1.actuator.runaway": pi / 4,
+    "fdi.types.surface.1.actuator.slow_step": radians(3.0) * DT / 2,
     "fdi.bank.config.n_filters": 3, "fdi.isolation.config.reach": 0,
     "fdi.isolation.config.narrows": 1,
     "control.reference.config.dt": DT,
@@ -192,7 +192,7 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
 
 def test_in_pairs_each_plane_is_asked_for_itself():
     fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
-    assert fdi["types"]["surface"]["status"]["may_be_sole_fault"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["status"]["may_be_sole"].tolist() == [0, 1, 0, 1]
     pitch, others = [1, 0, 1], [0, 1, 0]
     assert fdi["isolation"]["estimator"]["skip"][:4].tolist() == [others, pitch, others, pitch]
 

@@ -18,11 +18,23 @@ A derived aircraft declares a map of its model's error. The map has a few boxes 
 other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
 within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
 acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `extra`, belongs to the
-hypothesis that it is off its command (isolation.py). If two surfaces may be off, the bound itself takes the
-whole travel. Outside all boxes nothing has been measured, so nothing is concluded.
+be anywhere: the additional error of its share, `extra`, belongs to the hypothesis that it is off its command
+(isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes nothing
+has been measured, so nothing is concluded.
 
 Variances: for plug-ins, and for the filters and tests of the statistical detector.
+
+Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the design model):
+
+    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err an `a` behind the letter is the
+                                  magnitude as measured, a `w` the worst that the errors allow
+    eta (3,) rad/s2               bound on the uncertainty
+    C, dC; c, dc                  coefficient and its tolerance, of a moment's term; of inertia, dI (12,)
+    M, Ma, eM (3,) N m            moment; sum of its terms' magnitudes; bound on the error of this sum
+    q Pa, S m2, l m               dynamic pressure, wing area, span or chord
+    z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
+    b, j, k                       box, level of travel, row of time of the map
+    s, i                          surface, axis
 """
 
 from dataclasses import replace
@@ -93,18 +105,12 @@ def errors_dtype(n: int) -> np.dtype:
         wg=3, du=float,
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
         # far the reading of the altitude can be off: offset, m, and slope
-        wg_aloft=float, wg_1m=float, h0=float,
-        h1=float,
+        wg_aloft=float, wg_1m=float, h0=float, h1=float,
         # of dpt: see `slipstream_bound`
-        engine=int, kw0=float,
-        kw1=float,
+        engine=int, kw0=float, kw1=float,
         # scratch: magnitudes as measured, and as large as they can be
-        xa=3, ya=N_Y, ua=n, xw=3, yw=N_Y,
-        uw=n, xr=3,
-        sig=N_SIGNALS,
-        ma=MAX_MONOMIALS, mw=MAX_MONOMIALS,
-        eG=(3, n), Ma=3,
-        eM=3,
+        xa=3, ya=N_Y, ua=n, xw=3, yw=N_Y, uw=n, xr=3, sig=N_SIGNALS, ma=MAX_MONOMIALS, mw=MAX_MONOMIALS,
+        eG=(3, n), Ma=3, eM=3,
     )  # fmt: skip
 
 
@@ -112,54 +118,39 @@ def errors_dtype(n: int) -> np.dtype:
 def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
-    one_free: one surface may be anywhere in its travel; two_free:
-    more than one may.
-    outside: whether the state is outside all boxes; box, row: where it is
-    in the map.
-    u_old: deflections in the frame before, rad; e_now: error here, rad/s2.
-    yaw: bound on the yawing moment of healthy engines, by box."""
+    one_free: one surface may be anywhere in its travel; two_free: more than one may. lo, hi: ends of each
+    box; share: of the travel, by level; e: error by row of time, box, level and axis, rad/s2. outside:
+    whether the state is outside all boxes; box, row: where it is in the map; e_now: error there, rad/s2.
+    u_old: deflections in the frame before, rad. yaw, yaw_now: bound on the yawing moment of healthy engines,
+    by box and here.
+    """
     return record(
-        n_boxes=int, n_levels=int, n_rows=int, one_free=int,
-        two_free=int,
-        outside=int, box=int, row=int,
-        time_s=float, until_s=MAX_AGES, lo=(boxes, N_MAP_COORDINATES), hi=(boxes,
-        N_MAP_COORDINATES),
-        share=MAX_LEVELS,
-        e=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n,
-        u_old=n, coordinates=N_MAP_COORDINATES, e_now=3,
-        yaw=boxes, yaw_now=float,
+        n_boxes=int, n_levels=int, n_rows=int, one_free=int, two_free=int, outside=int, box=int, row=int,
+        time_s=float, until_s=MAX_AGES, lo=(boxes, N_MAP_COORDINATES), hi=(boxes, N_MAP_COORDINATES),
+        share=MAX_LEVELS, e=(MAX_AGES, boxes, MAX_LEVELS, 3), stop_lo=n, stop_hi=n, u_old=n,
+        coordinates=N_MAP_COORDINATES, e_now=3, yaw=boxes, yaw_now=float,
     )  # fmt: skip
 
 
 @sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
-    """Bounds on the uncertainty. eta_bar, eta_now: over the elapsed frame and at this instant, rad/s2.
-    n_gyro: on the changing part of a gyro's error, rad/s. nu_max: on the
-    innovation of one frame, rad/s2. eG, eGu: on
+    """Bounds on the uncertainty.
+
+    eta_bar, eta_now: over the elapsed frame and at this instant, rad/s2. n_gyro, n_old: on the changing part
+    of a gyro's error now and a frame ago, rad/s. nu_max: on the innovation of one frame, rad/s2. eG, eGu: on
     the error of each surface's own terms in the acceleration, per rad of deflection (rad/s2 per rad) and at
-    the command (rad/s2), means over the frame.
-    extra: by how much the map's error with a surface at each share of its
-    travel exceeds that in eta_bar."""
+    the command (rad/s2), means over the frame. extra: by how much the map's error with a surface at each
+    share of its travel exceeds that in eta_bar.
+    """
     return record(
-        inertia_coupling_error_share=3, const=3, earth_rate_rad_s=float,
-        declared_errors=errors_dtype(n),
-        error_map=map_dtype(n, boxes), eta_bar=3, eta_now=3,
-        n_gyro=3, n_old=3,
-        nu_max=3,
-        has_eG=int, eG=(3, n),
-        eGu=(3, n),
-        extra=(MAX_LEVELS, 3),
+        inertia_coupling_error_share=3, const=3, earth_rate_rad_s=float, declared_errors=errors_dtype(n),
+        error_map=map_dtype(n, boxes), eta_bar=3, eta_now=3, n_gyro=3, n_old=3, nu_max=3, has_eG=int,
+        eG=(3, n), eGu=(3, n), extra=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
-def fill_map(
-    emap: np.void,
-    aircraft: Aircraft,
-    one_free: bool,
-    two_free: bool,
-) -> None:
-    """Write the map of the aircraft, if it has one. one_free: a faulty surface may be
-    anywhere in its travel; two_free: more than one may."""
+def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) -> None:
+    """Write the map of the aircraft, if it has one; one_free, two_free: see `map_dtype`."""
     declared = aircraft.file.model_error_map
     if declared is None:
         return
@@ -167,15 +158,12 @@ def fill_map(
     emap["one_free"] = one_free
     emap["two_free"] = two_free
     emap["n_boxes"] = len(declared.boxes)
-    emap["n_levels"], emap["n_rows"] = (
-        n_levels,
-        n_rows,
-    )
+    emap["n_levels"], emap["n_rows"] = (n_levels, n_rows)
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
     share = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
-    emap["travel_low"] = share * [travel.min_rad for travel in aircraft.travel.values()]
-    emap["travel_high"] = share * [travel.max_rad for travel in aircraft.travel.values()]
+    emap["stop_lo"] = share * [travel.min_rad for travel in aircraft.travel.values()]
+    emap["stop_hi"] = share * [travel.max_rad for travel in aircraft.travel.values()]
     for b, box in enumerate(declared.boxes):
         ends = np.array(box.ends(aircraft.signals))
         emap["lo"][b, : len(ends)] = ends[:, 0]
@@ -187,25 +175,26 @@ def fill_map(
 
 @kernel
 def reading_bound(err, j, y):
-    """Bound the error of the reading of a signal, in its unit."""
+    """(e0 + e1 |y|) / (1 - e1): bound on the error of reading j, in its unit."""
     return (err.e0[j] + err.e1[j] * abs(y)) / (1.0 - err.e1[j])
 
 
 @kernel
 def n_gyro(err, i, x):
-    """Bound the changing error of the gyro of an axis, rad/s: noise, resolution, slope times the true
-    rate."""
+    """e0 - steady + e1 (|x| + e): bound on the changing error of gyro i, rad/s: noise, resolution, slope."""
     n0 = err.e0[i] - err.steady[i]
     return n0 + err.e1[i] * (abs(x) + reading_bound(err, i, x))
 
 
 @kernel
 def slipstream_bound(err, y):
-    """Bound the error of dpt, which is computed from the engine's instruments and the air data.
+    """Bound the error of dpt = a + b P / (qdyn V) [FDC], computed from the engine's instruments and the air
+    data.
 
-    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments kw0 and by
-    the density kw1 for all of it; and the share that dynamic pressure and
-    airspeed are off.
+        grown b kW / (q V) + (grown - 1) |dpt - a|,   grown = 1 / ((1 - eq) (1 - eV)),   kW = kw0 + kw1 rho
+
+    eq, eV, rho: relative errors of dynamic pressure, airspeed and density. kw0: error of the power by the
+    instruments, kW; kw1: by the density, for all of it.
     """
     eq = reading_bound(err, _Y0 + QDYN, y[QDYN]) / y[QDYN]
     eV = reading_bound(err, _Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
@@ -217,8 +206,9 @@ def slipstream_bound(err, y):
 
 @kernel
 def fill_magnitudes(err, x, y, u):
-    """Fill the scratch fields with |signal| as measured and the largest |signal| that the errors allow; for
-    airspeed, the smallest."""
+    """Fill xa, ya, ua with |signal| as measured and xw, yw, uw with the largest |signal| that the errors
+    allow; for airspeed, the smallest. xr: rates with the air's rotation.
+    """
     for i in range(3):
         err.xa[i] = abs(x[i])
         err.xw[i] = abs(x[i]) + reading_bound(err, i, x[i])
@@ -239,8 +229,9 @@ def fill_magnitudes(err, x, y, u):
 
 @kernel
 def fill_moments(err, model):
-    """Fill Ma (3,), the sum of the magnitudes of a moment's terms, and
-    eM (3,), the bound on the error of this sum; N m."""
+    """Fill Ma = S l q sum |C| m and eM = S l (qw sum (|C| + dC) mw - q sum |C| m), (3,) N m; m: a term's
+    signals.
+    """
     q = err.ya[QDYN]
     qw = err.yw[QDYN]
     tab = model.moments
@@ -258,38 +249,27 @@ def fill_moments(err, model):
 
 @kernel
 def product_bound(c, dc, s, sw):
-    """Bound the error of a c times a signal; dc: absolute."""
+    """(|c| + dc) sw - |c| s: bound on the error of a coefficient times a signal."""
     return (abs(c) + dc) * sw - abs(c) * s
 
 
 @kernel
 def moment_bound(err, i, c, dc):
-    """Bound the error of an inertia c times the moment about an axis, rad/s2."""
+    """Bound the error of an inertia coefficient times the moment about axis i, rad/s2."""
     M = err.Ma[i]
-    return product_bound(
-        c,
-        dc,
-        M,
-        M + err.eM[i],
-    )
+    return product_bound(c, dc, M, M + err.eM[i])
 
 
 @kernel
 def rates_bound(err, i, j, c, dc):
-    """Bound the error of an inertia c times the rates i and j, rad/s2."""
+    """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
     xa, xw = err.xa, err.xw
-    return product_bound(
-        c,
-        dc,
-        xa[i] * xa[j],
-        xw[i] * xw[j],
-    )
+    return product_bound(c, dc, xa[i] * xa[j], xw[i] * xw[j])
 
 
 @kernel
 def surface_moments(err, model, i, s):
-    """Return the part of surface s in the moment about an axis per rad: its magnitude, and with all errors; N
-    m."""
+    """(q S l sum |C| m, qw S l sum (|C| + dC) mw) over the terms of surface s in moment i, N m per rad."""
     C, Cw = 0.0, 0.0
     tab = model.moments
     for k in range(tab.free_to[i], tab.surface_to[i]):
@@ -300,73 +280,34 @@ def surface_moments(err, model, i, s):
     Sl = model.S * (model.c if i == 1 else model.b)
     qSl = Sl * err.ya[QDYN]
     qSlw = Sl * err.yw[QDYN]
-    return (
-        qSl * C,
-        qSlw * Cw,
-    )
+    return (qSl * C, qSlw * Cw)
 
 
 @kernel
 def fill_eG(err, model, s):
-    """Fill eG[:, s], rad/s2 per rad: on the error of the effect of surface s.
+    """Fill eG[:, s], rad/s2 per rad: bound on the error of the effect of surface s.
 
-    The declared bound is affine in |u_s|; this is its slope. Call
-    `add_declared_bound` first: it fills the scratch fields.
+    The declared bound is affine in |u_s|; this is its slope. `add_declared_bound` fills what it reads.
     """
     dI = err.dI
     eG = err.eG
     L, Lw = surface_moments(err, model, 0, s)
     M, Mw = surface_moments(err, model, 1, s)
     N, Nw = surface_moments(err, model, 2, s)
-    eG[0, s] = product_bound(
-        model.Pl,
-        dI[2],
-        L,
-        Lw,
-    )
-    eG[0, s] += product_bound(
-        model.Pn,
-        dI[3],
-        N,
-        Nw,
-    )
-    eG[1, s] = product_bound(
-        model.Qm,
-        dI[7],
-        M,
-        Mw,
-    )
-    eG[2, s] = product_bound(
-        model.Rl,
-        dI[10],
-        L,
-        Lw,
-    )
-    eG[2, s] += product_bound(
-        model.Rn,
-        dI[11],
-        N,
-        Nw,
-    )
+    eG[0, s] = product_bound(model.Pl, dI[2], L, Lw)
+    eG[0, s] += product_bound(model.Pn, dI[3], N, Nw)
+    eG[1, s] = product_bound(model.Qm, dI[7], M, Mw)
+    eG[2, s] = product_bound(model.Rl, dI[10], L, Lw)
+    eG[2, s] += product_bound(model.Rn, dI[11], N, Nw)
 
 
 @kernel
 def add_declared_bound(err, model, x, y, u, eta):
-    """Add to eta (3,) rad/s2 the bound by the declared errors; x (3,), y, u (surfaces,) as measured."""
+    """Add to eta the bound by the declared errors: of each moment and product of rates, times its inertia."""
     fill_magnitudes(err, x, y, u)
-    signals(
-        model.moments,
-        err.xa,
-        err.ya,
-        err.sig,
-    )
+    signals(model.moments, err.xa, err.ya, err.sig)
     monomials(model.moments, err.sig, err.ma)
-    signals(
-        model.moments,
-        err.xr,
-        err.yw,
-        err.sig,
-    )
+    signals(model.moments, err.xr, err.yw, err.sig)
     monomials(model.moments, err.sig, err.mw)
     fill_moments(err, model)
     dI = err.dI
@@ -380,7 +321,7 @@ def add_declared_bound(err, model, x, y, u, eta):
 
 @kernel
 def in_box(emap, b):
-    """Whether the state is in this box of the map."""
+    """Whether the state is in box b of the map."""
     inside = True
     for i in range(emap.coordinates.size):
         slack = _EDGE * (1.0 + abs(emap.coordinates[i]))
@@ -390,7 +331,7 @@ def in_box(emap, b):
 
 @kernel
 def outside_span(emap, i):
-    """Whether this coordinate of the state is outside the range that the boxes span together."""
+    """Whether coordinate i of the state is outside the range that the boxes span together."""
     lo, hi = np.inf, -np.inf
     for b in range(emap.n_boxes):
         lo = min(lo, emap.lo[b, i])
@@ -401,14 +342,15 @@ def outside_span(emap, i):
 
 @kernel
 def level_of_positions(emap, u):
-    """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
-    travel may be used."""
+    """Index of the least share of the travel that covers surfaces at u; the last index if all of the travel
+    may be used.
+    """
     if emap.two_free:
         return emap.n_levels - 1
     share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
-            end = emap.travel_high[s] if u[s] > 0.0 else emap.travel_low[s]
+            end = emap.stop_hi[s] if u[s] > 0.0 else emap.stop_lo[s]
             share = max(share, u[s] / end) if end != 0.0 else 1.0
     return level_of_share(emap, share)
 
@@ -425,19 +367,16 @@ def level_of_share(emap, share):
 
 @kernel
 def share_used(emap, s, between, before, n):
-    """The largest share of its travel that surface s can use at any of so many instants of a frame.
+    """The largest share of its travel that surface s can use at any of n instants of a frame.
 
-    between: (low, high) rad, of the mean position over the instants; before: the
-    share at the start of the frame, where the surface may still be at the first instant.
+    between: (low, high) rad, of the mean position over the instants; before: the share at the start of the
+    frame, where the surface may still be at the first instant.
     """
     share, (lo, hi) = 0.0, between
     if hi > 0.0:
-        share = hi / emap.travel_high[s] if emap.travel_high[s] != 0.0 else 1.0
+        share = hi / emap.stop_hi[s] if emap.stop_hi[s] != 0.0 else 1.0
     if lo < 0.0:
-        share = max(
-            share,
-            lo / emap.travel_low[s] if emap.travel_low[s] != 0.0 else 1.0,
-        )
+        share = max(share, lo / emap.stop_lo[s] if emap.stop_lo[s] != 0.0 else 1.0)
     if n > 1:
         share = max(before, (n * share + before) / (n - 1))
     return min(share, 1.0)
@@ -454,8 +393,7 @@ def map_row(emap):
 
 @kernel
 def look_up_map(emap, x, y, u):
-    """Fill `z` and `e_now`, the mapped error at this state; x (3,) rad/s, y (4 +
-    declared,), u (n,) rad."""
+    """Fill z and e_now, the mapped error at this state."""
     z = emap.coordinates
     z[:3], z[3 : 3 + y.size] = x, y
     z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
@@ -465,10 +403,7 @@ def look_up_map(emap, x, y, u):
         if in_box(emap, b):
             emap.outside = 0
             emap.e_now[:] = emap.e[k, b, j]
-            emap.box, emap.row = (
-                b,
-                k,
-            )
+            emap.box, emap.row = (b, k)
             emap.yaw_now = emap.yaw[b]
             return
     emap.outside = 1
@@ -478,25 +413,17 @@ def look_up_map(emap, x, y, u):
 
 @kernel
 def extra_bound(emap, j, i):
-    """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
-    travel, rad/s2."""
+    """By how much the mapped error of axis i at this instant is larger if a surface is at level j of travel,
+    rad/s2.
+    """
     if emap.outside:
         return 0.0
-    return max(
-        emap.e[
-            emap.row,
-            emap.box,
-            j,
-            i,
-        ]
-        - emap.e_now[i],
-        0.0,
-    )
+    return max(emap.e[emap.row, emap.box, j, i] - emap.e_now[i], 0.0)
 
 
 @kernel
 def add_mapped_bound(emap, x, y, u, eta):
-    """Add to eta (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
+    """Add to eta the mapped error at this state."""
     look_up_map(emap, x, y, u)
     for i in range(3):
         eta[i] += emap.e_now[i]
@@ -504,12 +431,11 @@ def add_mapped_bound(emap, x, y, u, eta):
 
 @kernel
 def add_published_bound(x, model, share, const, earth, eta):
-    """Add to eta (3,) rad/s2 the published bound, and what the Earth's rotation adds.
+    """Add to eta the published bound, and what the Earth's rotation adds.
 
-    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
+    Published: share_i |cross term_i| + const_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth |x| on any axis, and the inertia coupling multiplies it by
-    `coupling_factors`.
+    earth |x| on any axis, and the inertia coupling multiplies it by `coupling_factors`.
     """
     p, q, r = x[0], x[1], x[2]
     w = abs(p) + abs(q) + abs(r)
@@ -522,53 +448,44 @@ def add_published_bound(x, model, share, const, earth, eta):
 @kernel
 def coupling_factors(model):
     """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
-    least 1."""
+    least 1.
+    """
     kp = abs(model.Ppq) + abs(model.Pqr)
     kr = abs(model.Rpq) + abs(model.Rqr)
     kq = abs(model.Qpr) + 2.0 * max(abs(model.Qpp), abs(model.Qrr))
-    return (
-        max(kp, 1.0),
-        max(kq, 1.0),
-        max(kr, 1.0),
-    )
+    return (max(kp, 1.0), max(kq, 1.0), max(kr, 1.0))
 
 
 @kernel
 def earth_bound(earth, w, k):
-    """Bound the angular acceleration on an axis by the Earth's rotation and by rounding, rad/s2;
-    w: |p| + |q| + |r|, rad/s."""
+    """earth ((1 + k) w + k earth) + rounding: bound on the acceleration by the Earth's rotation, rad/s2.
+
+    w: |p| + |q| + |r|, rad/s; k: factor of the inertia coupling; earth: rate of the Earth, rad/s.
+    """
     return earth * ((1.0 + k) * w + k * earth) + ROUNDING_RAD_S2
 
 
 @kernel
 def least_height(h, h0, h1):
-    """The least true height, m. The error of `h` is up to h0 +
-    h1 |truth|. The ground is at sea level; the model of turbulence has no height below
-    LEAST_HEIGHT_M."""
-    return max(
-        h - (h0 + h1 * abs(h)) / (1.0 - h1),
-        LEAST_HEIGHT_M,
-    )
+    """h - (h0 + h1 |h|) / (1 - h1): the least true height, m, for a reading h whose error is up to h0 + h1
+    |truth|.
+
+    The ground is at sea level; the model of turbulence has no height below LEAST_HEIGHT_M.
+    """
+    return max(h - (h0 + h1 * abs(h)) / (1.0 - h1), LEAST_HEIGHT_M)
 
 
 @kernel
 def set_air_rotation(err, h):
-    """Set the bound on the air's rotation, rad/s, for this altitude."""
+    """Set the bound on the air's rotation, rad/s, for altitude h, m."""
     if err.wg_1m > 0.0:
-        least = least_height(
-            h,
-            err.h0,
-            err.h1,
-        )
-        err.wg[:] = max(
-            err.wg_aloft,
-            err.wg_1m / np.sqrt(least),
-        )
+        least = least_height(h, err.h0, err.h1)
+        err.wg[:] = max(err.wg_aloft, err.wg_1m / np.sqrt(least))
 
 
 @kernel
 def fill_bound(bound, model, meas, u):
-    """Fill eta_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
+    """Fill eta_now, the bound on the uncertainty at this instant."""
     x, y = meas.x, meas.y
     bound.eta_now[:] = 0.0
     if bound.declared_errors.given:
@@ -581,12 +498,7 @@ def fill_bound(bound, model, meas, u):
         add_mapped_bound(bound.error_map, x, y, u, bound.eta_now)
     rates = bound.declared_errors.xw if bound.declared_errors.given else x
     add_published_bound(
-        rates,
-        model,
-        bound.inertia_coupling_error_share,
-        bound.const,
-        bound.earth_rate_rad_s,
-        bound.eta_now,
+        rates, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, bound.eta_now
     )
 
 
@@ -617,20 +529,13 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
 
 def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
-    for all states. design: record of the design model."""
+    for all states. model: its record.
+    """
     fdi, aircraft = declared.fdi, declared.aircraft
-    bound["inertia_coupling_error_share"], bound["earth_rate_rad_s"] = (
-        declared.coupling,
-        EARTH_RATE_RAD_S,
-    )
+    bound["inertia_coupling_error_share"], bound["earth_rate_rad_s"] = (declared.coupling, EARTH_RATE_RAD_S)
     bound["const"] = declared.constant_rad_s2
     all_types = fdi.fault_class == "all"
-    fill_map(
-        bound["error_map"],
-        aircraft,
-        all_types,
-        all_types and fdi.pairs,
-    )
+    fill_map(bound["error_map"], aircraft, all_types, all_types and fdi.pairs)
     if aircraft.file.model_error_map is None:
         bound["const"] += aircraft.model_error_rad_s2
     err = bound["declared_errors"]
@@ -640,7 +545,7 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
 
 
 def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProperties) -> None:
-    """Fill the declared errors; design, mass: record and mass properties of the design model."""
+    """Fill the declared errors; model, mass: record and mass properties of the design model."""
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     err["dC"][: dC.size] = dC
     err["dI"] = inertia_bounds(declared.inertia, mass)
@@ -654,12 +559,7 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     err["e0"] = errors.each("worst")
     err["e1"] = errors.each("slope")
     err["steady"] = errors.each("steady", AXES)
-    others = (
-        err["dC"],
-        err["dI"],
-        err["du"],
-        err["wg"],
-    )
+    others = (err["dC"], err["dI"], err["du"], err["wg"])
     err["given"] = any(np.any(e) for e in others) or not errors.is_ideal
 
 
@@ -681,11 +581,10 @@ def fill_engine_errors(err: np.void, declared: Declared) -> None:
 
 
 def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
-    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro
-    noise.
+    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
 
-    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
-    of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
+    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. The excess of
+    one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
     """
     n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
     return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()
@@ -703,8 +602,9 @@ _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
 def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.ndarray) -> "DeclaredErrors":
-    """Return the declared errors for a plug-in, at the trim y and u rad; design: record of the design model,
-    (1,)."""
+    """Return the declared errors for a plug-in, at the trim y and u rad; model: record of the design model,
+    (1,).
+    """
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
     aircraft, errors, servos = declared.aircraft, declared.sensors, declared.servos
@@ -742,16 +642,12 @@ def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
 
 
 def model_error_std(
-    model: np.ndarray,
-    y: np.ndarray,
-    u: np.ndarray,
-    sigma: np.ndarray,
-    dC: np.ndarray,
-    du: float,
+    model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: float
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
-    sigma (4,): errors of alpha, beta, airspeed, dynamic pressure. dC: absolute.
+    sigma (4,): errors of alpha, beta, airspeed, dynamic pressure; dC (terms,): of the coefficients, absolute;
+    du rad: of the deflections.
     """
     F = _acceleration_at(model, y, u)
     dy = np.pad(np.diag(sigma), ((0, 0), (0, y.size - sigma.size)))
@@ -764,8 +660,8 @@ def model_error_std(
     return np.sqrt(np.square(dF).sum(axis=0))
 
 
-def _acceleration_at(record: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    model = DesignFunctions(record)
+def _acceleration_at(rec: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    model = DesignFunctions(rec)
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
@@ -780,8 +676,9 @@ def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
 
 
 def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, b: float) -> np.ndarray:
-    """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise (2,) rad of the flow's
-    angles."""
+    """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise sigma (2,) rad of the
+    flow's angles; b: span, m.
+    """
     V = y[AIRSPEED]
     sq, sr = sigma * pi * V / (np.array([4.0, 3.0]) * b)
     # without rates all of it is aerodynamic
@@ -804,10 +701,7 @@ def coefficient_bounds(
     dI = inertia_bounds(declared.inertia, mass)
     inertia = np.abs(inertia_coefficients(mass))
     own = (2, 7, 11)  # what multiplies a moment there
-    relative = np.full(
-        C.shape,
-        max(dI[i] / inertia[i] for i in own),
-    )
+    relative = np.full(C.shape, max(dI[i] / inertia[i] for i in own))
     relative += [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
     slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    last_midpoint_deflection_error,
+    last_error,
     verdict,
 )
 
@@ -35,110 +35,97 @@ WITHDRAWN_RECORD = record(surface=int, fault_type=int, from_s=float, to_s=float,
 
 @sized
 def conclusion_dtype(n: int) -> np.dtype:
-    """The conclusion about n surfaces. isolated_estimator: that of the isolated fault, NOT_ISOLATED or
-    UNANTICIPATED. fault_type: of the isolated fault, -1 if open. target, accommodation_mode:
-    the surface the law acts upon, and its accommodation mode. effectiveness: of every surface, where a
-    plug-in estimates it (has_effectiveness). from_s: since when each surface is isolated, -1 if it
-    is not; isolated_type, type_from_s: its type, -1 if open, and since when. gone,
-    withdrawn_types: what was isolated before, and of which other type."""
+    """The conclusion about n surfaces.
+
+    isolated_estimator: that of the isolated fault, NOT_ISOLATED or UNANTICIPATED. fault_type: of the isolated
+    fault, -1 if open. target, accommodation_mode: the surface the law acts upon, and its accommodation mode.
+    effectiveness: of every surface, where a plug-in estimates it (has_effectiveness). from_s: since when each
+    surface is isolated, -1 if it is not; isolated_type, type_from_s: its type, -1 if open, and since when.
+    gone, withdrawn_types: what was isolated before, and of which other type.
+    """
     return record(
         detected=int, detected_at_s=float, axis=int, isolated_estimator=int, isolated_at_s=float,
-        fault_type=int, typed_at_s=float, target=int, accommodation_mode=int,
-        has_effectiveness=int,
-        effectiveness=n, from_s=n,
-        isolated_type=(int, n), type_from_s=n,
-        n_gone=int, n_gone_types=int,
-        gone=(WITHDRAWN_RECORD, MAX_WITHDRAWN),
-        withdrawn_types=(WITHDRAWN_RECORD, MAX_WITHDRAWN),
+        fault_type=int, typed_at_s=float, target=int, accommodation_mode=int, has_effectiveness=int,
+        effectiveness=n, from_s=n, isolated_type=(int, n), type_from_s=n, n_gone=int, n_gone_types=int,
+        gone=(WITHDRAWN_RECORD, MAX_WITHDRAWN), withdrawn_types=(WITHDRAWN_RECORD, MAX_WITHDRAWN),
     )  # fmt: skip
 
 
-def reset_conclusion(done: np.void) -> None:
+def reset_conclusion(found: np.void) -> None:
     """Fill the record of a diagnosis that has concluded nothing."""
-    done["detected_at_s"] = done["isolated_at_s"] = -1.0
-    done["isolated_estimator"], done["from_s"] = NOT_ISOLATED, -1.0
-    done["isolated_type"], done["type_from_s"] = -1, -1.0
-    done["fault_type"] = done["target"] = done["accommodation_mode"] = done["typed_at_s"] = -1
+    found["detected_at_s"] = found["isolated_at_s"] = -1.0
+    found["isolated_estimator"], found["from_s"] = NOT_ISOLATED, -1.0
+    found["isolated_type"], found["type_from_s"] = -1, -1.0
+    found["fault_type"] = found["target"] = found["accommodation_mode"] = found["typed_at_s"] = -1
 
 
 @kernel
-def latch_alarm(done, axis, t):
+def latch_alarm(found, axis, t):
     """Latch an alarm at t s on an axis, -1 if it has no axis: only the first alarm is recorded."""
-    if not done.detected:
-        done.detected, done.detected_at_s, done.axis = 1, t, axis
+    if not found.detected:
+        found.detected, found.detected_at_s, found.axis = 1, t, axis
 
 
 @kernel
-def set_isolated(done, j, t):
+def set_isolated(found, j, t):
     """Replace the isolated fault; if it is another one, its time of isolation becomes t s."""
-    if j != done.isolated_estimator:
-        done.isolated_estimator, done.isolated_at_s = j, t
+    if j != found.isolated_estimator:
+        found.isolated_estimator, found.isolated_at_s = j, t
 
 
 @kernel
-def record_decision(done, found):
+def record_decision(found, given):
     """Replace isolated fault, type and accommodation by those that the fault types found.
 
-    found: (isolated, isolated_at_s, type, type_at_s, target,
-    accommodation_mode).
+    found: (isolated, isolated_at_s, type, type_at_s, target, accommodation_mode).
     """
-    done.isolated_estimator, done.isolated_at_s = (
-        found[0],
-        found[1],
-    )
-    done.fault_type, done.typed_at_s = (
-        found[2],
-        found[3],
-    )
-    done.target, done.accommodation_mode = (
-        found[4],
-        found[5],
-    )
+    found.isolated_estimator, found.isolated_at_s = (given[0], given[1])
+    found.fault_type, found.typed_at_s = (given[2], given[3])
+    found.target, found.accommodation_mode = (given[4], given[5])
 
 
 @kernel
-def record_plugin_verdict(done, plugin, t):
-    """Replace the built-in done at t s by the verdict of a plug-in."""
+def record_plugin_verdict(found, plugin, t):
+    """Replace the built-in conclusion at t s by the verdict of a plug-in."""
     if plugin.detected:
-        latch_alarm(done, plugin.axis, t)
-    set_isolated(done, plugin.isolated if done.detected else NOT_ISOLATED, t)
-    done.has_effectiveness = plugin.has_effectiveness
-    done.effectiveness[:] = plugin.effectiveness
+        latch_alarm(found, plugin.axis, t)
+    set_isolated(found, plugin.isolated if found.detected else NOT_ISOLATED, t)
+    found.has_effectiveness = plugin.has_effectiveness
+    found.effectiveness[:] = plugin.effectiveness
 
 
 @kernel
-def withdraw_conclusion(done):
+def withdraw_conclusion(found):
     """Withdraw alarm, isolation and type, because a sensor is broken and no surface; times of isolation of
     single surfaces and withdrawn isolations stay."""
-    done.detected, done.isolated_estimator, done.fault_type = 0, NOT_ISOLATED, -1
-    done.detected_at_s = done.isolated_at_s = -1.0
-    done.target = done.accommodation_mode = -1
+    found.detected, found.isolated_estimator, found.fault_type = 0, NOT_ISOLATED, -1
+    found.detected_at_s = found.isolated_at_s = -1.0
+    found.target = found.accommodation_mode = -1
 
 
 @kernel
-def update_interval(done, s, isolated, t, kind, reason):
-    """Record at t s whether a surface is isolated, and of which type (-1 if open); store what is withdrawn,
-    and why. If a store is full, the latest one replaces the last."""
-    since = done.from_s[s]
-    before = done.isolated_type[s]
+def update_interval(found, s, isolated, t, kind, reason):
+    """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what is
+    withdrawn, and why. If a store is full, the latest one replaces the last.
+    """
+    since = found.from_s[s]
+    before = found.isolated_type[s]
     if isolated and since < 0.0:
-        done.from_s[s] = t
+        found.from_s[s] = t
     elif since >= 0.0 and not isolated:
         store_withdrawn(
-            done.gone, done.n_gone, s, before,
-            since, t, reason,
+            found.gone, found.n_gone, s, before, since, t, reason,
         )  # fmt: skip
-        done.n_gone += 1
-        done.from_s[s] = -1.0
+        found.n_gone += 1
+        found.from_s[s] = -1.0
     elif before >= 0 and kind != before:
         store_withdrawn(
-            done.withdrawn_types, done.n_gone_types, s, before,
-            done.type_from_s[s], t, reason,
+            found.withdrawn_types, found.n_gone_types, s, before, found.type_from_s[s], t, reason,
         )  # fmt: skip
-        done.n_gone_types += 1
+        found.n_gone_types += 1
     kind = kind if isolated else -1
     if kind != before:
-        done.isolated_type[s], done.type_from_s[s] = kind, t
+        found.isolated_type[s], found.type_from_s[s] = kind, t
 
 
 @kernel
@@ -162,16 +149,16 @@ def reason_of_withdrawal(plugin, broken, excluded, left):
 
 
 @kernel
-def isolated_surface(done, fies):
+def isolated_surface(found, fies):
     """The surface of the isolated fault, or -1."""
-    return fies[done.isolated_estimator].surface if done.isolated_estimator >= 0 else -1
+    return fies[found.isolated_estimator].surface if found.isolated_estimator >= 0 else -1
 
 
 @kernel
-def has_no_target(done):
+def has_no_target(found):
     """True if the law has no surface to accommodate: none is isolated or accommodated, and no plug-in
     estimates effectiveness."""
-    return done.isolated_estimator < 0 and done.target < 0 and not done.has_effectiveness
+    return found.isolated_estimator < 0 and found.target < 0 and not found.has_effectiveness
 
 
 # 1 / variance of an effectiveness that is known to 0.05: it is precise enough to be applied at once
@@ -182,123 +169,100 @@ MIN_INFORMATION = 400.0
 def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces.
 
-    detected: a fault; no_target: true without a fault as well; isolated_surface: -1 for
-    none. lags: a surface follows its command late. accommodation_mode: of each surface, -1 where
-    open, or where faults of every type are not diagnosed; effectiveness; at_once: whether the law
-    applies it at once, not gradually; offset, lag rad. unknown_acceleration (3,)
-    rad/s2: explained by no known fault. pitch_undecided: elevator or flap is at fault, and it has long been
-    open which. held: the surfaces are assessed as before a sensor broke.
+    detected: a fault; no_target: true without a fault as well; isolated_surface: -1 for none. lags: a surface
+    follows its command late. accommodation_mode: of each surface, -1 where open, or where faults of every
+    type are not diagnosed; effectiveness; at_once: whether the law applies it at once, not gradually; offset,
+    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: elevator or flap
+    is at fault, and it has long been open which. held: the surfaces are assessed as before a sensor broke.
     """
     return record(
-        detected=int, no_target=int, diagnoses_all_types=int, isolated_surface=int,
-        lags=int,
-        accommodation_mode=(int, n),
-        effectiveness=n, at_once=(int, n), offset=n,
-        lag=n,
-        unknown_acceleration=3,
-        pitch_undecided=int, held=int,
+        detected=int, no_target=int, diagnoses_all_types=int, isolated_surface=int, lags=int,
+        accommodation_mode=(int, n), effectiveness=n, at_once=(int, n), offset=n, lag=n,
+        unknown_acceleration=3, pitch_undecided=int, held=int,
     )  # fmt: skip
 
 
 @kernel
-def assess_surfaces(out, cfg, done, types, layout, fies, stat):
-    """Fill the out of this frame from the outputs of the stages; stat: of
-    `statistical_dtype`."""
+def assess_surfaces(out, cfg, found, types, layout, fies, stat):
+    """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`."""
     all_types = cfg.diagnoses_all_types
-    at_fault = isolated_surface(done, fies)
+    at_fault = isolated_surface(found, fies)
     out.held = 0
-    out.detected, out.diagnoses_all_types = done.detected, all_types
-    out.isolated_surface, out.lags, out.no_target = (
-        at_fault,
-        0,
-        has_no_target(done),
-    )
+    out.detected, out.diagnoses_all_types = found.detected, all_types
+    out.isolated_surface, out.lags, out.no_target = (at_fault, 0, has_no_target(found))
     for s in range(out.accommodation_mode.size):
         out.accommodation_mode[s] = types.surface[s].accommodation.mode if all_types else -1
         out.effectiveness[s], out.at_once[s] = 1.0, 0
         out.offset[s], out.lag[s] = 0.0, 0.0
-        if done.has_effectiveness and done.detected:
-            out.effectiveness[s] = done.effectiveness[s]
+        if found.has_effectiveness and found.detected:
+            out.effectiveness[s] = found.effectiveness[s]
         elif out.accommodation_mode[s] >= 0:
             assess_surface(out, types, layout, fies, s)
         elif s == at_fault and not all_types:
-            likely = uses_statistical_estimates(stat.test, cfg.authority)
+            likely = weighs_statistics(stat.test, cfg.authority)
             precise = likely and statistical.estimate_loss(stat.block, s)[1] > MIN_INFORMATION
-            th = isolated_theta(cfg, done, layout, fies, stat, s)
+            th = isolated_theta(cfg, found, layout, fies, stat, s)
             out.effectiveness[s] = 1.0 + th
             out.at_once[s] = precise
 
 
 @kernel
 def hold_assessment(out, types):
-    """Go on with the out from before a sensor broke: effectiveness, and offsets of constant faults.
+    """Go on with the assessment from before a sensor broke: effectiveness, and offsets of constant faults.
 
     What varies from frame to frame cannot be estimated without the sensor, and is taken for zero.
     """
     out.held, out.lags, out.lag[:] = 1, 0, 0.0
     for s, surf in enumerate(types.surface):
-        if out.accommodation_mode[s] != GIVE_UP and not verdict.any_constant_parameter_type_remains(surf):
+        if out.accommodation_mode[s] != GIVE_UP and not verdict.constant_remains(surf):
             out.offset[s] = 0.0
 
 
 @kernel
 def assess_surface(out, types, layout, fies, s):
-    """Fill the out of surface s, which the diagnosis of every type accommodates."""
+    """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     surf = types.surface[s]
-    possible = verdict.estimator_or_deduction_allows_fault(surf)
+    possible = verdict.can_be_faulty(surf)
     mode = surf.accommodation.mode
     if mode == SCALE_COMMAND:
         out.effectiveness[s] = verdict.remaining_effectiveness(types, layout, fies, s)
     elif mode == GIVE_UP:
         out.effectiveness[s], out.at_once[s] = 0.0, 1
-        out.offset[s] = surf.last_observation.healthy_position + verdict.deflection_error(surf, possible)
+        out.offset[s] = surf.last.u + verdict.deflection_error(surf, possible)
     elif mode == SUBTRACT_OFFSET:
         out.offset[s] = verdict.deflection_error(surf, possible)
     elif mode == WAIT_FOR_SURFACE:
-        out.lag[s] = last_midpoint_deflection_error(surf)
+        out.lag[s] = last_error(surf)
         out.lags = 1
 
 
 @kernel
-def isolated_theta(cfg, done, layout, fies, stat, s):
+def isolated_theta(cfg, found, layout, fies, stat, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
-    if uses_statistical_estimates(stat.test, cfg.authority):
+    if weighs_statistics(stat.test, cfg.authority):
         return statistical.estimate_loss(stat.block, s)[0]
-    return fies[done.isolated_estimator].theta[layout.dominant_axis[s]]
+    return fies[found.isolated_estimator].theta[layout.dominant_axis[s]]
 
 
 @kernel
-def uses_statistical_estimates(cfg, authority):
+def weighs_statistics(cfg, authority):
     """Whether the estimates of the statistical detector are used."""
     return cfg.enabled and authority != WORST_CASE_DETECTOR
 
 
 @kernel
-def assess_unknown(
-    out,
-    cfg,
-    done,
-    types,
-    layout,
-    stat,
-    fdae,
-    bound,
-):
-    """Fill unknown and pitch_undecided; fdae: of `FDAE_RECORD`;
-    bound: what is declared.
+def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
+    """Fill unknown_acceleration and pitch_undecided; fdae: of `FDAE_RECORD`; bound: what is declared.
 
     The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
     unknown, all_types = out.unknown_acceleration, cfg.diagnoses_all_types
     unknown[:] = 0.0
-    waits = done.target >= 0 and done.accommodation_mode == WAIT_FOR_SURFACE
-    if done.detected and not waits and uses_statistical_estimates(stat.test, cfg.authority):
+    waits = found.target >= 0 and found.accommodation_mode == WAIT_FOR_SURFACE
+    if found.detected and not waits and weighs_statistics(stat.test, cfg.authority):
         statistical.fill_unmodelled(stat.block, stat.gust, unknown)
-    elif done.detected and not waits:
+    elif found.detected and not waits:
         filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)
-    open_yet = all_types and done.detected and done.isolated_estimator == NOT_ISOLATED
-    long = (
-        types.surface[layout.main[PITCH]].evidence.n_anomalous_frames
-        >= types.config.slowest_half_cycle_frames
-    )
+    open_yet = all_types and found.detected and found.isolated_estimator == NOT_ISOLATED
+    long = types.surface[layout.main[PITCH]].evidence.n_anomalous >= types.config.half_frames
     out.pitch_undecided = open_yet and long

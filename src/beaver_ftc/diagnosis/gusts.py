@@ -25,7 +25,18 @@ of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`speed_error_sha
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
 The velocity is integrated as in JSBSim, by the two-step method of Adams and Bashforth:
-v' = v + dt (3 a - a_before) / 2.
+v' = v + dt (3 a - a_prev) / 2.
+
+Letters of the kernels. i is a body axis, j an axis of the gusts; p, q, r at the end: roll, pitch, yaw.
+
+    v, v_g         velocity relative to the air; gust since the start, m/s in level axes
+    V              speed relative to the mean air, m/s
+    f, a           specific force, m/s2 in body axes; acceleration in level axes
+    T, C           rotations (3, 3): from level axes to body axes; from the gusts' axes to body axes
+    w, tau         rotation of the air in the gusts' axes, rad/s; its lag, s
+    acc            effect of w on the rates, rad/s2
+    L              rate damping, angular acceleration per rad/s (3, 3), 1/s; of a view (3,)
+    Q              intensity of the drift of w over V, rad2/s3 per m/s; Q_V: of an acceleration
 """
 
 from math import pi
@@ -48,11 +59,7 @@ from beaver_ftc.design.model import (
     rate_damping,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import (
-    flow_noise,
-    gust_noise,
-    least_height,
-)
+from beaver_ftc.diagnosis.bounds import flow_noise, gust_noise, least_height
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -70,63 +77,40 @@ MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coeffic
 FAST_TURN_SHARE = 0.01
 
 GUST_CONFIG_RECORD = record(
-    has_forces=int,  # whether the design model has forces
-    coarse_only=int,  # whether only a coarse estimate of the gust is possible
-    S_m=float, gravity=float, span=float,  # m2/kg, m/s2, m
-    # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
-    Q_aloft=3, Q_1m=3,
-    h0=float,
-    h1=float,  # bound on the altimeter's error: offset, m; slope
-    # limit of a gust component, m/s; decay of `v_g`, 1/s
-    v_max=float, a_v=float,
-    # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
-    # relative error of the speed leaves, over the variance of that error.
+    has_forces=int, coarse_only=int,  # whether the design model has forces; whether the estimate is coarse
+    S_m=float, gravity=float, span=float,  # S / m, m2/kg; m/s2; b, m
+    Q_aloft=3, Q_1m=3,  # Q above 2000 ft; at a height of 1 m
+    h0=float, h1=float,  # bound on the altimeter's error: offset, m; slope
+    v_max=float, a_v=float,  # limit of a component of v_g, m/s; decay of v_g, 1/s
+    # Error variance of V, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a relative
+    # error of V leaves, over the variance of that error.
     var_V=float, var_v=float, speed_error_share=float,
-    L_roll=float,  # lag of the rolling gust times airspeed, m
-    L_gust=float,  # of the gusts, m
+    L_roll=float, L_gust=float,  # correlation lengths of the rolling gust and of the gusts, m
     starts_in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
-    has_prev=int,  # whether `a_prev` is valid
-    f_read=3,  # reading of the accelerometers, m/s2
-    table=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
-    # Velocity relative to the air, m/s in level axes; specific force, m/s2 in body axes; attitude.
-    v=3, f=3, T=(3, 3), heading=float,
-    # an instant before, by forces and gravity, m/s2 in the level axes of this one
-    a_prev=3,
-    w=3, w_body=3,  # rad/s
-    # sum of `acc` over the instants of a frame, rad/s2
-    acc_sum=3,
-    # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
-    Q=3,
-    share=3,  # share of it that the vanes do not measure
-    # Change of the gust's velocity since the start, m/s ahead, right, down; share of the variance of the
-    # initial gust that still counts.
-    v_g=3, start_left=float,
+    # whether a_prev is valid; reading of the accelerometers, m/s2; force coefficients
+    has_prev=int, f_read=3, table=TABLE, scratch=MAX_MONOMIALS,
+    v=3, f=3, T=(3, 3), heading=float, a_prev=3,  # a an instant before, in level axes of now
+    w=3, w_body=3, acc_sum=3,  # w in body axes; sum of acc over the instants of a frame
+    Q=3, share=3,  # share of Q that the vanes do not measure
+    v_g=3, start_left=float,  # share of the variance of the initial gust that still counts
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
     # the pitching gust that was present when the diagnosis started.
-    turn_now=float, turn_past=float,
-    start_share=float,
-    # turn of the gusts' axes in the body, 1/s; whether it counts
-    C_dot=(3, 3), turns_fast=int,
-    # Variance of the accelerations by that turn, (rad/s2)2: in the current frame, in the frame before; number
-    # of frames for which there is any.
-    var_now=(3, 3), var_prev=(3, 3),
-    n_turn=int,
+    turn_now=float, turn_past=float, start_share=float,
+    C_dot=(3, 3), turns_fast=int,  # turn of C, 1/s; whether it counts
+    # Variance of acc by that turn, (rad/s2)2: in this frame, in the frame before; frames that it lasts.
+    var_now=(3, 3), var_prev=(3, 3), n_turn=int,
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
     # Whether there is turbulence; whether accelerometers are used; whether the gust is measured. These are
     # filled by configure, and end with the accelerometers.
     gusty=int, uses_accelerometers=int, measured=int,
-    # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
-    acc=3, acc_mean=3,
-    acc_coarse=3,  # effect of the coarse estimate, rad/s2
-    # `var_now` plus `var_prev`, (rad/s2)2
-    var_turn=(3, 3),
-    V=float,  # relative to the mean air, m/s
-    rate_damping=(3, 3), C=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
+    acc=3, acc_mean=3, acc_coarse=3,  # of the measured gust, now and mean of the frame; of the coarse one
+    var_turn=(3, 3), V=float,  # var_now plus var_prev
+    rate_damping=(3, 3), C=(3, 3),
 )  # fmt: skip
 
 GUST_RECORD = record(config=GUST_CONFIG_RECORD, memory=GUST_MEMORY_RECORD, output=GUST_OUTPUT_RECORD)
@@ -134,7 +118,9 @@ GUST_RECORD = record(config=GUST_CONFIG_RECORD, memory=GUST_MEMORY_RECORD, outpu
 
 @kernel
 def fill_force(gust, x, y, u, f):
-    """Fill out (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
+    """Fill f (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
+
+        f_i = qdyn S / m C_i(x, y, u)
 
     x (3,) rad/s, y (4 + declared,), u (n,) rad. The term of the rate of sideslip is omitted: it is below a
     hundredth of the side force.
@@ -147,8 +133,7 @@ def fill_force(gust, x, y, u, f):
 
 @kernel
 def fill_rotation(phi, th, T):
-    """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles
-    rad."""
+    """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
     sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
     T[0, 0], T[0, 1], T[0, 2] = cos_theta, 0.0, -sin_theta
     T[1, 0] = sin_phi * sin_theta
@@ -161,13 +146,13 @@ def fill_rotation(phi, th, T):
 
 @kernel
 def level_component(T, v, i):
-    """Component along a level axis of a vector (3,) in body axes."""
+    """Component i in level axes of a vector v (3,) in body axes: (T' v)_i."""
     return T[0, i] * v[0] + T[1, i] * v[1] + T[2, i] * v[2]
 
 
 @kernel
 def fill_velocity(gust, y, attitude):
-    """Fill attitude, heading and velocity relative to the air, m/s in level axes, of this instant.
+    """Fill attitude, heading and v = T' (velocity relative to the air) of this instant.
 
     y (5,) and attitude (3,) rad as measured.
     """
@@ -203,7 +188,7 @@ def start_gust(gust, y, attitude):
 
 @kernel
 def update_axes(gust, sin, cos):
-    """Fill `C` for this instant, and keep those of the instant before in `C_dot`.
+    """Fill `C` for this instant, and keep that of the instant before in `C_dot`.
 
     sin, cos: of the change of heading. JSBSim's gusts have the heading of the step before.
     """
@@ -218,12 +203,10 @@ def update_axes(gust, sin, cos):
 
 @kernel
 def fill_axes_rate(gust, dt, V):
-    """Fill `C_dot`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant
-    before.
+    """Fill `C_dot`, 1/s, from the C of the instant before, dt s ago, and whether the axes turn fast.
 
-    A constant unmeasured gust of deviation sigma = sqrt(intensity lag / 2) then changes in body axes at the
-    rate sigma C_dot. Over its lag this equals a random walk of (C_dot lag)^2 / 2 times its
-    intensity.
+    A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
+    sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity.
     """
     fastest = 0.0
     for i in range(3):
@@ -235,24 +218,27 @@ def fill_axes_rate(gust, dt, V):
 
 @kernel
 def yaw_turn_share(gust, V, psi_dot):
-    """Share of the yawing gust's intensity that is unmeasured while the heading turns at `psi_dot`
-    rad/s.
+    """Share of the yawing gust's intensity that is unmeasured at a rate psi_dot, rad/s, of the heading.
+
+        share = psi_dot^2 b L / (pi V^2)
 
     The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
-    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L_gust. The share is
-    the ratio of their squares over the lag of the yawing gust, 3 span / pi V.
+    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L. The share is the ratio of their
+    squares over the lag of the yawing gust, 3 b / pi V.
     """
     return psi_dot * psi_dot * gust.config.span * gust.config.L_gust / (pi * V * V)
 
 
 @kernel
 def advance_gust(gust, y, attitude, dt):
-    """Update `w` (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
+    """Update w (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
-    y (5,) and attitude (3,) rad as measured now; `f` and attitude in memory are those dt s ago.
-    If the heading turns so fast that the vanes mostly measure this turn, as when the nose passes the
-    vertical, the yawing gust only decays, and the sum of changes `v_g` starts
-    again. It does so one instant longer: JSBSim's gusts turn a step after the heading.
+        v <- v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
+
+    y (5,) and attitude (3,) rad as measured now; f and T in memory are those dt s ago. If the heading turns
+    so fast that the vanes mostly measure this turn, as when the nose passes the vertical, the yawing gust
+    only decays, and the sum of changes v_g starts again. It does so one instant longer: JSBSim's gusts turn a
+    step after the heading.
     """
     a = gust.memory.scratch
     for i in range(3):
@@ -272,14 +258,7 @@ def advance_gust(gust, y, attitude, dt):
     gust.memory.a_prev[1] = a[1] * cos - a[0] * sin
     gust.memory.a_prev[2] = a[2]
     fill_velocity(gust, y, attitude)
-    update_gust_speed(
-        gust,
-        v_x,
-        v_y,
-        v_z,
-        y[AIRSPEED],
-        dt,
-    )
+    update_gust_speed(gust, v_x, v_y, v_z, y[AIRSPEED], dt)
     V = gust.output.V
     update_axes(gust, sin, cos)
     fill_axes_rate(gust, dt, V)
@@ -290,46 +269,34 @@ def advance_gust(gust, y, attitude, dt):
 def update_rotation(gust, v_y, v_z, psi_dot, dt):
     """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
 
-    v_y, v_z, m/s: velocity relative to the air
-    if the gust had not changed. psi_dot rad/s; dt s.
+        w_q <- exp(-dt / tau_q) w_q + (v_z - v[2]) / V tau_q
+        w_r <- exp(-dt / tau_r) w_r + (v_y - v[1]) / V tau_r
+
+    v_y, v_z, m/s: velocity relative to the air if the gust had not changed. psi_dot rad/s; dt s.
     """
     V = gust.output.V
     tau_q, tau_r = gust_lag(gust, 1, V), gust_lag(gust, 2, V)
     previous = gust.memory.turn_now
     gust.memory.turn_now = yaw_turn_share(gust, V, psi_dot)
     larger = max(previous, gust.memory.turn_now)
-    gust.memory.turn_past = min(
-        max(
-            np.exp(-dt / tau_r) * gust.memory.turn_past,
-            larger,
-        ),
-        1.0,
-    )
+    gust.memory.turn_past = min(max(np.exp(-dt / tau_r) * gust.memory.turn_past, larger), 1.0)
     gust.memory.start_share *= np.exp(-dt / tau_q)
     gust.memory.w[1] = np.exp(-dt / tau_q) * gust.memory.w[1] + (v_z - gust.memory.v[2]) / (V * tau_q)
     gust.memory.w[2] = np.exp(-dt / tau_r) * gust.memory.w[2]
     if larger < 1.0:
         gust.memory.w[2] += (v_y - gust.memory.v[1]) / (V * tau_r)
     else:
-        gust.memory.v_g[:], gust.memory.start_left = (
-            0.0,
-            1.0,
-        )
+        gust.memory.v_g[:], gust.memory.start_left = (0.0, 1.0)
 
 
 @kernel
-def update_gust_speed(
-    gust,
-    v_x,
-    v_y,
-    v_z,
-    V,
-    dt,
-):
-    """Update `v_g` and `V` for the elapsed dt s.
+def update_gust_speed(gust, v_x, v_y, v_z, V, dt):
+    """Update v_g and V for the elapsed dt s.
 
-    v_x, _right and v_z, m/s: velocity relative
-    to the air if the gust had not changed. airspeed m/s: it is the speed if no gust is measured.
+        v_g <- a v_g + (v_x, v_y, v_z) - v      V = |v + v_g|
+
+    v_x, v_y, v_z, m/s: velocity relative to the air if the gust had not changed. V m/s: airspeed; it is the
+    speed if no gust is measured.
     """
     gust.output.V = V
     if not gust.output.measured:
@@ -341,31 +308,18 @@ def update_gust_speed(
     gust.memory.v_g[2] = a * gust.memory.v_g[2] + v_z - gust.memory.v[2]
     V2 = 0.0
     for i in range(3):
-        gust.memory.v_g[i] = min(
-            max(gust.memory.v_g[i], -gust.config.v_max),
-            gust.config.v_max,
-        )
+        gust.memory.v_g[i] = min(max(gust.memory.v_g[i], -gust.config.v_max), gust.config.v_max)
         V2 += (gust.memory.v[i] + gust.memory.v_g[i]) ** 2
     gust.output.V = max(np.sqrt(V2), 0.5 * V)
 
 
 @kernel
 def set_intensity(gust, altitude):
-    """Fill the intensity of turbulence at this altitude."""
-    h = least_height(
-        altitude,
-        gust.config.h0,
-        gust.config.h1,
-    )
-    gust.memory.Q[0] = max(
-        gust.config.Q_aloft[0],
-        gust.config.Q_1m[0] / h**1.5,
-    )
+    """Fill Q at this altitude, m."""
+    h = least_height(altitude, gust.config.h0, gust.config.h1)
+    gust.memory.Q[0] = max(gust.config.Q_aloft[0], gust.config.Q_1m[0] / h**1.5)
     for j in range(1, 3):
-        gust.memory.Q[j] = max(
-            gust.config.Q_aloft[j],
-            gust.config.Q_1m[j] / h,
-        )
+        gust.memory.Q[j] = max(gust.config.Q_aloft[j], gust.config.Q_1m[j] / h)
 
 
 @kernel
@@ -379,8 +333,7 @@ def step_gust(gust, y, attitude, dt, k):
 
 @kernel
 def fill_gust_effect(gust, design, x, y, u):
-    """Fill `acc` (3,) rad/s2, the effect of the gust from now on, and
-    `f`, m/s2.
+    """Fill acc (3,) rad/s2, the effect of the gust from now on, -L C w, and f, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
@@ -458,7 +411,7 @@ def drop_accelerometers(gust):
 
 @kernel
 def unmeasured_share(gust, j):
-    """Share of the intensity of the gust about a gust axis that is unmeasured in this frame."""
+    """Share of the intensity of the gust about axis j that is unmeasured in this frame."""
     if j == 0:
         return min(gust.memory.share[j], 1.0)
     by_speed = (
@@ -469,15 +422,13 @@ def unmeasured_share(gust, j):
         else 0.0
     )
     return min(
-        gust.memory.share[j] + by_speed + (gust.memory.start_share if j == 1 else gust.memory.turn_past),
-        1.0,
+        gust.memory.share[j] + by_speed + (gust.memory.start_share if j == 1 else gust.memory.turn_past), 1.0
     )
 
 
 @kernel
 def rolling_scale(gust, j):
-    """Power of the gust about a gust axis at low frequency, over that with the correlation length of the
-    rolling gust.
+    """Power of the gust about axis j at low frequency, over that with the length of the rolling gust.
 
     A gust of the rolling gust's length and with this share of the intensity has the same power at low
     frequency. It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
@@ -487,7 +438,7 @@ def rolling_scale(gust, j):
 
 @kernel
 def gust_lag(gust, j, V):
-    """Lag of the gust about a gust axis, s, at a speed V m/s: its correlation length over V."""
+    """tau of the gust about axis j, s, at a speed V m/s: its correlation length over V."""
     if j == 0:
         return gust.config.L_roll / V
     return (4.0 if j == 1 else 3.0) * gust.config.span / (pi * V)
@@ -495,16 +446,18 @@ def gust_lag(gust, j, V):
 
 @kernel
 def gust_length(gust, j):
-    """Correlation length of the gust about a gust axis, m, as in `design.rotation_lengths`: lag at 1 m/s."""
+    """Correlation length of the gust about axis j, m, as in `design.rotation_lengths`: lag at 1 m/s."""
     return gust_lag(gust, j, 1.0)
 
 
 @kernel
 def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
-    """Intensity, (rad/s2)2/s, of the drift of two accelerations by the unmeasured rotation; V m/s.
+    """Intensity, (rad/s2)2/s, of the drift of accelerations i_1 and i_2 by the unmeasured rotation; V m/s.
 
-    as_rolling: that of a gust with the correlation length of the rolling gust and equal
-    power at low frequency.
+        V sum_j (L C)_i1j (L C)_i2j share_j Q_j
+
+    as_rolling: that of a gust with the correlation length of the rolling gust and equal power at low
+    frequency.
     """
     Q_V = 0.0
     for j in range(3):
@@ -520,8 +473,10 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
 
 @kernel
 def add_turn_variance(gust, V, dt):
-    """Add to `var_now` the effect of the turn of the gusts' axes in dt s; V
-    m/s."""
+    """Add to var_now the effect of the turn of the gusts' axes in dt s; V m/s.
+
+    dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
+    """
     if not gust.memory.turns_fast:
         return
     Q_p = 0.5 * gust_lag(gust, 0, V) ** 2 * gust.memory.Q[0]
@@ -536,11 +491,10 @@ def add_turn_variance(gust, V, dt):
 
 @kernel
 def finish_gust(gust, share):
-    """Fill `acc_mean` and `var_turn` for the elapsed
-    frame.
+    """Fill acc_mean = share acc_sum, and var_turn, for the elapsed frame.
 
-    w: one over the number of instants. Axes may turn in the middle of a frame. A part
-    of the effect is then in this frame and the rest in the next, so the variance counts in both frames.
+    share: one over the number of instants. Axes may turn in the middle of a frame. A part of the effect is
+    then in this frame and the rest in the next, so the variance counts in both frames.
     """
     for i in range(3):
         gust.output.acc_mean[i] = share * gust.memory.acc_sum[i]
@@ -557,8 +511,9 @@ def finish_gust(gust, share):
 def full_drift(gust, V, L_rate, L_force):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of
-    the forces, about the body axes.
+        V sum_j (|L_rate' C_j| + |L_force' C_j|)^2 Q_j      if C turns fast: + (tau L_rate' C_dot_j)^2 Q_j / 2
+
+    L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
     Q_V, tau_p = 0.0, gust_lag(gust, 0, V)
     for j in range(3):
@@ -573,8 +528,9 @@ def full_drift(gust, V, L_rate, L_force):
 def remaining_drift(gust, V, L_rate, L_force):
     """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
 
-    L_rate, L_force (3,) 1/s: gust sensitivities about the body axes.
-    On the forces the whole rotation acts.
+        V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
+
+    On the forces the whole rotation acts. L_rate, L_force: see `full_drift`.
     """
     Q_V = 0.0
     for j in range(3):
@@ -585,15 +541,15 @@ def remaining_drift(gust, V, L_rate, L_force):
 
 @kernel
 def project_gust(L_m, C, j):
-    """Sensitivity to the gust about a gust axis, from that (3,) to rotation about the body axes."""
+    """Sensitivity L_m' C_j to the gust about axis j, from that (3,) to rotation about the body axes."""
     return L_m[0] * C[0, j] + L_m[1] * C[1, j] + L_m[2] * C[2, j]
 
 
 @kernel
 def effect_product(gust, C, i_1, i_2, j):
-    """Product of the effects of the gust about a gust axis on two accelerations, per (rad/s)2.
+    """Product of the effects of the gust about axis j on two accelerations, (L C)_i1j (L C)_i2j.
 
-    C (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
+    C (3, 3): axes of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
     q_1, q_2 = 0.0, 0.0
     for k in range(3):
@@ -603,7 +559,7 @@ def effect_product(gust, C, i_1, i_2, j):
 
 
 def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> None:
-    """Fill the record with the declared air, for an aircraft of this mass."""
+    """Fill the record with the declared turbulence, for an aircraft of this mass."""
     air, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span = aircraft.geometry.span_m
     gust["output"]["gusty"] = air.moves
@@ -629,12 +585,7 @@ def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> N
 
 
 def add_gust_noise(
-    stat: np.void,
-    errors: SensorErrors,
-    design: np.void,
-    y: np.ndarray,
-    u: np.ndarray,
-    dt: float,
+    stat: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt: float
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
@@ -654,11 +605,11 @@ def add_gust_noise(
 
 
 def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
-    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim.
+    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim, m/s.
 
-    level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of
-    decay rate a, 1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the
-    variance sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
+    level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of decay rate a,
+    1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the variance
+    sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
     sigma, errors = declared.air.sigma_mps, declared.sensors
     if not (gust["output"]["gusty"] and gust["output"]["measured"]):

@@ -44,7 +44,7 @@ FlightColumns = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
 
 
 class WhiteningFilter:
-    """The Kalman filter of rates, air and the unexplained, once it has settled."""
+    """The Kalman filter of rates, air and the unexplained, (9,) in this order, once it has settled."""
 
     def __init__(self, context: Context) -> None:
         declared, dt = context.declared, context.dt_s
@@ -70,8 +70,10 @@ class WhiteningFilter:
         return P - K @ P[:3]
 
     def whitened_response(self, phi: np.ndarray) -> np.ndarray:
-        """Compute the effect of phi (n, 3, ...) rad/s2 on the innovations, scaled to variance
-        one."""
+        """The effect g (n, 3, ...) of phi (n, 3, ...) rad/s2 on the innovations, scaled to variance one.
+
+        g = W H delta,  W' W = S^-1      delta <- A delta + dt phi,  A = F (1 - K H)
+        """
         A = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         W = np.linalg.cholesky(np.linalg.inv(self.S)).T
         delta = np.zeros((9, *phi.shape[2:]))
@@ -89,20 +91,19 @@ class WhiteningFilter:
     def deflection_with_unknowns(self, phi: np.ndarray, Z: np.ndarray, sigma: np.ndarray) -> float:
         """d of phi (n, 3) rad/s2 with unknown constants in all frames.
 
-        The constants, of standard deviation sigma (m,) > 0, multiply Z (n, 3, m).
+            d^2 = g' g - N' (R' R + 1)^-1 N,  N = R' g
+
+        The constants, of standard deviation sigma (m,) > 0, multiply Z (n, 3, m); R: response to Z sigma.
         """
         g = self.whitened_response(phi).ravel()
         R = self.whitened_response(Z).reshape(g.size, sigma.size) * sigma
         N = R.T @ g
-        d2 = g @ g - N @ np.linalg.solve(
-            R.T @ R + np.eye(sigma.size),
-            N,
-        )
+        d2 = g @ g - N @ np.linalg.solve(R.T @ R + np.eye(sigma.size), N)
         return float(np.sqrt(max(d2, 0.0)))
 
 
 def with_measured_gust(context: Context, gust_noise: np.ndarray) -> Context:
-    """Return the context of a test that knows the gusts the vanes measure, with noise (3,) rad/s2."""
+    """The context of a test that knows the gusts the vanes measure, with gust_noise (3,) rad/s2."""
     declared = context.declared
     if not declared.air:
         return context
@@ -115,8 +116,7 @@ def with_measured_gust(context: Context, gust_noise: np.ndarray) -> Context:
 
 
 def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> float:
-    """Probability of detection by that test, made once every interval_s, at so many false alarms per
-    hour."""
+    """Probability of detection by that test, made once every interval_s, at so many false alarms per hour."""
     normal = NormalDist()
     if alarms_per_h <= 0.0:
         return 0.0  # noise that has no bound leaves nothing certain
@@ -124,7 +124,7 @@ def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> f
 
 
 def healthy_positions(context: Context, columns: FlightColumns, surface: str) -> np.ndarray:
-    """Return the positions of a healthy surface under the commands of a flight, (frames,) rad."""
+    """The positions of a healthy surface under the commands of a flight, (frames,) rad."""
     s, commands = context.surfaces.index(surface), columns[f"{surface}_cmd_rad"]
     bandwidth = context.declared.bandwidth_rad_s[s]
     rate = context.declared.rate_limit_rad_s[s]
@@ -141,8 +141,7 @@ def healthy_positions(context: Context, columns: FlightColumns, surface: str) ->
 def term_acceleration(
     aircraft: Aircraft, term: Term, columns: FlightColumns, deflection: np.ndarray | None
 ) -> np.ndarray:
-    """Compute the acceleration by a coefficient of one, (frames, 3) rad/s2; deflection: of its
-    surface."""
+    """Acceleration by a coefficient of one, (frames, 3) rad/s2; deflection (frames,) rad: of its surface."""
     V, geometry = columns["airspeed_mps"], aircraft.geometry
     inertia = inertia_coefficients(aircraft.mass)
     values: dict[str | None, Any] = {

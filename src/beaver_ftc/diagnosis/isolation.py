@@ -14,10 +14,9 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the
-surface does not follow its command. Its parameter, the deflection in rad, may change in any way, so it
-covers every fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of
-fault it is.
+LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the surface
+does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
+fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
 Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
 
@@ -33,6 +32,21 @@ isolated.
 
 The sharpened tests (detection/filters.py, set membership) exclude as well, each by its own switch. The first
 test that fails excludes a fault.
+
+Symbols of the kernels:
+
+    nu, nu_max (3,) rad/s2        innovation of the frame and its bound without a fault (filters.py)
+    x (3,) rad/s, F (3,) rad/s2   measured rates; mean of f + G u over the elapsed frame
+    G (3, n), Gu (3, n)           mean of G, rad/s2 per rad, and effect of each healthy surface, rad/s2
+    e_Gu (3, n) rad/s2            error of that mean if a fault changes within the frame
+    phi                           effect of a fault, base + theta Z within +- e (EFFECT_RECORD)
+    lo, hi; between               interval of theta, or of a position, rad
+    Om, Om_pos, Om_neg            Omega, and the same of the positive and the negative part of Z
+    e, e_eta, e_n rad/s           bound on the filtered uncertainty, and its parts by eta_bar and by gyros
+    th, P                         estimate of theta and its variance
+    s, i, j                       surface, axis, estimator
+    iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
+    abrupt                        a fault is declared to stay as it is
 """
 
 from math import exp
@@ -71,8 +85,7 @@ N_ROUNDS = 4  # each round reduces the remaining travel to the share of it that 
 
 @kernel
 def eta_explains(nu, nu_max):
-    """True if the declared uncertainty alone explains an nu (3,): |nu| <= nu_max (3,),
-    rad/s2."""
+    """True if the declared uncertainty alone explains an innovation: |nu| <= nu_max."""
     within = True
     for i in range(3):
         within = within and abs(nu[i]) <= nu_max[i]
@@ -81,8 +94,7 @@ def eta_explains(nu, nu_max):
 
 @kernel
 def consistent_theta(nu, e, Z, lo, hi):
-    """The theta of [lo, hi] with |nu - theta Z| <= e, as (low,
-    high); low > high if none."""
+    """The theta of [lo, hi] with |nu - theta Z| <= e, as (low, high); low > high if none."""
     if Z == 0.0:
         return (lo, hi) if abs(nu) <= e else NO_THETA
     a = (nu - e) / Z
@@ -92,10 +104,8 @@ def consistent_theta(nu, e, Z, lo, hi):
 
 @kernel
 def consistent_on(nu, nu_max, fie, phi, i):
-    """The interval of theta that is consistent with an nu (3,) rad/s2 on axis i.
-
-    It is the whole known set if the axis is ignored. nu_max (3,) rad/s2: without a fault;
-    phi: acceleration by the fault, of dtype EFFECT_RECORD.
+    """The theta of the known set with |nu - base - theta Z| <= nu_max + e on axis i; the whole set if i is
+    skipped.
     """
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
@@ -106,7 +116,7 @@ def consistent_on(nu, nu_max, fie, phi, i):
 
 @kernel
 def largest_axis(Z):
-    """The axis on which a Z (3,) is largest."""
+    """The axis on which Z (3,) is largest."""
     axis = 0
     for i in range(1, 3):
         if abs(Z[i]) > abs(Z[axis]):
@@ -116,12 +126,15 @@ def largest_axis(Z):
 
 @kernel
 def widen_error(fie, bound, nu, n_substeps):
-    """Widen the tolerance of a position by the errors of the surface's own terms at that position.
+    """Widen the tolerance of a position by the errors of the surface's own terms at that position:
 
-    eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
-    the surface can have been follows from the frame itself, in a few rounds from its travel inwards; every
-    round gives a valid bound. If a frame has several substeps, the surface may still be where it was a frame
-    before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
+        e <- e + max(eG (u + first) - eGu, 0) + extra
+
+    eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
+    far the surface can have been follows from the frame itself, in a few rounds from its travel inwards;
+    every round gives a valid bound. If a frame has several substeps, the surface may still be where it was a
+    frame before at the first of them. The same holds for a map of the model's error, which is for healthy
+    surfaces.
     """
     s, phi = fie.surface, fie.effect
     i = largest_axis(phi.regressor)
@@ -134,17 +147,10 @@ def widen_error(fie, bound, nu, n_substeps):
     rest = nu[i] - phi.base[i]
     first = 2.0 * u_old / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_ROUNDS):
-        more = max(
-            bound.eG[i, s] * (u + first) - bound.eGu[i, s],
-            0.0,
-        )
+        more = max(bound.eG[i, s] * (u + first) - bound.eGu[i, s], 0.0)
         more += bound.extra[level, i]
         lo, hi = consistent_theta(
-            rest,
-            bound.nu_max[i] + e + more,
-            phi.regressor[i],
-            fie.theta_min,
-            fie.theta_max,
+            rest, bound.nu_max[i] + e + more, phi.regressor[i], fie.theta_min, fie.theta_max
         )
         if lo > hi:
             break
@@ -155,32 +161,16 @@ def widen_error(fie, bound, nu, n_substeps):
     if emap.one_free:
         fie.share_far = share_used(emap, s, between, fie.share_far, n_substeps)
     for j in range(3):
-        phi.e[j] += max(
-            bound.eG[j, s] * (u + first) - bound.eGu[j, s],
-            0.0,
-        )
+        phi.e[j] += max(bound.eG[j, s] * (u + first) - bound.eGu[j, s], 0.0)
         phi.e[j] += bound.extra[level, j]
 
 
 @kernel
 def level_near(emap, fie, between, n_substeps):
-    """The level of the error map that covers a surface whose mean position is in `between`,
-    (low, high) rad.
-
-    It is 0 without a map.
-    """
+    """The level of the map that covers a surface whose mean position is in `between`; 0 without a map."""
     if not emap.one_free:
         return 0
-    return level_of_share(
-        emap,
-        share_used(
-            emap,
-            fie.surface,
-            between,
-            fie.share_far,
-            n_substeps,
-        ),
-    )
+    return level_of_share(emap, share_used(emap, fie.surface, between, fie.share_far, n_substeps))
 
 
 @kernel
@@ -217,23 +207,14 @@ def intersect_sets(fie, i, between, shared):
 def narrow_sets(fie, nu, nu_max, shared):
     """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
 
-    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
+    |eps + Omega thetahat - Omega theta| <= e       for any course of the estimate
     """
     for i in range(3):
         between = consistent_on(nu, nu_max, fie, fie.effect, i)
         intersect_sets(fie, i, between, shared)
         rest = fie.residual[i] + fie.Om[i] * fie.theta[i]
         intersect_sets(
-            fie,
-            i,
-            consistent_theta(
-                rest,
-                fie.e[i],
-                fie.Om[i],
-                fie.theta_min,
-                fie.theta_max,
-            ),
-            shared,
+            fie, i, consistent_theta(rest, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max), shared
         )
     some = True
     for i in range(3):
@@ -243,24 +224,20 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 @kernel
 def set_effect_error(phi, e_Gu, s):
-    """Set the error bound of a fault's effect to that of its surface; e_Gu (3, n) rad/s2."""
+    """e = e_Gu[:, s]."""
     for i in range(3):
         phi.e[i] = e_Gu[i, s]
 
 
 @kernel
 def clear_mean_effect(mean):
-    """Begin the mean of a fault's effect over a block of frames (dtype EFFECT_RECORD)."""
-    mean.base[:], mean.regressor[:], mean.e[:] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    """Begin the mean of a fault's effect over a block of frames (EFFECT_RECORD)."""
+    mean.base[:], mean.regressor[:], mean.e[:] = (0.0, 0.0, 0.0)
 
 
 @kernel
 def add_to_mean(mean, phi, w):
-    """Add the effect of a frame, a `w` of the block, to the mean over the block."""
+    """mean <- mean + w phi, w the share of a frame in the block."""
     for i in range(3):
         mean.base[i] += w * phi.base[i]
         mean.regressor[i] += w * phi.regressor[i]
@@ -273,18 +250,15 @@ EFFECT_RECORD = record(base=3, regressor=3, e=3)
 ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
-    excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3,
-    mu_lo=3, mu_hi=3,
+    excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
     confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
     # Omega, and the same of the positive and the negative part of Z
-    Om=3, Om_pos=3, Om_neg=3,
-    e=3, e_eta=3, e_n=3, theta=3, P=3,
-    effect=EFFECT_RECORD, mean_effect=EFFECT_RECORD,
+    Om=3, Om_pos=3, Om_neg=3, e=3, e_eta=3, e_n=3, theta=3, P=3, effect=EFFECT_RECORD,
+    mean_effect=EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
     u_far=float, share_far=float,
     # on the residuals of the bank (filters.py)
-    parity_direction=3,
-    reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
+    parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
     set_lo=3, set_hi=3,  # what the frames since the alarm leave of the known set
 )  # fmt: skip
 
@@ -292,13 +266,14 @@ ESTIMATOR_RECORD = record(
 @sized
 def isolation_dtype(n: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
-    them is sharpened. gradient: else by least squares; free: their estimates may
-    leave the known set. hold_s: for so long the one left is not isolated yet."""
+    them is sharpened.
+
+    gradient: else by least squares; free: their estimates may leave the known set. hold_s: for so long the
+    one left is not isolated yet. losable (n,): whether damage can take a surface.
+    """
     config = record(
-        n_estimators=int, mu_kind=int, forget=float, a=3, reach=int,
-        shared=int, narrows=int,
-        gradient=int, gain=float, free=int, hold_s=float,
-        losable=(int, n),
+        n_estimators=int, mu_kind=int, forget=float, a=3, reach=int, shared=int, narrows=int, gradient=int,
+        gain=float, free=int, hold_s=float, losable=(int, n),
     )  # fmt: skip
     return record(config=config, estimator=(ESTIMATOR_RECORD, 2 * n))
 
@@ -321,11 +296,7 @@ def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntr
     if fault_class == "published":
         return losses
     stand_ins = tuple((name, LOSS, s) for name in aircraft.stand_ins for s in [index[name]])
-    return (
-        *losses,
-        *stand_ins,
-        *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in index.items()),
-    )
+    return (*losses, *stand_ins, *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in index.items()))
 
 
 def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
@@ -334,10 +305,7 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def configure_isolation(
-    iso: np.void,
-    declared: Declared,
-    rows: tuple[EstimatorEntry, ...],
-    travel: np.ndarray,
+    iso: np.void, declared: Declared, rows: tuple[EstimatorEntry, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
@@ -345,14 +313,8 @@ def configure_isolation(
     iso["config"]["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
     iso["config"]["forget"] = exp(-dt / config.forgetting_time_s)
     iso["config"]["a"] = exp(-config.isolation_pole_per_s * dt)
-    iso["config"]["reach"], iso["config"]["shared"] = (
-        sharpen.memory,
-        sharpen.shared_effectiveness,
-    )
-    iso["config"]["narrows"], iso["config"]["n_estimators"] = (
-        sharpen.set_membership,
-        len(rows),
-    )
+    iso["config"]["reach"], iso["config"]["shared"] = (sharpen.memory, sharpen.shared_effectiveness)
+    iso["config"]["narrows"], iso["config"]["n_estimators"] = (sharpen.set_membership, len(rows))
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
@@ -370,37 +332,19 @@ def configure_isolation(
 
 @kernel
 def fill_effect(kind, s, G, Gu, base, Z):
-    """Fill base (3,) rad/s2 and Z (3,) rad/s2 per unit of theta, for one fault.
-
-    G (3, n) rad/s2 per rad; Gu (3, n) rad/s2, the acceleration each commanded surface would give
-    if healthy.
-    """
+    """Fill base and Z (3,) of one fault: 0 and Gu of a loss, -Gu and G of a position."""
     for i in range(3):
         if kind == POSITION_HYPOTHESIS:
-            base[i], Z[i] = (
-                -Gu[i, s],
-                G[i, s],
-            )
+            base[i], Z[i] = (-Gu[i, s], G[i, s])
         else:
             base[i], Z[i] = 0.0, Gu[i, s]
 
 
 @kernel
 def update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu):
-    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
-
-    G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame.
-    e_Gu (3, n) rad/s2: error of the mean if a fault changes within the frame.
-    """
+    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank."""
     phi = fie.effect
-    fill_effect(
-        fie.hypothesis_kind,
-        fie.surface,
-        G,
-        Gu,
-        phi.base,
-        phi.regressor,
-    )
+    fill_effect(fie.hypothesis_kind, fie.surface, G, Gu, phi.base, phi.regressor)
     set_effect_error(phi, e_Gu, fie.surface)
     if (bound.has_eG or bound.error_map.one_free) and fie.hypothesis_kind == POSITION_HYPOTHESIS:
         widen_error(fie, bound, bank.output.innovation, config.n_substeps)
@@ -418,9 +362,8 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
 
 @kernel
 def start_estimators(iso, n, x):
-    """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
-
-    n (3,) rad/s: on the changing part of the gyros' errors.
+    """Start every estimator at the measured x, without residual and with the prior of theta; n (3,): of
+    `n_gyro`.
     """
     for fie in iso.estimator[: iso.config.n_estimators]:
         fie.xhat[:], fie.e_n[:] = x, n
@@ -430,7 +373,7 @@ def start_estimators(iso, n, x):
 
 @kernel
 def update_residual(fie, kind, x):
-    """Compute the residual and its thresholds; true if it is within them on every axis not ignored."""
+    """eps = x - xhat and its thresholds mu; true if it is within them on every axis that is not skipped."""
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
@@ -440,15 +383,7 @@ def update_residual(fie, kind, x):
         th = fie.theta[i]
         e = fie.e[i]
         if kind == INTERVAL_THRESHOLD:
-            mu = residual_interval(
-                lo,
-                hi,
-                fie.Om_pos[i],
-                fie.Om_neg[i],
-                Om,
-                th,
-                e,
-            )
+            mu = residual_interval(lo, hi, fie.Om_pos[i], fie.Om_neg[i], Om, th, e)
         elif kind == CONSTANT_THRESHOLD:
             mu = -e, e
         else:
@@ -462,9 +397,7 @@ def update_residual(fie, kind, x):
 def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
     """True if no test that is switched on excludes the fault of estimator fie.
 
-    nu_max (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is
-    declared to stay as it is; x (3,) rad/s: measured; started: it started a frame or more
-    ago.
+    started: the isolation started a frame or more ago.
     """
     possible = update_residual(fie, iso.config.mu_kind, x)
     if iso.config.reach:
@@ -514,18 +447,19 @@ def decide_isolation(iso, t):
 
 @kernel
 def set_theta(iso, j, th):
-    """Replace theta of the isolated estimator, where there is one, by the estimate of a plug-in."""
+    """Replace theta of estimator j, the isolated one where there is one, by the estimate of a plug-in."""
     if j >= 0:
         iso.estimator[j].theta[:] = th
 
 
 @kernel
 def least_squares_step(fie, i, eps, forget, lo, hi):
-    """One least-squares step of thetahat_i on a residual, rad/s, projected onto [lo, hi];
-    returns the step.
+    """One least-squares step of theta_i on a residual eps, rad/s, projected onto [lo, hi]; returns the step.
 
-    The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
-    filtered uncertainty, so the estimate changes no faster than its information allows.
+        K = P Om / S,  S = R + Om P Om,  R = e^2      th <- th + K eps      P <- min(P R / S / forget, prior)
+
+    R is the square of the bound on the filtered uncertainty, so the estimate changes no faster than its
+    information allows.
     """
     R = fie.e[i] ** 2
     POm = fie.P[i] * fie.Om[i]
@@ -533,10 +467,7 @@ def least_squares_step(fie, i, eps, forget, lo, hi):
     if S <= 0.0:
         return 0.0
     th = fie.theta[i]
-    fie.theta[i] = min(
-        max(th + POm / S * eps, lo),
-        hi,
-    )
+    fie.theta[i] = min(max(th + POm / S * eps, lo), hi)
     P0 = (fie.theta_max - fie.theta_min) ** 2 / 12.0
     fie.P[i] = min(fie.P[i] * R / S / forget, P0)
     return fie.theta[i] - th
@@ -561,14 +492,7 @@ def joint_least_squares(fie, forget):
             fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
         if fie.effect.regressor[i] != 0.0:
             eps = fie.residual[i] - fie.Om[i] * total
-            total += least_squares_step(
-                fie,
-                i,
-                eps,
-                forget,
-                fie.set_lo[i],
-                fie.set_hi[i],
-            )
+            total += least_squares_step(fie, i, eps, forget, fie.set_lo[i], fie.set_hi[i])
             forget = 1.0  # once a frame
     fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
     return total
@@ -578,8 +502,10 @@ def joint_least_squares(fie, forget):
 def advance_estimator(iso, fie, bound, x, F, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
-    x (3,) rad/s: at the start of the frame; F (3,) rad/s2: mean of f + G u over
-    the frame; fie.effect must be that of this frame.
+        xhat <- x + dt (F + base + Z th) + a (xhat - x)
+        Om_pos <- a Om_pos + dt max(Z, 0)      Om_neg <- a Om_neg + dt min(Z, 0)
+
+    x: at the start of the frame; fie.effect must be that of this frame.
     """
     for i in range(3):
         base = fie.effect.base[i]
@@ -592,20 +518,16 @@ def advance_estimator(iso, fie, bound, x, F, dt):
         Z, a = fie.effect.regressor[i], iso.config.a[i]
         fie.Om_pos[i] = a * fie.Om_pos[i] + dt * max(Z, 0.0)
         fie.Om_neg[i] = a * fie.Om_neg[i] + dt * min(Z, 0.0)
-        fie.e_eta[i] = advance_bound(
-            fie.e_eta[i],
-            bound.eta_bar[i] + fie.effect.e[i],
-            a,
-            dt,
-        )
+        fie.e_eta[i] = advance_bound(fie.e_eta[i], bound.eta_bar[i] + fie.effect.e[i], a, dt)
         fie.e_n[i] = advance_gyro(fie.e_n[i], bound.n_old[i], a)
         fie.e[i] = fie.e_eta[i] + fie.e_n[i] + bound.n_gyro[i]
 
 
 @kernel
 def update_theta(iso, fie, dt):
-    """Correct the estimate by the residual at the start of the frame, and the predicted rates by Omega[k+1]
-    times the step of the estimate."""
+    """Correct th by the residual at the start of the frame; Om <- a Om + dt Z; xhat <- xhat + Om (step of
+    th).
+    """
     joint = joint_least_squares(fie, iso.config.forget) if iso.config.shared else 0.0
     for i in range(3):
         if iso.config.gradient:
@@ -614,12 +536,7 @@ def update_theta(iso, fie, dt):
             step = joint
         else:
             step = least_squares_step(
-                fie,
-                i,
-                fie.residual[i],
-                iso.config.forget,
-                fie.set_lo[i],
-                fie.set_hi[i],
+                fie, i, fie.residual[i], iso.config.forget, fie.set_lo[i], fie.set_hi[i]
             )
         fie.Om[i] = iso.config.a[i] * fie.Om[i] + dt * fie.effect.regressor[i]
         fie.xhat[i] += fie.Om[i] * step
@@ -633,21 +550,12 @@ def advance_estimators(iso, bound, x, F, dt):
 
 
 @kernel
-def update_likelihood(
-    fie,
-    cfg,
-    blocks,
-    iso,
-    of,
-    abrupt,
-    hidden,
-):
-    """Fill `unlikely` of estimator fie; update its `confirmed` and
-    `weak`.
+def update_likelihood(fie, cfg, blocks, iso, of, abrupt, hidden):
+    """Fill `unlikely` of estimator fie; update its `confirmed` and `weak`.
 
-    hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may
-    then be the effect of that error, so all estimators become weakly excluded. of
-    (n,): index of the estimator; abrupt: a fault is declared to stay as it is.
+    hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
+    that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; of (n,):
+    index of the estimator of each surface's loss.
     """
     fies, s = iso.estimator, fie.surface
     fie.unlikely = 0
@@ -655,25 +563,9 @@ def update_likelihood(
         fie.confirmed = statistical.confirms_loss(
             cfg, blocks, fies, of, s
         )  # what follows later may be its end
-    if fie.confirmed or not statistical.excludes_loss(
-        cfg,
-        blocks,
-        fies,
-        of,
-        s,
-        False,
-        abrupt,
-    ):
+    if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, of, s, False, abrupt):
         return
-    fie.unlikely = statistical.excludes_loss(
-        cfg,
-        blocks,
-        fies,
-        of,
-        s,
-        True,
-        abrupt,
-    )
+    fie.unlikely = statistical.excludes_loss(cfg, blocks, fies, of, s, True, abrupt)
     fie.weak = max(fie.weak, 1)
     if fie.unlikely and hidden:
         for other in fies[: iso.config.n_estimators]:

@@ -15,11 +15,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
-from beaver_ftc.diagnosis.bounds import (
-    extra_bound,
-    fill_bound,
-    n_gyro,
-)
+from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro
 from beaver_ftc.scenario.declared import Declared
 
 
@@ -27,8 +23,7 @@ from beaver_ftc.scenario.declared import Declared
 def frame_sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
-        f=3, G=(3, n), Gu=(3, n), eta_bar=3,
-        eG=(3, n), eGu=(3, n),
+        f=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
         Gu_first=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
@@ -89,8 +84,7 @@ def evaluate_design(pred, meas):
 
 @kernel
 def add_to_sums(pred, bound, layout, all_types):
-    """Add this instant to the sums over the frame and, for faults of `all_types`, to the
-    extremes."""
+    """Add this instant to the sums over the frame and, for faults of all types, to the extremes."""
     sums, G, u = pred.sums, pred.G, pred.u
     for i in range(3):
         sums.f[i] += pred.f[i]
@@ -115,7 +109,7 @@ def add_to_sums(pred, bound, layout, all_types):
 
 @kernel
 def fill_means(pred, bound):
-    """Fill the means over the elapsed frame: G, the effect G u of each surface, f + G u, and the bound."""
+    """Fill the means over the elapsed frame: G, G u of each surface, F = f + G u, and the bound."""
     w = pred.w
     sums = pred.sums
     means = pred.means
@@ -139,7 +133,7 @@ def fill_means(pred, bound):
 
 @kernel
 def fill_old_effects(means):
-    """Fill `Gu_old` (3, n) rad/s2: the effect of each surface with G of the frame before."""
+    """Gu_old = (G_old / G) Gu, (3, n) rad/s2: the effect of each surface with G of the frame before."""
     for i in range(3):
         for s in range(means.G_min.size):
             ratio = means.G_old[i, s] / means.G[i, s] if means.G[i, s] != 0.0 else 0.0
@@ -148,12 +142,11 @@ def fill_old_effects(means):
 
 @kernel
 def fill_change_tolerance(pred):
-    """Fill `e_Gu` (3, n) rad/s2: the error of the mean effect if a fault changes
-    within the frame.
+    """e_Gu = w |z0 - z|, (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
-    are the effects of a healthy surface in the first and in the other n - 1 steps. The mean effect of the
-    fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
+    are the effects of a healthy surface in the first and in the other n - 1 steps, w = 1 / n. The mean effect
+    of the fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
     """
     w, sums = pred.w, pred.sums
     for i in range(3):
@@ -210,11 +203,9 @@ def add_instant(pred, bound, layout, all_types, meas):
 
 @kernel
 def predict_known(pred, with_faults, effectiveness, bias, with_biases):
-    """Fill `F_known` (3,) rad/s2: mean of f + G u over the elapsed frame, with the
-    faults if `with_faults`.
+    """F_known = F - Gu (1 - effectiveness) + G bias, (3,) rad/s2, over the elapsed frame.
 
-    effectiveness (n,): estimate for each surface; bias (n,) rad: its bias, used if
-    `with_biases`.
+    effectiveness (n,), bias (n,) rad: estimates for each surface, used if `with_faults` and `with_biases`.
     """
     F = pred.F_known
     means = pred.means
@@ -233,8 +224,7 @@ def predict_known(pred, with_faults, effectiveness, bias, with_biases):
 
 @kernel
 def innovation_known(pred, x, dt):
-    """Fill `nu_known` (3,) rad/s2 of the elapsed frame, of dt s; x
-    (3,) rad/s: now."""
+    """nu_known = (x - x_old) / dt - F_known, (3,) rad/s2."""
     for i in range(3):
         pred.nu_known[i] = (x[i] - pred.x_before[i]) / dt - pred.F_known[i]
 

@@ -42,15 +42,13 @@ def layout_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of
-# that scheme; variant: its number (schemes/adaptive_estimators.py); authority: the detector
-# whose alarms count, EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR;
-# diagnoses_all_types: faults of every type; abrupt: a fault is declared to stay as it is; n_substeps: JSBSim
-# frames in a frame; dt s.
+# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that scheme;
+# variant: its number (schemes/adaptive_estimators.py); authority: the detector whose alarms count,
+# EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR; diagnoses_all_types: faults of every type;
+# abrupt: a fault is declared to stay as it is; n_substeps: JSBSim frames in a frame; dt s.
 SHARED_CONFIG_RECORD = record(
-    enabled=int, scheme_number=int, variant=int, authority=int, diagnoses_all_types=int,
-    abrupt=int, n_substeps=int,
-    dt=float,
+    enabled=int, scheme_number=int, variant=int, authority=int, diagnoses_all_types=int, abrupt=int,
+    n_substeps=int, dt=float,
 )  # fmt: skip
 
 
@@ -59,14 +57,8 @@ def configure_shared(cfg: np.void, declared: Declared) -> None:
     fdi = declared.fdi
     cfg["enabled"], cfg["dt"] = fdi.diagnoses, 1.0 / declared.rate_hz
     cfg["scheme_number"] = scheme_number(fdi.scheme)
-    cfg["authority"], cfg["diagnoses_all_types"] = (
-        _AUTHORITIES[fdi.authority],
-        fdi.fault_class == "all",
-    )
-    cfg["abrupt"], cfg["n_substeps"] = (
-        fdi.fault_profile == "abrupt",
-        declared.substeps,
-    )
+    cfg["authority"], cfg["diagnoses_all_types"] = (_AUTHORITIES[fdi.authority], fdi.fault_class == "all")
+    cfg["abrupt"], cfg["n_substeps"] = (fdi.fault_profile == "abrupt", declared.substeps)
 
 
 def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
@@ -87,10 +79,7 @@ def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], airc
 
 _COMPILED = compiled_rows(DETECTORS)
 _PLUGIN_PATH = f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
-SCHEME_KERNEL_PATHS = (
-    *dict.fromkeys(row["kernels"] for row in _COMPILED.values()),
-    _PLUGIN_PATH,
-)
+SCHEME_KERNEL_PATHS = (*dict.fromkeys(row["kernels"] for row in _COMPILED.values()), _PLUGIN_PATH)
 PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_PATH)
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         recorded_until_alarm,
         set_ground,
         stop_diagnosis,
-        surface_and_sensor_alarm_flags,
+        alarm_flags,
     )
     from beaver_ftc.loop.simulation import Asked, Stepping
     from beaver_ftc.loop.stream import FLOW, Diagnosis

@@ -37,7 +37,7 @@ from beaver_ftc.diagnosis.conclusion import (
     assess_surfaces,
     assess_unknown,
     hold_assessment,
-    uses_statistical_estimates,
+    weighs_statistics,
 )
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import nearest_filter
@@ -368,7 +368,7 @@ def monitor_sensors(frame):
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
     conclusion.withdraw_conclusion(fdi.verdict)
-    verdict.clear_all_accommodation_modes(fdi.types.surface)
+    verdict.clear_modes(fdi.types.surface)
     filters.reset_network(fdi.fdae.network)
 
 
@@ -529,7 +529,7 @@ def note_beyond_threshold(accounts, fdi, t):
     if fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
-        uses_statistics = uses_statistical_estimates(detector.test, authority)
+        uses_statistics = weighs_statistics(detector.test, authority)
         ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
         is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
     if is_beyond:

@@ -20,7 +20,7 @@ from beaver_ftc.compiled import apart, borrows, kernel, row_of
 from beaver_ftc.compiled.cache import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
-from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
+from beaver_ftc.diagnosis.conclusion import weighs_statistics
 from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
@@ -73,7 +73,7 @@ def detection_share(frames):
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.authority
     return largest_statistic(
-        fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.test, authority)
+        fdi.bank, alarm, authority, weighs_statistics(fdi.statistical.test, authority)
     )
 
 

@@ -78,24 +78,24 @@ def news(frames, known):
         excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
     changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.fault_type)
     if fdi.config.diagnoses_all_types:
-        for plane in range(fdi.types.pair.group_has_alarm.size):
-            changed |= replace(known, 5 + plane, fdi.types.pair.group_has_alarm[plane])
+        for plane in range(fdi.types.pair.group_alarm.size):
+            changed |= replace(known, 5 + plane, fdi.types.pair.group_alarm[plane])
         for s in range(fdi.types.surface.size):
             changed |= news_of(
-                fdi.types.surface[s], fdi.types.config.slowest_half_cycle_frames, known[8 + 5 * s :]
+                fdi.types.surface[s], fdi.types.config.half_frames, known[8 + 5 * s :]
             )
     return changed
 
 
 @kernel
-def news_of(surface, slowest_half_cycle_frames, known):
+def news_of(surface, half_frames, known):
     """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
-    for kind in range(surface.feasible_sets.excluded.size):
-        bits = 2 * bits + surface.feasible_sets.excluded[kind]
-    early = surface.evidence.n_anomalous_frames - surface.evidence.n_rest_frames < slowest_half_cycle_frames
+    for kind in range(surface.sets.excluded.size):
+        bits = 2 * bits + surface.sets.excluded[kind]
+    early = surface.evidence.n_anomalous - surface.evidence.n_rest < half_frames
     changed = replace(known, 0, surface.status.is_isolated) | replace(
-        known, 1, surface.status.can_be_at_fault_basis
+        known, 1, surface.status.basis
     )
     changed |= replace(known, 2, surface.status.fault_type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)

@@ -340,7 +340,7 @@ def _type_statements(scenario: Scenario, tape: Tape, history: History, alarm: in
             "what": kinds.exclusion_name(surface, kind), "column": kinds.exclusion_column(surface, kind),
             "frame": kinds.exclusion_row(frames[0], s, kind),
         }  # fmt: skip
-        followed = bool(TYPES[kind].multi_frame_exclusion_test_name)
+        followed = bool(TYPES[kind].frames_test)
         if because is None and not followed and TYPES[kind].deflection_relation is None:
             because = kinds.UNKNOWN_TYPE
         if because is not None:

@@ -63,14 +63,14 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
         return
     reading = TESTS[number]
     predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
-    pole = int(np.argmax(np.abs(test.filtered_residual_by_pole) / test.filtered_bound_by_pole))
+    pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s
         + test.bound_per_sample
-        + test.gust_gain * monitor.filtered_gust_change_bound_by_pole_mps[pole]
+        + test.gust_gain * monitor.gust_change_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
-    filtered, bound = test.filtered_residual_by_pole[pole], test.filtered_bound_by_pole[pole]
+    filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]
     earlier = np.array([filtered - test.residual, bound - sample_bound])
     earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(filtered), bound])] = 0.0
     yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

@@ -18,7 +18,7 @@ from beaver_ftc.loop import (
     give_back_memory,
     recorded_always,
     recorded_until_alarm,
-    surface_and_sensor_alarm_flags,
+    alarm_flags,
     take_memory,
 )
 from beaver_ftc.scenario import Scenario
@@ -103,7 +103,7 @@ class Recorder:
         config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
         self._always = _RecordWords(recorded_always(numbers[0], n, config.fault_class == "all"))
         self._early = _RecordWords(recorded_until_alarm(numbers[0], n, config.statistical is not None))
-        self._state = np.array([0, -1, 0, *surface_and_sensor_alarm_flags(numbers[0])])
+        self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
         ring = 1 + (FRAMES_BEFORE_ALARM if config.statistical is None else STATISTICAL_FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)

@@ -223,8 +223,8 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
 def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
     """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
     sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)
-    for dynamic_pressure_over_trim in (1.0, 2.0):
-        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
+    for q_ratio in (1.0, 2.0):
+        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, q_ratio, 1.0)
         record, drawn = fdi["statistical"]["forces"], []
         for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
             update_both_forces(
@@ -761,17 +761,17 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
 
 
 @pytest.mark.parametrize("q_ratio", [1.0, 2.5])
-def test_noise_and_slopes_of_forces_go_with_the_pressure(dynamic_pressure_over_trim):
+def test_noise_and_slopes_of_forces_go_with_the_pressure(q_ratio):
     """A dive at more than its trim's pressure: as if trimmed there."""
     sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
-    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
+    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, q_ratio, 1.0)
     record = fdi["statistical"]["forces"]
     update_both_forces(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
     slopes = (
-        dynamic_pressure_over_trim * record["component"]["vane"][:, 1]
+        q_ratio * record["component"]["vane"][:, 1]
     )
     noise = np.radians([0.02, 0.03])
-    assert record["q_ratio"] == pytest.approx(dynamic_pressure_over_trim)
+    assert record["q_ratio"] == pytest.approx(q_ratio)
     assert record["component"]["var"][:, 0] == pytest.approx(
         (slopes * noise) ** 2, rel=0.01
     )

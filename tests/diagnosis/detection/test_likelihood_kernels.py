@@ -204,16 +204,16 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
         (
             0.0,
             500.0,
-            lambda calm_air_cross_correlation, size: (
-                (calm_air_cross_correlation + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0)
+            lambda pg, size: (
+                (pg + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0)
             ),
         ),
-        (-900.0, 500.0, lambda calm_air_cross_correlation, size: 0.0),
-        (900.0, 500.0, lambda calm_air_cross_correlation, size: 1.0),
+        (-900.0, 500.0, lambda pg, size: 0.0),
+        (900.0, 500.0, lambda pg, size: 1.0),
     ],
 )
 def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_lately_has(
-    calm_air_cross_correlation, size, share
+    pg, size, share
 ):
     block = steady_block()
     for name in (
@@ -228,7 +228,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     block["calm"]["Q_d"][:] = 0.1 * TOGETHER
     alone = block["calm"].copy()
     block["g"], block["nu"] = (0.003, -0.001), (0.4, -0.2)
-    block["pg"], block["pp"] = calm_air_cross_correlation, size
+    block["pg"], block["pp"] = pg, size
     inverse, g = block["S_inv"].copy(), block["g"].copy()
     likelihood.whiten_calm(block, DT)
     likelihood.update_calm_part(block, DT)
@@ -236,12 +236,12 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     likelihood.whiten_step(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["g"])
     foretold = g - alone["g"]
     kept = np.exp(-DT / 2.0)
-    calm_air_cross_correlation, size = (
-        kept * calm_air_cross_correlation + foretold @ inverse @ g,
+    pg, size = (
+        kept * pg + foretold @ inverse @ g,
         kept * size + foretold @ inverse @ foretold,
     )
-    assert (block["pg"], block["pp"]) == pytest.approx((calm_air_cross_correlation, size), rel=1e-12)
-    assert block["p"] == pytest.approx(share(calm_air_cross_correlation, size) * foretold, rel=1e-12)
+    assert (block["pg"], block["pp"]) == pytest.approx((pg, size), rel=1e-12)
+    assert block["p"] == pytest.approx(share(pg, size) * foretold, rel=1e-12)
     assert block["calm"]["state"] == pytest.approx(alone["state"], rel=1e-12)
 
 

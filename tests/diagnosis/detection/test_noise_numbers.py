@@ -431,18 +431,18 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     of frames: the pace covers each step, and no frame more than the whole way."""
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, map_dtype(3)).view(np.recarray)[0]
-    error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
+    error_map.stop_lo, error_map.stop_hi = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
     record.noise.rate0 = 0.02
     rng = np.random.default_rng(1)
     steps = rng.dirichlet(np.ones(20)) * 0.25
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
         u = error_map.u_old.copy()
-        u[way] += step * (error_map.travel_high - error_map.travel_low)[way]
+        u[way] += step * (error_map.stop_hi - error_map.stop_lo)[way]
         statistical.update_eta_rate(record.noise, record.block, error_map, u)
         assert [block.eta_rate for block in record.block] == pytest.approx([0.02 + 2.0 * step / 0.25] * 3)
     statistical.update_eta_rate(record.noise, record.block, error_map, error_map.u_old.copy())
     assert record.block[0].eta_rate == pytest.approx(0.02)
-    statistical.update_eta_rate(record.noise, record.block, error_map, error_map.travel_low.copy())
+    statistical.update_eta_rate(record.noise, record.block, error_map, error_map.stop_lo.copy())
     assert record.block[0].eta_rate == 2.0
 
 
@@ -450,7 +450,7 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     """Each frame is held against the one before it, not against where the surfaces were at first."""
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, map_dtype(3)).view(np.recarray)[0]
-    error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
+    error_map.stop_lo, error_map.stop_hi = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
     record.noise.rate0, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
         statistical.update_eta_rate(record.noise, record.block, error_map, np.array(u))

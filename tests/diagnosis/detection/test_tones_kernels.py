@@ -138,7 +138,7 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONES_RAD_S, age_s)) @ faded)
     mean = parity.max_tone_mean(TONES_RAD_S, PACE)
-    assert view["tones"]["uncertain_share"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
+    assert view["tones"]["eta"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
@@ -238,7 +238,7 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_te
     parity.score_tones(record, tone_test_config, 6.0)
     root = sqrt(100.0 * tone_test_config["v_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["uncertain_share"][3] = 200.0
+    record["eta"][3] = 200.0
     parity.score_tones(record, tone_test_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["correlation"][:] = 0.0

@@ -555,7 +555,7 @@ def test_all_that_a_monitor_is_set_up_with_and_no_more(noise_deg, share):
         "redundancy.config.gust_change": walk * np.sqrt(h / fading),
         "redundancy.config.max_airspeed_mps": 1.4 * 48.0,
         "redundancy.config.low_m": Dryden("moderate").low_m,
-        "redundancy.config.w_max": 1.5,
+        "redundancy.config.wind_max": 1.5,
         "redundancy.config.e_zero": at_sensors(
             p=0.2 * deg, r=0.005 * deg, V=2.05, theta=4.0 * noise_deg * deg, **steady
         ),

@@ -101,7 +101,7 @@ def new_watch(h):
         np.exp([-1e6 * h, -10.0 * h, -h]),
         GRAVITY,
     )
-    relations["config"]["w_max"], relations["config"]["max_airspeed_mps"] = 1.0, 80.0
+    relations["config"]["wind_max"], relations["config"]["max_airspeed_mps"] = 1.0, 80.0
     (
         relations["config"]["e_zero"][:3],
         relations["config"]["const"][:3],

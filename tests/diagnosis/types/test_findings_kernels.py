@@ -26,21 +26,21 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
         -1,
     )
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
-    fdi["types"]["pair"]["first_pitch_fault_surface"] = -1
+    fdi["types"]["pair"]["first_pitch"] = -1
     fdi["layout"]["position"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - PITCH_GROUP
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
     (
-        fdi["types"]["surface"]["position_estimator_excluded"],
-        fdi["types"]["surface"]["feasible_sets"]["excluded"],
+        fdi["types"]["surface"]["not_at_position"],
+        fdi["types"]["surface"]["sets"]["excluded"],
     ) = 1, 1
     (
         fdi["types"]["surface"]["status"]["fault_type"],
         fdi["types"]["surface"]["status"]["typed_at_s"],
     ) = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["types"]["surface"]["position_estimator_excluded"][s] = 0
-        fdi["types"]["surface"]["feasible_sets"]["excluded"][s][list(kinds)] = 0
+        fdi["types"]["surface"]["not_at_position"][s] = 0
+        fdi["types"]["surface"]["sets"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
 
@@ -82,9 +82,9 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     fdi = new({RUDDER: [STUCK]})
     (
         fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
-        fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][RUDDER],
+        fdi["types"]["surface"]["status"]["basis"][RUDDER],
     ) = named, standing
-    fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = excluded
+    fdi["types"]["surface"]["not_at_position"][RUDDER] = excluded
     assert (
         f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_finding_dict(fdi, SURFACES)["candidates"]
     ) == possible
@@ -104,13 +104,13 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
 ):
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
-    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, slowest_half_cycle_frames=40)
+    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, half_frames=40)
     (
-        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][RUDDER],
-        fdi["types"]["surface"]["evidence"]["n_rest_frames"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_anomalous"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_rest"][RUDDER],
     ) = evidence, 10
     fdi["types"]["config"]["has_eG"] = has_eG
-    types = verdict._remaining_type_names(fdi, RUDDER)
+    types = verdict._type_names(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))
 
@@ -150,7 +150,7 @@ def several(named=(), alarmed=(0, 0), left=None):
             1,
             at_s,
         )
-    fdi["types"]["pair"]["group_has_alarm"] = alarmed
+    fdi["types"]["pair"]["group_alarm"] = alarmed
     return verdict.fault_finding_dict(fdi, SURFACES)
 
 
@@ -198,10 +198,10 @@ def test_where_no_plane_is_alarmed_both_stay_open():
 def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
     fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
     every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
-    assert set(verdict._remaining_type_names(fdi, ELEVATOR)) == every
-    assert set(verdict._remaining_type_names(fdi, RUDDER)) == set(said(kind))
-    assert set(verdict._remaining_type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
-    assert set(verdict._remaining_type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
+    assert set(verdict._type_names(fdi, ELEVATOR)) == every
+    assert set(verdict._type_names(fdi, RUDDER)) == set(said(kind))
+    assert set(verdict._type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
+    assert set(verdict._type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])
@@ -211,9 +211,9 @@ def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     sets = fdi["types"]["surface"]
     for surface in range(4):
         fill(sets[surface], seed=surface + 1)
-    apart(low=sets["feasible_sets"]["low"], high=sets["feasible_sets"]["high"])
+    apart(low=sets["sets"]["low"], high=sets["sets"]["high"])
     for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
-        low, high = sets["feasible_sets"]["low"][s, kind] - off, sets["feasible_sets"]["high"][s, kind] - off
+        low, high = sets["sets"]["low"][s, kind] - off, sets["sets"]["high"][s, kind] - off
         assert TYPES[kind].estimate_parameter_interval(fdi, s, kind) == pytest.approx((low, high))
-    middle = 0.5 * (sets["feasible_sets"]["low"][s, STUCK] + sets["feasible_sets"]["high"][s, STUCK])
+    middle = 0.5 * (sets["sets"]["low"][s, STUCK] + sets["sets"]["high"][s, STUCK])
     assert TYPES[STUCK].estimate_parameter(fdi, s, STUCK) == pytest.approx(middle)

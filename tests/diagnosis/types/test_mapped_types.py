@@ -41,7 +41,7 @@ class Mapped(DesignPlant):
         super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
         self.map = self.fdi["bound"]["error_map"]
         self.map["one_free"], self.map["two_free"] = 1, 0
-        self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
+        self.map["stop_lo"], self.map["stop_hi"] = TRAVEL_RAD
         self.amplitude *= 0.3
 
     def effect(self, G):

@@ -1,7 +1,7 @@
 """The worst-case detector: a bank of filters of the innovation with adaptive thresholds, and the FDAE.
 
     nu[k] = (x[k+1] - x[k]) / dt - F[k] = eta[k] + phi[k]
-    E_m[k+1] = a_m E_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
+    eps_m[k+1] = a_m eps_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
 
 All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): a residual obeys eps[k+1] = a
 eps[k] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. The guarantees of the theory
@@ -15,7 +15,7 @@ reach of a fault is its possible effect on the filters since the start of the fl
 
 The fault detection and approximation estimator (FDAE) is always on:
 
-    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > ebar_i, some i
+    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > mu_i, some i
 
 [Zhang2005, sec. IV]. Until the alarm eps0 is filter 0 of the bank, which raises it. In discrete time
 xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
@@ -28,6 +28,17 @@ weights:
 [Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning at any
 state. D is a continuous dead zone at the detection threshold: the network cannot learn what the declared
 uncertainty explains.
+
+Symbols of the kernels:
+
+    nu (3,) rad/s2            innovation of the elapsed frame
+    F (3,) rad/s2             f + G u of the healthy aircraft, mean over the frame
+    x, x_old (3,) rad/s       measured now and a frame ago
+    eps, mu rad/s             residual of a filter and its threshold
+    n rad/s                   nbar of bounds.py: bound on the changing part of a gyro's error
+    a, m, i                   decay per frame, filter, axis
+    fie, lo, hi, base, Z, e   isolation estimator; its set of theta; its fault base + theta Z +- e, rad/s2
+    bank, bound, net          records: BANK_RECORD, `bound_dtype`, FDAE_NETWORK_RECORD
 """
 
 from math import exp
@@ -43,39 +54,31 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 @kernel
 def advance_bound(e, eta, a, dt):
-    """Advance ebar' = -lam ebar + eta by one frame [Zhang2005, sec. IV].
-
-    Units: bound rad/s, eta rad/s2, decay = exp(-lam dt), dt s.
+    """e <- a e + dt eta: bound on a residual, rad/s, for an uncertainty within eta, rad/s2 [Zhang2005, sec.
+    IV].
     """
     return a * e + dt * eta
 
 
 @kernel
 def advance_gyro(m, n, a):
-    """Advance the filtered bound on a gyro's changing error, rad/s, by one frame.
+    """m <- a m + (1 - a) n: the filtered bound on a gyro's changing error, rad/s; n at the start of the
+    frame.
 
-    n: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds
-    at most the filtered bound plus the present nbar to a residual.
+    An error of the gyro adds at most the filtered bound plus the present n to a residual.
     """
     return a * m + (1.0 - a) * n
 
 
 @kernel
-def residual_interval(
-    lo,
-    hi,
-    Zp,
-    Zm,
-    Z,
-    th,
-    e,
-):
-    """The signed interval (low, high), rad/s, that holds the residual of the true estimator.
+def residual_interval(lo, hi, Zp, Zm, Z, th, e):
+    """The interval (low, high), rad/s, that holds the residual of the true estimator.
 
-    The parameter may move anywhere within [lo, hi] at every instant, so an incipient or
-    intermittent fault is covered. With Z+ and Z- the filtered positive and negative part of Z, the filtered
-    Z theta lies between lo Z+ + hi Z- and hi Z+ + lo Z-. The residual is this
-    effect minus Omega thetahat, plus or minus the bound on the uncertainty.
+        lo Zp + hi Zm - Z th - e  <=  eps  <=  hi Zp + lo Zm - Z th + e
+
+    The parameter may move anywhere within [lo, hi] at every instant, so an incipient or intermittent fault is
+    covered. Zp, Zm, Z rad/s: filtered positive part, negative part and whole of the regressor; th: estimate;
+    e rad/s: bound on the filtered uncertainty.
     """
     eps_lo = lo * Zp + hi * Zm - Z * th - e
     eps_hi = hi * Zp + lo * Zm - Z * th + e
@@ -84,24 +87,18 @@ def residual_interval(
 
 @kernel
 def published_interval(lo, hi, Z, th, e):
-    """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
+    """(-mu, mu), mu = k |Z| + e rad/s, k = max(th - lo, hi - th) bounds |theta - th| [Zhang2005, via
     Zhang2002].
     """
     mu = max(th - lo, hi - th) * abs(Z) + e
     return -mu, mu
 
 
-# The bank of detection filters; filter 0 is the published one. a: a_m; residual, threshold and its
-# parts rad/s; innovation rad/s2; peak: of residual over threshold, in healthy
-# flight.
+# The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu and its parts
+# rad/s; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
 BANK_CONFIG_RECORD = record(n_filters=int, a=MAX_POLES)
 BANK_MEMORY_RECORD = record(mu_eta=(MAX_POLES, 3), mu_n=(MAX_POLES, 3))
-BANK_OUTPUT_RECORD = record(
-    innovation=3,
-    residual=(MAX_POLES, 3),
-    threshold=(MAX_POLES, 3),
-    peak=MAX_POLES,
-)
+BANK_OUTPUT_RECORD = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES)
 BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
 
 
@@ -121,24 +118,23 @@ def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: flo
 
 @kernel
 def start_bank(bank, n):
-    """Start with the full bound on the changing part of the gyros' errors, n (3,)
-    rad/s."""
+    """Start with the full bound n (3,) on the changing part of the gyros' errors."""
     bank.memory.mu_n[: bank.config.n_filters] = n
 
 
 @kernel
 def hold_bank(bank, mu):
-    """Replace the mu of the published filter by a constant, rad/s."""
+    """Replace the threshold of the published filter by a constant, rad/s."""
     bank.output.threshold[0] = mu
 
 
 @kernel
 def set_directions(isolation, G):
-    """Fix, once, the direction along which each fault has least effect; G (3, n) at the start of the flight.
+    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which each fault has least effect.
 
-    Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
-    The bound is exact for any fixed direction; this one has power while G keeps its direction, which
-    depends on alpha alone, and weakly.
+    G (3, n) rad/s2 per rad: at the start of the flight. m has unit length, in the roll-yaw plane, whose two
+    axes are the only ones that one surface moves together. The bound is exact for any fixed direction; this
+    one has power while G keeps its direction, which depends on alpha alone, and weakly.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
         Gp, Gr = G[0, fie.surface], G[2, fie.surface]
@@ -152,8 +148,9 @@ def set_directions(isolation, G):
 def update_bank(bank, bound, x, x_old, F, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
-    x, x_old (3,) rad/s: measured now and a frame ago; F (3,) rad/s2: f + G u of the
-    healthy aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
+    nu = (x - x_old) / dt - F            nu_max = eta_bar + (n + n_old) / dt
+    eps <- a eps + dt nu                 mu = mu_eta + mu_n + n
+    mu_eta <- a mu_eta + dt eta_bar      mu_n <- a mu_n + (1 - a) n_old
     """
     for i in range(3):
         bank.output.innovation[i] = (x[i] - x_old[i]) / dt - F[i]
@@ -161,11 +158,7 @@ def update_bank(bank, bound, x, x_old, F, dt):
         for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
             bank.output.residual[m, i] = a * bank.output.residual[m, i] + dt * bank.output.innovation[i]
             bank.memory.mu_eta[m, i] = advance_bound(bank.memory.mu_eta[m, i], bound.eta_bar[i], a, dt)
-            bank.memory.mu_n[m, i] = advance_gyro(
-                bank.memory.mu_n[m, i],
-                bound.n_old[i],
-                a,
-            )
+            bank.memory.mu_n[m, i] = advance_gyro(bank.memory.mu_n[m, i], bound.n_old[i], a)
             bank.output.threshold[m, i] = bank.memory.mu_eta[m, i] + bank.memory.mu_n[m, i] + bound.n_gyro[i]
 
 
@@ -181,7 +174,7 @@ def bank_axis(bank):
 
 @kernel
 def filter_share(bank, m, i):
-    """The share of its bound that filter m reaches on axis i."""
+    """|eps| / mu of filter m on axis i."""
     mu = bank.output.threshold[m, i]
     return abs(bank.output.residual[m, i]) / mu if mu > 0.0 else 0.0
 
@@ -199,7 +192,7 @@ def nearest_filter(bank, i):
 
 @kernel
 def bank_share(bank):
-    """The largest share of its bound that a filter of the bank reaches."""
+    """The largest |eps| / mu in the bank."""
     best = 0.0
     for m in range(bank.config.n_filters):
         for i in range(3):
@@ -209,18 +202,17 @@ def bank_share(bank):
 
 @kernel
 def keep_bank_peak(bank):
-    """Keep the largest share of its bound that each filter has reached."""
+    """Keep the largest |eps| / mu that each filter has reached."""
     for m in range(bank.config.n_filters):
         for i in range(3):
-            bank.output.peak[m] = max(
-                bank.output.peak[m],
-                filter_share(bank, m, i),
-            )
+            bank.output.peak[m] = max(bank.output.peak[m], filter_share(bank, m, i))
 
 
 @kernel
 def fault_range(fie, i):
-    """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
+    """Least and greatest acceleration of axis i, rad/s2: base + theta Z +- e, theta in its set, or no fault
+    at all.
+    """
     base = fie.effect.base[i]
     Z = fie.effect.regressor[i]
     e = fie.effect.e[i]
@@ -233,8 +225,7 @@ def fault_range(fie, i):
 
 @kernel
 def parity_range(fie):
-    """Least and greatest acceleration, rad/s2, along `fie.parity_direction` (3,); else as
-    `fault_range`."""
+    """As `fault_range`, along the direction m of the estimator."""
     phi = fie.effect
     base = 0.0
     Z = 0.0
@@ -252,7 +243,10 @@ def parity_range(fie):
 
 @kernel
 def advance_reach(bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; index 3: `parity_direction`."""
+    """Advance the reach of the fault in each filter since the flight began; index 3: along m.
+
+    reach_lo <- a reach_lo + dt lo      reach_hi <- a reach_hi + dt hi
+    """
     for i in range(4):
         lo, hi = fault_range(fie, i) if i < 3 else parity_range(fie)
         for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
@@ -262,10 +256,9 @@ def advance_reach(bank, fie, dt):
 
 @kernel
 def is_reachable(bank, fie, shared):
-    """True if the residuals are within the reach of the fault, for any course of it since the flight began.
+    """True if reach_lo - mu <= eps <= reach_hi + mu for each filter and axis that is not skipped.
 
-    shared: the axes share one parameter; the residual along `parity_direction` is then tested as
-    well.
+    shared: the axes share one parameter; the residual along m is then tested as well.
     """
     for m in range(bank.config.n_filters):
         eps_m, mu_m = 0.0, 0.0
@@ -280,8 +273,7 @@ def is_reachable(bank, fie, shared):
     return True
 
 
-# Centres of the network's basis functions, rad; and its record. gain 1/s2, w_max rad/s2;
-# output: fhat, rad/s2.
+# Centres of the network's basis functions, rad; and its record. gain 1/s2, w_max rad/s2; output fhat, rad/s2.
 ALPHA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES_RAD = np.linspace(-0.3, 0.3, 5)
 N_BASIS = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
@@ -291,8 +283,7 @@ FDAE_NETWORK_RECORD = record(
     output=3,
 )
 
-# a: a. xhat: the estimate of the rates, rad/s; mu_eta,
-# mu_n rad/s: parts of the threshold. residual, threshold rad/s.
+# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; mu_eta, mu_n rad/s: its parts.
 FDAE_CONFIG_RECORD = record(pole_per_s=3, a=3)
 FDAE_MEMORY_RECORD = record(xhat=3, mu_eta=3, mu_n=3)
 FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
@@ -323,11 +314,10 @@ def configure_fdae(fdae: np.void, declared: Declared) -> None:
 
 @kernel
 def fill_gaussians(z, n, first, out):
-    """Fill out from first on with exp(-(z - j)^2 / 2), j = 0, 1, ...; return the sum of
-    their squares.
+    """Fill out from `first` on with exp(-(z - j)^2 / 2), j = 0, 1, ...; return the sum of their squares.
 
-    The ratio of a value and the one before is exp(z - j - 1/2). The ratio of two successive
-    ratios is 1 / e. So two exponentials are enough for all values.
+    The ratio of a value and the one before is exp(z - j - 1/2). The ratio of two successive ratios is 1 / e.
+    So two exponentials are enough for all values.
     """
     g = np.exp(-0.5 * z * z)
     ratio = np.exp(z - 0.5)
@@ -342,7 +332,7 @@ def fill_gaussians(z, n, first, out):
 
 @kernel
 def fill_basis(alpha, beta, out):
-    """Fill out (N_BASIS,) with the normalised radial basis functions at (alpha, beta), rad.
+    """Fill out (N_BASIS,) with Phi, the normalised radial basis functions at (alpha, beta), rad.
 
     Each width equals the spacing of its centres; outside the grid the nearest edge answers.
     """
@@ -355,7 +345,7 @@ def fill_basis(alpha, beta, out):
 
 @kernel
 def beyond_bound(eps, mu):
-    """D[eps]: zero inside the mu, the excess over it outside."""
+    """D[eps]: zero within the threshold mu, the excess over it outside."""
     if eps > mu:
         return eps - mu
     if eps < -mu:
@@ -365,7 +355,7 @@ def beyond_bound(eps, mu):
 
 @kernel
 def evaluate_network(net, alpha, beta):
-    """Fill network.output (3,) rad/s2 for the present alpha and beta."""
+    """fhat = W^T Phi, rad/s2, at the present alpha and beta."""
     fill_basis(alpha, beta, net.memory.Phi)
     for i in range(3):
         fhat = 0.0
@@ -376,7 +366,7 @@ def evaluate_network(net, alpha, beta):
 
 @kernel
 def train_network(net, eps, mu, leaks, dt):
-    """Advance the weights by one frame; residual and mu (3,) rad/s, dt s.
+    """W <- clip(exp(-leak dt) W + dt gain D[eps] Phi, w_max): the weights after a frame.
 
     leaks: the weights decay, because another estimate explains the fault.
     """
@@ -391,16 +381,13 @@ def train_network(net, eps, mu, leaks, dt):
 
 @kernel
 def start_fdae(fdae, n, x):
-    """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
-
-    n (3,) rad/s: on the changing part of the gyros' errors.
-    """
+    """Start at the first measurement x (3,): no residual, and all of the gyro's error n (3,) to come."""
     fdae.memory.xhat[:], fdae.memory.mu_n[:] = x, n
 
 
 @kernel
 def hold_fdae(fdae, mu):
-    """Replace the mu by a constant, rad/s."""
+    """Replace the threshold by a constant, rad/s."""
     fdae.output.threshold[:] = mu
 
 
@@ -418,17 +405,14 @@ def reset_network(net):
 
 @kernel
 def fdae_residual(fdae, x):
-    """Fill the residual for the measured x (3,) rad/s."""
+    """eps0 = x - xhat0."""
     for i in range(3):
         fdae.output.residual[i] = x[i] - fdae.memory.xhat[i]
 
 
 @kernel
 def alarm_axis(bank, authority, alarm):
-    """The axis on which a detector in authority raises the alarm, or -1.
-
-    alarm: `ALARM` of the statistical detector.
-    """
+    """The axis on which a detector in authority raises the alarm, or -1; alarm: ALARM_RECORD."""
     axis = bank_axis(bank) if authority != STATISTICAL_DETECTOR else -1
     if axis < 0 and authority != WORST_CASE_DETECTOR and alarm.ratio > 1.0:
         axis = alarm.axis
@@ -437,10 +421,12 @@ def alarm_axis(bank, authority, alarm):
 
 @kernel
 def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
-    """Advance the FDAE and its threshold by one frame; once `detected`, the network learns what
-    exceeds the threshold.
+    """Advance the FDAE and its threshold by a frame; once a fault is detected, the network learns what
+    exceeds mu.
 
-    x (3,) rad/s; F (3,) rad/s2 is f + G u, with the isolated fault once there is one.
+        xhat <- x + dt (F + fhat) + a (xhat - x)      mu as in `update_bank`
+
+    F (3,) rad/s2: with the isolated fault once there is one.
     """
     if detected:
         train_network(fdae.network, fdae.output.residual, fdae.output.threshold, leaks, dt)
@@ -449,21 +435,18 @@ def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
         a = fdae.config.a[i]
         fdae.memory.xhat[i] = x[i] + dt * F_hat + a * (fdae.memory.xhat[i] - x[i])
         fdae.memory.mu_eta[i] = advance_bound(fdae.memory.mu_eta[i], bound.eta_bar[i], a, dt)
-        fdae.memory.mu_n[i] = advance_gyro(
-            fdae.memory.mu_n[i],
-            bound.n_old[i],
-            a,
-        )
+        fdae.memory.mu_n[i] = advance_gyro(fdae.memory.mu_n[i], bound.n_old[i], a)
         fdae.output.threshold[i] = fdae.memory.mu_eta[i] + fdae.memory.mu_n[i] + bound.n_gyro[i]
 
 
 @kernel
 def fdae_unmodelled(fdae, n, out):
-    """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
+    """out = fhat + Lambda0 D[eps0], (3,) rad/s2: the acceleration that the FDAE estimates in addition to the
+    model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's n (3,) rad/s alone
-    explains stays out of it, and off the surfaces.
+    weights, at the bandwidth of the estimator. The dead zone is what the gyro's error alone explains: it
+    stays out of the estimate, and off the surfaces.
     """
     for i in range(3):
         mu_n = fdae.memory.mu_n[i] + n[i]

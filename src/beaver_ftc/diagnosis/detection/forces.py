@@ -13,6 +13,16 @@ mass. Noise of the accelerometers is model noise; their declared bias and slope 
 
 The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
 rate of the run before.
+
+Letters of the kernels. i is the force, f its record, k a term or an axis, s a surface; a force over m c,
+like e, is in rad/s2.
+
+    e, f_hat       innovation; force of the model
+    per_C          qdyn S / m c: e of a coefficient of one
+    Z, tol         regressor of a term; tolerance of its coefficient
+    G, Gu, e_G     e per rad of a surface; e at its command; bound on the error of G
+    L              e per rad/s of rotation of the air, 1/s
+    angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
 """
 
 import numpy as np
@@ -36,43 +46,30 @@ MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
 MAX_FORCE_LAG_S = 0.002
 DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
-SIDESLIP_RATE_TOLERANCES = {
-    False: 0.05,
-    True: 0.2,
-}  # of the term in the rate of sideslip: gusts have a part in it
+# Tolerance of the term in the rate of sideslip, by whether the air moves: gusts have a part in it.
+SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
 TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
 FORCE_RECORD = record(
-    innovation=float,  # e at the start of the elapsed frame, rad/s2
-    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
-    # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
-    e_inertial=float, angle=float, drift=float,
-    e_drift=float, Q_e=float,
+    innovation=float,  # e at the start of the elapsed frame
+    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; e per rad/s of
+    # drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
+    e_inertial=float, angle=float, drift=float, e_drift=float, Q_e=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    G=MAX_SURFACES,
-    G_prev=MAX_SURFACES,
-    Gu=MAX_SURFACES,
-    e_G=MAX_SURFACES,
+    G=MAX_SURFACES, G_prev=MAX_SURFACES, Gu=MAX_SURFACES, e_G=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane=2, vane_roll=float,
-    # variance of e in trim and now: with the vane, without it; (rad/s2)2
-    var_trim=2, var=2,
-    # e per rad/s of rotation of the air; bound on e by errors of deflections
-    L=3, eta_u=float,
-    f_hat=float,  # e of the model, rad/s2
-    e_lag=float,  # bound on its error by a time lag, rad/s2
-    # variance of e by noise of the accelerometer; independent of the pressure
-    var_acc=float,
+    var_trim=2, var=2,  # variance of e in trim and now, with the vane and without it, (rad/s2)2
+    L=3, eta_u=float, f_hat=float, e_lag=float,  # bounds on e by errors of deflections and by a time lag
+    var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
     n_Z=int, tol=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
 )  # fmt: skip
 FORCES_RECORD = record(
-    in_use=int, c_inv=float,  # whether forces are used
-    gravity=float, span=float,  # m/s2; m
-    q_trim=float, q_noise=float,  # Pa
-    q_ratio=float,  # forces scale with it
+    in_use=int, c_inv=float, gravity=float, span=float,  # whether forces are used; 1/m; m/s2; m
+    q_trim=float, q_noise=float, q_ratio=float,  # dynamic pressure: in trim, noise, Pa; over that in trim
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     CY_bdot=float, angle_rate=2,
     n_seen=int,  # updates so far, up to MIN_UPDATES
@@ -94,12 +91,7 @@ def update_both_forces(forces, gust, meas, u, dt):
     for i in range(2):
         f_prev = forces.component[i].f_hat
         update_force(forces, gust, i, meas, u)
-        bound_lag(
-            forces.component[i],
-            f_prev,
-            forces.n_seen,
-            dt,
-        )
+        bound_lag(forces.component[i], f_prev, forces.n_seen, dt)
         update_inertial(forces, forces.component[i], i, meas.y, dt)
     fill_angle_rates(forces, meas)
     forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
@@ -107,16 +99,17 @@ def update_both_forces(forces, gust, meas, u, dt):
 
 @kernel
 def bound_lag(f, f_prev, seen, dt):
-    """Fill `e_lag` from the change of the model's e since
-    `f_prev`: force and flow differ in time."""
+    """Fill e_lag = MAX_FORCE_LAG_S |f_hat - f_prev| / dt, 0 unless seen: force and flow differ in time."""
     f.e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if seen else 0.0
 
 
 @kernel
 def fill_vaneless_y(forces, w, y):
-    """Fill `y` with the readings y, but alpha and beta worked out from the forces.
+    """Fill `y_free` with the readings y, but alpha and beta worked out from the forces.
 
-    w (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
+        y_free = y - (e / q_ratio + L' w) / vane[1]
+
+    w (3,) rad/s: rotation of the air in body axes; it damps like the aircraft's own rotation.
     """
     forces.y_free[:] = y
     for i in range(2):
@@ -138,7 +131,10 @@ def drop_forces(forces, gust, inertial):
 
 @kernel
 def update_inertial(forces, f, i, y, dt):
-    """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
+    """Integrate the flow angle of a vane from inertial motion, and fill the innovation of force i at it.
+
+    angle <- angle + dt angle_rate      e_inertial = e - slope (y - angle)      e_drift = sum dt slope
+    """
     angle = y[BETA if i == SIDE_INDEX else ALPHA]
     slope = f.vane[1] * forces.q_ratio
     f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
@@ -148,7 +144,12 @@ def update_inertial(forces, f, i, y, dt):
 
 @kernel
 def update_force(forces, gust, i, meas, u):
-    """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
+    """Update force i: its innovation e, the effects of surfaces, and the regressors of its errors.
+
+        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c      e = a_i / c - f_hat
+
+    The last regressors are the term in the rate of sideslip, f_bdot, and f_hat itself.
+    """
     table, f = gust.memory.table, forces.component[i]
     first = table.free_from[SIDE_ROW + i]
     end = table.surface_to[SIDE_ROW + i]
@@ -188,7 +189,9 @@ def update_force(forces, gust, i, meas, u):
 def fill_angle_rates(forces, meas):
     """Fill `angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
-    They follow from accelerometers, rates, attitude and flow.
+        a = f + gravity      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
+
+    f (3,) m/s2: accelerometers; x (3,) rad/s.
     """
     g, x, f = forces.gravity, meas.x, meas.force
     phi, th = meas.attitude[0], meas.attitude[1]
@@ -207,21 +210,16 @@ def fill_angle_rates(forces, meas):
 
 
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
-    """The terms of one direction, as `update_force` goes through them."""
+    """The terms of force i, as `update_force` goes through them."""
     return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]
 
 
 def configure_forces(
-    fdi: np.void,
-    declared: Declared,
-    trim: TrimState,
-    slopes: np.ndarray,
-    dt: float,
+    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, dt: float
 ) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
-    slopes (3, y.size): the slopes of the angular accelerations with y. dt: of a
-    frame.
+    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
     """
     y = trim[1]
     stat = fdi["statistical"]
@@ -239,12 +237,7 @@ def configure_forces(
 
 
 def _configure_force(
-    fdi: np.void,
-    declared: Declared,
-    trim: TrimState,
-    slopes: np.ndarray,
-    i: int,
-    dt: float,
+    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
 ) -> None:
     """Fill the record of one force; the arguments are those of `configure_forces`."""
     y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
@@ -254,24 +247,13 @@ def _configure_force(
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
     f_all = per_C * _force_slopes(aircraft, FORCE_NAMES[i], trim)
     f_y = f_all[:-1]
-    f["vane"] = (
-        -slopes[axis, vane],
-        -f_y[vane],
-    )
+    f["vane"] = (-slopes[axis, vane], -f_y[vane])
     f["vane_roll"] = -slopes[0, vane]
     f["L"] = f_y[3:]
     f["var_trim"] = _force_variances(fdi, errors, y, f_all, vane)
     std = errors[ACCELEROMETERS[1 + i]].random
     f["var_acc"] = (forces["c_inv"] * std) ** 2
-    _configure_terms(
-        f,
-        declared,
-        terms,
-        y,
-        f_y[vane] / per_C,
-        i,
-        forces["c_inv"],
-    )
+    _configure_terms(f, declared, terms, y, f_y[vane] / per_C, i, forces["c_inv"])
     f_u = per_C * sum(abs(term.value) for term in terms if term.surface)
     f["eta_u"] = f_u * declared.deflection_rad
     f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
@@ -280,13 +262,12 @@ def _configure_force(
 
 
 def _force_variances(
-    fdi: np.void,
-    errors: SensorErrors,
-    y: np.ndarray,
-    f_all: np.ndarray,
-    vane: int,
+    fdi: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, and without that of its vane."""
+    """Variance of a predicted force by the noise of all readings, and without that of its vane.
+
+    f_all (7,): slopes of the force as of `_force_slopes`.
+    """
     f_y = f_all[:-1].copy()
     f_dpt = f_all[-1]
     dpt_V, var_dpt = _slipstream_noise(y, fdi["bound"]["declared_errors"], errors)
@@ -323,13 +304,7 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 
 
 def _configure_terms(
-    f: np.void,
-    declared: Declared,
-    terms: list[Term],
-    y: np.ndarray,
-    C_vane: float,
-    i: int,
-    c_inv: float,
+    f: np.void, declared: Declared, terms: list[Term], y: np.ndarray, C_vane: float, i: int, c_inv: float
 ) -> None:
     """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
     pressure do; of the accelerometer's bias, m/s2; of the whole."""
@@ -354,17 +329,13 @@ def _configure_terms(
 
 
 def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
-    """A force coefficient at x (3,) rad/s, y, u rad."""
+    """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
     geometry, V = aircraft.geometry, y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
     values |= dict(
-        zip(
-            ("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE),
-            (y[0], y[1], *rates, 0.0),
-            strict=True,
-        )
+        zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *rates, 0.0), strict=True)
     )
     return float(aircraft.coefficient(name, values))
 

@@ -51,6 +51,26 @@ and the evidence that it contributes is subtracted.
 
 Onsets: slot j restarts every 2^(j+1) frames, so that onsets of about every age exist at any time. After an
 alarm no slot restarts, and old evidence decays slowly.
+
+Letters of the kernels. A block b has n axes, 1 or 2; i is an axis, j a regressor, k an onset test; a digit
+at the end is an axis.
+
+    nu, v          innovation of the frame; input of a filter, rad/s2
+    x              state of a filter: e of two axes, rad/s, then d of two axes, rad/s2
+    g              whitened response, rad/s: to nu; g_Z to a regressor, g_c to a coarse gust, g_s to s
+    a              decay of the drift d in a frame
+    P, Q, R_y      covariance of e (xx) and d (dd); noise of e (Q_x), (rad/s2)2, of d (Q_d), (rad/s2)2/s,
+                   and of the readings, (rad/s)2
+    S_inv, K       S^-1, s2/rad2; gains of e (K_x) and of d (K_d), 1/s
+    s, w           signature since the onset, rad/s2; S^-1 g_s, s/rad
+    N, D           sums as above; N_p, N_c: shares of N by p = lambda (g - g_0) and by a coarse gust
+    Z, tol, R      regressor, rad/s2; its tolerance; R_j
+    e_R            sum tol |R|
+    eta, eta_0     eta_bar, rad/s2; eta_bar |g_0|, rad/s
+    eta_r          eta_bar RINGING / K_d, rad/s
+    eta_rate       omega dt
+    e_0, e_tv, e_w shares of |N| by eta_bar: sums of eta_0 |w|, eta_r TV(w), eta_r eta_rate |w|
+    th             theta
 """
 
 from collections.abc import Sequence
@@ -64,11 +84,8 @@ from beaver_ftc.diagnosis.state import LOSS
 
 # A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
 # filter is e, then d.
-PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = (
-    0,
-    1,
-    2,
-)  # the last: roll and yaw again, with a drift that returns to zero
+# The last: roll and yaw again, with a drift that returns to zero.
+PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = 0, 1, 2
 N_FILTER_BLOCKS = 3
 N_SLOTS = 10
 N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: statistical.py
@@ -76,13 +93,7 @@ USUAL_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, 
 MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
-SIGN_OF_KIND = {
-    LOSS: -1.0,
-    STEP_FAULT: 0.0,
-    ALPHA_CUBED_MOMENT: 0.0,
-    GROWING_LOSS: -1.0,
-    LOSS_END: 1.0,
-}
+SIGN_OF_KIND = {LOSS: -1.0, STEP_FAULT: 0.0, ALPHA_CUBED_MOMENT: 0.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}
 
 DRIFT_PRIOR_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
 LOSS_PRIOR = 12.0  # one over the variance of a loss that is uniform on [0, 1]
@@ -113,44 +124,34 @@ class BlockCapacity(NamedTuple):
 
 
 # An onset test is one hypothesis with one onset. Those of a few hypotheses lie side by side for vector
-# instructions: test (h % GROUP_SIZE) * N_SLOTS + slot in group
-# h // GROUP_SIZE. A group has the same size in every record, so compiled code knows that its
-# arrays do not overlap. Checking that in each frame took a tenth of the detector's time.
+# instructions: test (h % GROUP_SIZE) * N_SLOTS + slot in group h // GROUP_SIZE. A group has the same size in
+# every record, so compiled code knows that its arrays do not overlap. Checking that in each frame took a
+# tenth of the detector's time.
 GROUP_SIZE = 4
 N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
 TESTS_RECORD = record(
     supporting_correlation_sign=N_GROUP_TESTS,  # sign of N that supports the hypothesis, or 0
-    s=(2, N_GROUP_TESTS),  # s since the onset, rad/s2
-    x_s=(4, N_GROUP_TESTS),
-    w=(2, N_GROUP_TESTS),  # w = S^-1 g_s of the frame
-    correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # N; D
-    e_R=N_GROUP_TESTS,  # sum_j tol_j |R_j|
-    # exp(-kappa t) of a growing loss; 1 until a loss has ended
-    left=N_GROUP_TESTS,
-    s_end=(2, N_GROUP_TESTS),  # rad/s2
-    # shares of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its rate of
-    # change
-    e_0=N_GROUP_TESTS,
-    e_tv=N_GROUP_TESTS,
-    e_w=N_GROUP_TESTS,
-    # shares of N: of lambda p; of a roughly visible gust
-    N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,
-    score=N_GROUP_TESTS,
-    llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
+    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS),  # signature since the onset, rad/s2; state of its filter
+    w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
+    e_R=N_GROUP_TESTS,
+    # exp(-kappa t) of a growing loss, or 1 until a loss has ended; signature at the end of a loss, rad/s2
+    left=N_GROUP_TESTS, s_end=(2, N_GROUP_TESTS),
+    e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
+    N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,  # N_p; N_c
+    score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
     llr=N_GROUP_TESTS,  # log-likelihood ratio
 )  # fmt: skip
 
 
 _FILTER_FIELDS = {
-    "n": int, "a": float, "state": 4, "g": 2,
-    "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "Q_d": (2, 2), "Q_x": 2,
-    "R_y": 2, "S_inv": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
+    "n": int, "a": float, "state": 4, "g": 2, "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "Q_d": (2, 2),
+    "Q_x": 2, "R_y": 2, "S_inv": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
 FILTER_RECORD = record(**_FILTER_FIELDS)
 
 
 def set_signs(b: np.void, kinds: Sequence[int]) -> None:
-    """Fill the sign of N that supports each hypothesis, in all of its onset tests."""
+    """Fill the sign of N that supports each hypothesis of a block, in all of its onset tests."""
     b["tests"]["supporting_correlation_sign"] = 0.0
     for h, kind in enumerate(kinds):
         k = (h % GROUP_SIZE) * N_SLOTS
@@ -168,23 +169,17 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
+        # length of the drift's memory, m, 0 for none; factor on the intensity of a gust
         drift_correlation_length_m=float, Q_scale=float,
-        x_known=4,
-        nu=2,  # rad/s2
-        # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
-        calm=FILTER_RECORD, p=2, pg=float,
-        pp=float,
-        # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
-        has_coarse=int, g_c=2, x_c=4,
-        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty;
-        # omega dt of that uncertainty; its responses: see `bound_responses`
-        alarm_level=float, noise_share=float, eta_rate=float,
-        eta_0=2, eta_r=2,
+        x_known=4, nu=2,  # state of the filter after known faults
+        calm=FILTER_RECORD, p=2, pg=float, pp=float,  # in turbulence: filter without gust; p; sums of lambda
+        has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust roughly; state of its filter
+        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
+        alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
         n_Z=int, tol=size.max_regressors, regressor=(size.max_regressors, 2),
         x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
         tests=(TESTS_RECORD, max_test_groups(size)),
-        # R_j of each onset test
         R=(max_test_groups(size), size.max_regressors, N_GROUP_TESTS),
     )  # fmt: skip
 
@@ -192,22 +187,19 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
 def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
-    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
+    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise.
+    """
     blocks, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
     b, x, d = blocks[0], slice(0, n), slice(n, 2 * n)
     b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
-    for name, i, j in (
-        ("P_xx", x, x),
-        ("P_xd", x, d),
-        ("P_dd", d, d),
-    ):
+    for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
         b[name][:n, :n] = P[i, j]
     return blocks
 
 
 @kernel
 def invert_symmetric(n, S):
-    """Replace the leading n x n part of a symmetric S (2, 2), n at most 2, by its inverse."""
+    """S <- S^-1, in place; S (n, n) symmetric, n at most 2."""
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
         return
@@ -219,7 +211,12 @@ def invert_symmetric(n, S):
 
 @kernel
 def predict_covariance(b, dt):
-    """Predict the covariances over a frame of dt s, and fill `S_inv` with S, yet to be inverted."""
+    """Predict the covariances over a frame of dt s:
+
+        P <- F P F' + Q,  F = [1 dt; 0 a],  Q = [dt^2 Q_x 0; 0 dt Q_d]        S = P_xx + R_y
+
+    `S_inv` is filled with S, yet to be inverted.
+    """
     P_xx, P_xd, P_dd, S = b.P_xx, b.P_xd, b.P_dd, b.S_inv
     for i in range(b.n):
         for j in range(b.n):
@@ -269,10 +266,11 @@ def advance_covariance(b, dt):
 
 @kernel
 def whiten_step(b, x, v, dt, g):
-    """Advance the filter by one frame of v (2,) rad/s2; dt s.
+    """Advance the filter of a block by one frame of the input v (2,) rad/s2:
 
-    x (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g;
-    that of the innovation has covariance S.
+        g = e + dt (v - d)      e <- g - K_x g      d <- a d + K_d g
+
+    x (4,): e, d; advanced in place. g (2,) rad/s, filled: of the innovation it has the covariance S.
     """
     for i in range(b.n):
         g[i] = x[i] + dt * (v[i] - x[2 + i])
@@ -287,7 +285,7 @@ def whiten_step(b, x, v, dt, g):
 
 @kernel
 def whiten_regressors(b, dt):
-    """Whiten all Z as `whiten_step` does.
+    """Advance the filter of each regressor Z as `whiten_step` does: x_Z, g_Z.
 
     In a block of one axis all values of a second axis are zero.
     """
@@ -311,24 +309,18 @@ def whiten_regressors(b, dt):
 
 @kernel
 def whiten_calm(b, dt):
-    """Whiten the frame, `nu`, rad/s2, by the filter without gust; dt s."""
+    """Whiten nu by the filter without gust; dt s."""
     advance_covariance(b.calm, dt)
-    whiten_step(
-        b.calm,
-        b.calm.state,
-        b.nu,
-        dt,
-        b.calm.g,
-    )
+    whiten_step(b.calm, b.calm.state, b.nu, dt, b.calm.g)
 
 
 @kernel
 def update_calm_part(b, dt):
-    """Fill `p` (2,) rad/s with lambda p, the part of g that calm air makes
-    predictable.
+    """Fill `p` (2,) rad/s with lam p, the part of g that calm air makes predictable.
 
-    lambda is estimated over the last CALM_MEMORY_S. `whiten_calm` must have run for
-    this frame.
+        p = g - g_0      lam = sum p' S^-1 g / sum p' S^-1 p
+
+    The sums, pg and pp, are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before.
     """
     calm = b.calm
     p = b.p
@@ -351,7 +343,7 @@ def update_calm_part(b, dt):
 
 @kernel
 def restarting_slot(k):
-    """The slot that restarts at a frame: slot j at odd multiples of 2^j, the last at all other frames."""
+    """The slot that restarts at frame k: slot j at odd multiples of 2^j, the last at all other frames."""
     j = 0
     while k % 2 == 0 and j < N_SLOTS - 1:
         k //= 2
@@ -361,7 +353,7 @@ def restarting_slot(k):
 
 @kernel
 def tests_in_group(b, i):
-    """The number of onset tests in use in group g: the first entries of each array."""
+    """The number of onset tests in use in group i: the first entries of each array."""
     return min(b.n_h - i * GROUP_SIZE, GROUP_SIZE) * N_SLOTS
 
 
@@ -391,10 +383,9 @@ def reset_slot(b, slot):
 
 @kernel
 def bound_responses(b, eta, dt):
-    """Fill `eta_0` and `eta_r` (2,) with eta_bar |g_0|
-    and eta_bar RINGING / K_d.
+    """Fill `eta_0` = eta_bar |g_0| and `eta_r` = eta_bar RINGING |K_d^-1|, (2,); eta (3,) rad/s2: eta_bar.
 
-    eta (3,) rad/s2: eta_bar.
+    g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      K_d^-1: cofactors c over det
     """
     K_d, lost = b.K_d, 1.0 - b.a
     det = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if b.n > 1 else K_d[0, 0]
@@ -410,10 +401,10 @@ def bound_responses(b, eta, dt):
 
 @kernel
 def update_signatures(h, t, first):
-    """Fill `s`, rad/s2, of a h for each onset, from test `first` on.
+    """Fill s (2,) rad/s2 of hypothesis h for each of its onsets, tests first, first + 1, ...
 
-    It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
-    of the onset.
+    It is the signature of the frame; for a growing loss times 1 - left, left = exp(-kappa t); for the end of
+    a loss that of the onset, s_end.
     """
     s0, s1 = h.signature[0], h.signature[1]
     for k in range(first, first + N_SLOTS):
@@ -436,10 +427,14 @@ def update_signatures(h, t, first):
 
 @kernel
 def accumulate_tests(b, t, n, dt, decay):
-    """Whiten `s` of the first n tests, and add the frame to N, D and the bounds on N.
+    """Whiten s of the first n tests of a group t, and add the frame to their sums:
 
-    forget: factor by which earlier sums decay. In a block of one axis all values of a second
-    axis are zero.
+        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s      N_p <- decay N_p + w' p
+        e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
+        e_w <- decay e_w + eta_rate eta_r' |w|
+
+    gs0, gs1: g_s; x00 ... d11: entries of K_x and K_d; r0, r1, c0, c1: entries of eta_r and eta_0. In a block
+    of one axis all values of a second axis are zero.
     """
     K_x, K_d, S_inv = b.K_x, b.K_d, b.S_inv
     x00, x01 = K_x[0, 0], K_x[0, 1]
@@ -482,8 +477,9 @@ def accumulate_tests(b, t, n, dt, decay):
 
 @kernel
 def accumulate_regressors(b, t, R, n, decay):
-    """Add the frame to R_j of n onset tests, `R` (regressors, tests), and fill their
-    `e_R`.
+    """Add the frame to R (regressors, tests) of the first n tests of a group t, and fill their e_R:
+
+        R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
 
     Regressors go in pairs: weight and bound then pass through memory half as often. LLVM makes vector
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
@@ -516,14 +512,11 @@ def accumulate_regressors(b, t, R, n, decay):
 
 @kernel
 def accumulate_gust(b, t, n, decay):
-    """Add the frame to the share of N that a roughly visible gust contributes.
+    """Add the frame to the share of N that a coarse gust contributes: N_c <- decay N_c + w' g_c.
 
-    `accumulate_tests` must have filled the weights of the frame.
+    `accumulate_tests` must have filled w.
     """
-    g0, g1 = (
-        b.g_c[0],
-        b.g_c[1],
-    )
+    g0, g1 = (b.g_c[0], b.g_c[1])
     for k in range(n):
         t.correlation_from_coarse_gust[k] = decay * t.correlation_from_coarse_gust[k] + (
             t.w[0, k] * g0 + t.w[1, k] * g1
@@ -532,14 +525,12 @@ def accumulate_gust(b, t, n, decay):
 
 @kernel
 def accumulate_evidence(b, with_Z, dt, decay):
-    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by
-    `decay`."""
+    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `decay`.
+
+    with_Z: whether the regressors count; dt s.
+    """
     for h in range(b.n_h):
-        update_signatures(
-            b.hypothesis[h],
-            b.tests[h // GROUP_SIZE],
-            (h % GROUP_SIZE) * N_SLOTS,
-        )
+        update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
     for i in range(n_test_groups(b)):
         t, n = b.tests[i], tests_in_group(b, i)
         accumulate_tests(b, t, n, dt, decay)
@@ -551,15 +542,12 @@ def accumulate_evidence(b, with_Z, dt, decay):
 
 @kernel
 def uncertain_share(t, k, r0, r1):
-    """The largest share of |N| in test k that a bounded uncertainty explains.
+    """The share of |N| in test k that a bounded uncertainty explains: e_0 + min(e_tv + eta_r' |w|, e_w).
 
-    r0, _1: the two entries of the block's `eta_r`.
+    r0, r1: eta_r. eta_r' |w| is the variation when the weight drops to zero at the end.
     """
     drop = r0 * abs(t.w[0, k]) + r1 * abs(t.w[1, k])
-    return t.e_0[k] + min(
-        t.e_tv[k] + drop,
-        t.e_w[k],
-    )
+    return t.e_0[k] + min(t.e_tv[k] + drop, t.e_w[k])
 
 
 @kernel
@@ -570,9 +558,9 @@ def is_one_sided(kind):
 
 @kernel
 def max_llr(signed, N, D):
-    """Largest log-likelihood ratio of a fault against none, for N N and D D.
+    """Largest log-likelihood ratio of a fault against none: N^2 / 2 D.
 
-    It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
+    If signed, |theta| is at most 1, as that of a loss: N - D / 2 where N > D.
     """
     llr = 0.5 * N * N / D
     if signed and N > D:
@@ -583,31 +571,26 @@ def max_llr(signed, N, D):
 
 @kernel
 def evidence_ratio(level, share, N, eta, D):
-    """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
+    """Evidence over what noise, and uncertainty with noise, allow.
 
-    eta: the share of the evidence that a bounded uncertainty explains; level:
-    of the alarm; share: share of the level that is reserved for noise in addition. The
-    result is compared with the level.
+        N / max(sqrt(D), eta / level + share sqrt(D))
+
+    eta: share of N that a bounded uncertainty explains. level: that of the alarm, with which the result is
+    compared; share: share of it that is reserved for noise in addition.
     """
     std = sqrt(D)
-    return N / (
-        std
-        if eta <= 0.0
-        else max(
-            std,
-            eta / level + share * std,
-        )
-    )
+    return N / (std if eta <= 0.0 else max(std, eta / level + share * std))
 
 
 @kernel
 def evaluate_tests(b, t, n, without_eta, mapped):
-    """Fill the score and the log-likelihood ratios of n onset tests; those of a test without information are
-    0.
+    """Fill the score and the log-likelihood ratios of the first n tests of a group t; 0 without information.
 
-    without_eta: the bounds on the ratios leave out the bounded uncertainty.
-    mapped: the bounds on hypotheses other than a loss always include it,
-    because the model's error is mapped: it is then large and lasting.
+        score = (N_s - e) over noise and eta      llr(N_s)      llr_lo, llr_hi: llr(N_s -+ (e + eta))
+
+    N_s: sign N, or |N| without a sign; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); eta: `uncertain_share`.
+    without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
+    always include it, because the model's error is mapped: it is then large and lasting.
     """
     sign = t.supporting_correlation_sign
     r0 = b.eta_r[0]
@@ -623,13 +606,7 @@ def evaluate_tests(b, t, n, without_eta, mapped):
         N_s = sign[k] * N if signed else abs(N)
         eta = uncertain_share(t, k, r0, r1)
         e_all = e + (eta if mapped and not signed else weight * eta)
-        score = evidence_ratio(
-            level,
-            share,
-            N_s - e,
-            eta,
-            D,
-        )
+        score = evidence_ratio(level, share, N_s - e, eta, D)
         llr = max_llr(signed, N_s, D)
         lo = max_llr(signed, N_s - e_all, D)
         hi = max_llr(signed, N_s + e_all, D)
@@ -641,27 +618,18 @@ def evaluate_tests(b, t, n, without_eta, mapped):
 
 @kernel
 def evaluate_hypotheses(b, decay=0.0, mapped=False):
-    """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hyp.
+    """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
-    decay: if a loss may end, the factor by which earlier upper bounds decay;
-    else 0. mapped: see `evaluate_tests`.
+    They are the largest over its onsets. decay: if a loss may end, the factor by which earlier upper bounds
+    decay; else 0. mapped: see `evaluate_tests`.
     """
     for i in range(n_test_groups(b)):
-        evaluate_tests(
-            b,
-            b.tests[i],
-            tests_in_group(b, i),
-            decay > 0.0,
-            mapped,
-        )
+        evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
     for h, hyp in enumerate(b.hypothesis[: b.n_h]):
         t = b.tests[h // GROUP_SIZE]
         first = (h % GROUP_SIZE) * N_SLOTS
         score, best, k_best = 0.0, -1.0, -1
-        lo, hi = (
-            0.0,
-            decay * hyp.llr_hi,
-        )
+        lo, hi = (0.0, decay * hyp.llr_hi)
         for k in range(first, first + N_SLOTS):
             score = max(score, t.score[k])
             lo = max(lo, t.llr_lo[k])
@@ -673,28 +641,15 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
         if k_best >= 0:
             N = t.correlation[k_best]
             D = t.information[k_best]
-            hyp.th, hyp.D = (
-                estimate_theta(hyp.kind, N, D),
-                D,
-            )
+            hyp.th, hyp.D = (estimate_theta(hyp.kind, N, D), D)
 
 
 @kernel
-def update_block(
-    b,
-    eta,
-    with_Z,
-    dt,
-    decay,
-    hi_decay=0.0,
-    mapped=False,
-):
-    """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
+def update_block(b, eta, with_Z, dt, decay, hi_decay=0.0, mapped=False):
+    """Update a block with one frame of the innovation nu: whiten it and test every hypothesis; dt s.
 
-    The innovation, rad/s2, is in `nu`. Noise, drift, signatures and, if `with_Z`,
-    regressors are those of the frame. eta: see `bound_responses`;
-    decay: `accumulate_evidence`; hi_decay,
-    mapped: `evaluate_hypotheses`.
+    Noise, drift, signatures and, if with_Z, regressors are those of the frame. eta: see `bound_responses`;
+    decay: `accumulate_evidence`; hi_decay and mapped: `evaluate_hypotheses`.
     """
     advance_covariance(b, dt)
     if b.alarm_level > 0.0:
@@ -712,7 +667,7 @@ def update_block(
 
 @kernel
 def estimate_theta(kind, N, D):
-    """The most likely theta; for a loss with a prior that is uniform on its set [-1, 0]."""
+    """The most likely theta: N / D; for a loss with a prior that is uniform on its set [-1, 0]."""
     if not is_one_sided(kind):
         return N / D
     th = (N - 0.5 * LOSS_PRIOR) / (D + LOSS_PRIOR)
@@ -721,9 +676,6 @@ def estimate_theta(kind, N, D):
 
 @kernel
 def set_coarse_gust(b, acc):
-    """Store acc (3,) rad/s2, of the coarsely estimated gust, in `g_c`.
-
-    `update_block` whitens it in place.
-    """
+    """Store acc (3,) rad/s2, the effect of the coarse gust, in g_c, where `update_block` whitens it."""
     for i, axis in enumerate(b.axes[: b.n]):
         b.g_c[i] = acc[axis]

@@ -50,6 +50,17 @@ N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with
 
 The sums are updated once per TONE_INTERVAL_S: no frequency of the grid changes its phase much in that
 time.
+
+Letters of the kernels, beside those of likelihood.py: i and k are an axis or a force, j a regressor; in the
+tests of tones k is a frequency, t their record, c their configuration.
+
+    m, col      direction of a view and g / |g|, (5,): roll, pitch, yaw, side force, normal force
+    b, f        block of a view; record of a force; `rates`: block of the rates that the view combines
+    nu          innovation of the rates (3,), rad/s2
+    L           acceleration per rad/s of rotation of the air, 1/s
+    N, R        (2, N_TONES), (n_Z, 2, N_TONES): sums as above, real and imaginary part
+    z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
+    cfg         configuration of the statistical tests
 """
 
 from collections.abc import Iterator
@@ -80,11 +91,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     BlockCapacity,
     evidence_ratio,
 )
-from beaver_ftc.diagnosis.gusts import (
-    full_drift,
-    project_gust,
-    remaining_drift,
-)
+from beaver_ftc.diagnosis.gusts import full_drift, project_gust, remaining_drift
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 
 N_TONES = 16
@@ -94,8 +101,7 @@ TONE_MEMORY_S = 2.5
 TONES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
 TONE_INTERVAL_S = 0.04
 # Share of the alarm level reserved for noise in addition to a bounded uncertainty. It is reserved without
-# noise too, because `tone_gain` assumes constant gains, and the gains vary with a varying
-# bound.
+# noise too, because `tone_gain` assumes constant gains, and the gains vary with a varying bound.
 TONE_NOISE_SHARE = 0.5
 # The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
 MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
@@ -103,16 +109,11 @@ MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
 # Configuration that all views share.
 TONE_RECORD = record(
     V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
-    stride=int, alarm_level=float,  # alarm level, standard deviations
-    a=float,  # factor by which a sum decays from one update to the next
-    # (cos, sin) of the phase change per frame; per update, and twice that, both times
-    # `a`
-    z=(2, N_TONES), rho=(2, N_TONES),
-    rho2=(2, N_TONES),
-    # largest mean of cos(w t) d(t) for a bounded uncertainty |d| <= 1
-    c=N_TONES,
-    # larger variance of real and imaginary part of N; the sum of both is 1
-    v_share=N_TONES,
+    stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
+    # decay of a sum in an update; cos and sin of w dt; of an update, times a, of w and of 2 w
+    a=float, z=(2, N_TONES), rho=(2, N_TONES), rho2=(2, N_TONES),
+    # largest mean of cos(w t) d(t) for |d| <= 1; share of the larger of the variances of N's two parts
+    c=N_TONES, v_share=N_TONES,
 )  # fmt: skip
 
 
@@ -120,16 +121,11 @@ TONE_RECORD = record(
 def tones_dtype(n_Z: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
-        # frames since the last update; sums since then of g and of n_Z, over the deviation of g
-        n_new=int, sum_g=float, sum_Z=n_Z,
-        # N and R_j: real and imaginary parts
-        correlation=(2, N_TONES), R=(n_Z, 2, N_TONES),
-        # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, two
-        # sums over the filtered bound: of the bound, and of its component at twice the frequency
-        e_R=N_TONES,
-        uncertain_share=N_TONES,
-        b_0=N_TONES,
-        b_2=(2, N_TONES),
+        n_new=int, sum_g=float, sum_Z=n_Z,  # frames since the last update; sums of g and g_Z over sqrt(S)
+        correlation=(2, N_TONES), R=(n_Z, 2, N_TONES),  # N and R_j: real and imaginary parts
+        # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
+        # filtered bound, and over its component at twice the frequency
+        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(2, N_TONES),
         D=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
     )  # fmt: skip
@@ -147,10 +143,10 @@ def within_limits(c, y):
 
 @kernel
 def update_tones(view, c, level, inside, with_Z, dt):
-    """Update the tests of a view with one frame, which the view's block has whitened; dt s.
+    """Update the tests of tones of a view with one frame, which the view's block has whitened; dt s.
 
-    regress: whether the regressors of the block count. Without `inside` the frame counts
-    as zero, so the sums decay.
+    level: alarm level of the detector, standard deviations. with_Z: whether the regressors count. Unless
+    `inside`, the frame counts as zero, so the sums decay.
     """
     t, b = view.tones, view.block
     n_Z = b.n_Z if with_Z else 0
@@ -174,8 +170,7 @@ def update_tones(view, c, level, inside, with_Z, dt):
 
 @kernel
 def resonate(c, N, v):
-    """Advance N at every frequency, N (2, N_TONES), by one update: rotate, decay,
-    add the drive."""
+    """N <- rho N + v at each frequency: an update of N (2, N_TONES), real and imaginary part, by v."""
     rho = c.rho
     for j in range(N.shape[1]):
         re = N[0, j]
@@ -186,9 +181,10 @@ def resonate(c, N, v):
 
 @kernel
 def tone_gain(K_x, K_d, a, cos, sin, dt):
-    """Amplitude, rad/s, of the whitened response to a tone of amplitude 1 rad/s2, at constant filter gains.
+    """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
 
-    cos, sin: of the change of the tone's phase per frame, of dt s.
+    g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
+    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = cos + i sin = exp(i w dt)
     """
     q = (cos - a) * (cos - a) + sin * sin
     re = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - a) / q
@@ -198,16 +194,17 @@ def tone_gain(K_x, K_d, a, cos, sin, dt):
 
 @kernel
 def update_tone_eta(t, c, b, eta, dt):
-    """Update `uncertain_share`: the most that a bounded uncertainty adds to |N|.
+    """Update `eta`: the most that a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|.
 
-    eta: eta_bar, the bound on |d|, over the standard deviation of g.
+        b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = eta n_new
+
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
     rho2 = c.rho2
     a = c.a
     v = eta * t.n_new
-    for j in range(t.uncertain_share.size):
+    for j in range(t.eta.size):
         cos = c.z[0, j]
         sin = c.z[1, j]
         Wv = v * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, cos, sin, dt)
@@ -216,21 +213,14 @@ def update_tone_eta(t, c, b, eta, dt):
         t.b_2[0, j] = rho2[0, j] * re - rho2[1, j] * im + Wv
         t.b_2[1, j] = rho2[1, j] * re + rho2[0, j] * im
         t.b_0[j] = a * t.b_0[j] + Wv
-        t.uncertain_share[j] = c.c[j] * (
-            t.b_0[j]
-            + np.hypot(
-                t.b_2[0, j],
-                t.b_2[1, j],
-            )
-        )
+        t.eta[j] = c.c[j] * (t.b_0[j] + np.hypot(t.b_2[0, j], t.b_2[1, j]))
 
 
 @kernel
 def bound_coefficients(t, tol, n_Z):
-    """Fill `e_R`: the most that the declared errors of the first n
-    coefficients add to |N|.
+    """Fill e_R = sum_j tol_j |R_j|: the most that the errors of the first n_Z coefficients add to |N|.
 
-    The magnitude of R_j is at most its larger part plus (sqrt 2 - 1) times its smaller part.
+    |R_j| is at most its larger part plus (sqrt 2 - 1) times its smaller part.
     """
     t.e_R[:] = 0.0
     for j in range(n_Z):
@@ -244,21 +234,12 @@ def bound_coefficients(t, tol, n_Z):
 
 @kernel
 def score_tones(t, c, level):
-    """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
+    """Fill `score`, the largest over the frequencies: |N| - e_R over noise and eta, scaled to the level."""
     score = 0.0
     for k in range(t.e_R.size):
         evidence = np.hypot(t.correlation[0, k], t.correlation[1, k]) - t.e_R[k]
         v = c.v_share[k] * t.D
-        score = max(
-            score,
-            evidence_ratio(
-                c.alarm_level,
-                TONE_NOISE_SHARE,
-                evidence,
-                t.uncertain_share[k],
-                v,
-            ),
-        )
+        score = max(score, evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, evidence, t.eta[k], v))
     t.score = score * level / c.alarm_level
 
 
@@ -272,18 +253,11 @@ def max_tone_mean(w: np.ndarray, rate: float) -> np.ndarray:
     return 2.0 / pi * np.where(ratio < pi / 2.0, np.sin(ratio), 1.0) / ratio
 
 
-def configure_tones(
-    c: np.void,
-    false_alarm: float,
-    V: float,
-    rate: float,
-    dt: float,
-) -> None:
+def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: float) -> None:
     """Fill the configuration that all views share.
 
-    false_alarm: probability of a false alarm granted to one test in one frame.
-    V: in trim. rate: largest rate of change of a bounded uncertainty, in
-    bounds per second.
+    false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
+    rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
     """
     c["c"] = max_tone_mean(TONES_RAD_S, rate)
     c["V_min"] = V / MAX_V_FACTOR
@@ -295,14 +269,8 @@ def configure_tones(
     c["a"] = a
     c["alarm_level"] = sqrt(-2.0 * np.log(false_alarm))
     c["z"] = np.cos(phase), np.sin(phase)
-    c["rho"] = (
-        a * np.cos(stride * phase),
-        a * np.sin(stride * phase),
-    )
-    c["rho2"] = (
-        a * np.cos(2.0 * stride * phase),
-        a * np.sin(2.0 * stride * phase),
-    )
+    c["rho"] = (a * np.cos(stride * phase), a * np.sin(stride * phase))
+    c["rho2"] = (a * np.cos(2.0 * stride * phase), a * np.sin(2.0 * stride * phase))
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
     difference = (1.0 - a**2) / np.abs(1.0 - a**2 * np.exp(2j * stride * phase))
     c["v_share"] = 0.5 * (1.0 + difference)
@@ -316,8 +284,7 @@ PITCH_PLANE = (PITCH, NORMAL_FORCE)
 ROLL_YAW_PLANE = (ROLL, YAW)
 YAW_PLANE = (YAW, SIDE_FORCE)
 
-# Values of `nulled` in a view without one: a view of an axis; one across the column of an
-# error of a vane.
+# Values of `nulled` in a view without one: a view of an axis; one across the column of an error of a vane.
 AXIS_VIEW, VANE_VIEW = -1, -2
 
 
@@ -330,9 +297,8 @@ class StatisticalSize(NamedTuple):
     n_map_boxes: int
 
 
-USUAL_SIZE = StatisticalSize(
-    BlockCapacity(23, USUAL_HYPOTHESES), BlockCapacity(36, 3), 13, 6
-)  # enough for most aircraft: see `required_size`
+# Enough for most aircraft: see `required_size`.
+USUAL_SIZE = StatisticalSize(BlockCapacity(23, USUAL_HYPOTHESES), BlockCapacity(36, 3), 13, 6)
 
 
 @sized
@@ -361,7 +327,7 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
 
 @kernel
 def view_innovation(view, forces, gust, inertial, nu, i):
-    """One i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
+    """Component i of the innovation that a view projects, rad/s2: of the rates, nu (3,), or of a force."""
     if i < SIDE_FORCE:
         acc = 0.0
         if subtracts_gust(view, gust):
@@ -373,7 +339,7 @@ def view_innovation(view, forces, gust, inertial, nu, i):
 
 @kernel
 def column_entry(view, forces, bound, G, place):
-    """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
+    """Entry 0 or 1 (place) of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane_pair[place], view.nulled
     if s == VANE_VIEW:
         entry = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
@@ -388,9 +354,12 @@ def column_entry(view, forces, bound, G, place):
 
 @kernel
 def turn_view(view, forces, gust, bound, G):
-    """Fill `direction` and `col` (5,) of a view across a column of G (3, n) rad/s2 per rad.
+    """Fill `direction` m and `col` (5,) of a view across a column g of G (3, n) rad/s2 per rad.
 
-    Returns the share of the innovation along the column that errors of the column let leak into the view.
+        m = (-g_j, g_i) / |g|      col = g / |g|
+
+    Returns the share of the innovation along the column that errors e of the column let leak into the view,
+    (|m_i| e_i + |m_j| e_j) / (|g| - |m_j| e_i - |m_i| e_j).
     """
     if view.across_gust:
         return turn_vane_view(view, forces, gust)
@@ -411,11 +380,11 @@ def turn_view(view, forces, gust, bound, G):
 
 @kernel
 def turn_vane_view(view, forces, gust):
-    """Fill `direction`, orthogonal to two vectors, and `col`; return the share that leaks.
+    """Fill `direction` m and `col` of a view across two vectors; return the share that leaks, as `turn_view`.
 
-    The direction is the vector product of the two in (roll, yaw, side force).
+        m = b x q / |b x q|      col = b / |b|      in (p: roll, r: yaw, Y: side force)
 
-    The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
+    b: column of an error of the side vane, rad/s2 per rad; q: effect of the rolling gust on the rates, 1/s.
     """
     f = forces.component[0]
     b_p = f.vane_roll
@@ -431,11 +400,7 @@ def turn_vane_view(view, forces, gust):
         return 0.0
     norm_b = np.sqrt(b_p * b_p + b_r * b_r + b_Y * b_Y)
     e_m = 0.0
-    for i, b_i, m_i in (
-        (ROLL, b_p, m_p),
-        (YAW, b_r, m_r),
-        (SIDE_FORCE, b_Y, m_Y),
-    ):
+    for i, b_i, m_i in ((ROLL, b_p, m_p), (YAW, b_r, m_r), (SIDE_FORCE, b_Y, m_Y)):
         view.direction[i] = m_i / norm_m
         view.col[i] = b_i / norm_b
         e_m += VANE_TOLERANCE * abs(view.direction[i] * b_i)
@@ -462,10 +427,9 @@ def gust_of_view(view, gust, inertial):
 
 @kernel
 def fill_sensitivity(view, forces, L):
-    """Fill `L_rate` and `L_force` (3,), 1/s: the gust sensitivity of a view.
+    """Fill `L_rate` and `L_force` (3,), 1/s: projected acceleration per rad/s of rotation of the air.
 
-    It is the projected acceleration per rad/s of rotation of the air about each body axis. L (3,
-    3) 1/s: that of the rates.
+    L_rate = m' L      L_force = sum over the forces of m L_f      L (3, 3) 1/s: rate damping
     """
     m = view.direction
     for k in range(3):
@@ -480,10 +444,12 @@ def fill_sensitivity(view, forces, L):
 
 @kernel
 def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
-    """Fill measurement noise, model noise, drift intensity and bound of a view from the declared ones; V
-    m/s."""
+    """Fill R_y, Q_x, Q_d and eta of a view from the declared ones, projected on m; V m/s.
+
+    R_y = m^2 R_y      sqrt(Q_x) = |m| sqrt(noise)      eta = |m| eta
+    """
     b, m = view.block, view.direction
-    R_y, std, eta, drift_intensity = 0.0, 0.0, 0.0, 0.0
+    R_y, std, eta, Q_d = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         R_y += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].R_y[i // 2]
         std += abs(m[i]) * np.sqrt(noise.Q[i])
@@ -493,19 +459,14 @@ def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
     for k, f in enumerate(forces.component):
         std += abs(m[SIDE_FORCE + k]) * np.sqrt(f.var[view.by_inertia])
         if view.by_inertia:
-            drift_intensity += (m[SIDE_FORCE + k] * forces.q_ratio) ** 2 * f.Q_e
+            Q_d += (m[SIDE_FORCE + k] * forces.q_ratio) ** 2 * f.Q_e
         eta += abs(m[SIDE_FORCE + k]) * (f.eta_u * forces.q_ratio + f.e_lag)
     if gust.output.gusty:
         fill_sensitivity(view, forces, gust.output.rate_damping)
         if subtracts_gust(view, gust):
-            drift_intensity += remaining_drift(
-                gust_of_view(view, gust, inertial),
-                V,
-                view.L_rate,
-                view.L_force,
-            )
+            Q_d += remaining_drift(gust_of_view(view, gust, inertial), V, view.L_rate, view.L_force)
         else:
-            drift_intensity += full_drift(gust, V, view.L_rate, view.L_force)
+            Q_d += full_drift(gust, V, view.L_rate, view.L_force)
         for i in range(3):
             for j in range(3):
                 b.P_dd[0, 0] += m[i] * m[j] * gust.output.var_turn[i, j]
@@ -513,7 +474,7 @@ def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
     b.R_y[0] = R_y
     b.Q_x[0] = std * std
     view.eta[0] = eta
-    b.Q_d[0, 0] = drift_intensity + noise.q * limited * limited
+    b.Q_d[0, 0] = Q_d + noise.q * limited * limited
 
 
 @kernel
@@ -561,20 +522,10 @@ def turn_views(views, forces, gust, bound, G, Gu):
 
 
 @kernel
-def project_innovation(
-    views,
-    with_Z,
-    noise,
-    blocks,
-    forces,
-    gust,
-    inertial,
-    nu,
-    V,
-):
-    """Project the innovation (3,) rad/s2 on the direction of each view, into `nu` of its block.
+def project_innovation(views, with_Z, noise, blocks, forces, gust, inertial, nu, V):
+    """Project the innovation nu (3,) rad/s2 on the direction of each view, into `nu` of its block.
 
-    Fill the noise too, and with `regress` the regressors of constant errors; V m/s.
+    Fill the noise too, and, if with_Z, the regressors of constant errors; V m/s.
     """
     for view in views:
         if not view.used:
@@ -605,16 +556,12 @@ def update_views(views, cfg, c, y, dt, k, latched):
         likelihood.update_block(view.block, view.eta, with_Z, dt, decay)
         if not view.by_inertia:  # the error of the integrated angle oscillates with the aircraft's own modes
             update_tones(view, c, cfg.alarm_level, inside, with_Z, dt)
-        view.peak = max(
-            (1.0 - (1.0 - cfg.forget) / PEAK_MEMORY_RATIO) * view.peak,
-            view_score(view),
-        )
+        view.peak = max((1.0 - (1.0 - cfg.forget) / PEAK_MEMORY_RATIO) * view.peak, view_score(view))
 
 
 @kernel
 def changes_view(view, forces, s, column):
-    """True if a fault of surface s, with this column (3,) of G, changes the projection
-    of a view."""
+    """True if a fault of surface s, with this column (3,) of G, changes the projection of a view."""
     if view.nulled == s:
         return False
     m, effect = view.direction, 0.0
@@ -650,10 +597,7 @@ def confirmed_score(view, views, cfg, forces, gust):
     for other in views:
         if other.vane_free and other.plane_pair[1] == view.confirmer:
             peak = max(peak, other.peak)
-    return min(
-        view.peak,
-        peak * cfg.alarm_level / np.sqrt(2.0 * cfg.margin),
-    )
+    return min(view.peak, peak * cfg.alarm_level / np.sqrt(2.0 * cfg.margin))
 
 
 @kernel
@@ -673,8 +617,7 @@ def view_alarm_score(view, views, cfg, forces, gust):
 
 @kernel
 def views_exclude(views, cfg, forces, gust, s, column):
-    """True if a view detects a signal that no fault of surface s, with this column (3,)
-    of G, can cause."""
+    """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
     for view in views:
         decides = not view.vane_free and not changes_view(view, forces, s, column)
         if decides and confirmed_score(view, views, cfg, forces, gust) > cfg.alarm_level:
@@ -685,9 +628,9 @@ def views_exclude(views, cfg, forces, gust, s, column):
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the surface to whose column it is orthogonal, or VANE_VIEW, or
-    AXIS_VIEW; m_0: at the start of the flight; tested_losses: their indices;
-    by_inertia: the force is that at the flow angle from inertial motion.
+    nulled: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW; m_0: at the start of the
+    flight; tested_losses: indices of surfaces; by_inertia: the force is that at the flow angle from inertial
+    motion.
     """
 
     nulled: int
@@ -706,55 +649,23 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield ParityDirection(
-        AXIS_VIEW,
-        _unit_sum((PITCH,)),
-        PITCH_PLANE,
-        pitch,
-        uses_vane_gust=True,
-    )
+    yield ParityDirection(AXIS_VIEW, _unit_sum((PITCH,)), PITCH_PLANE, pitch, uses_vane_gust=True)
     yield ParityDirection(AXIS_VIEW, _unit_sum((ROLL,)), ROLL_YAW_PLANE, lateral)
-    yield ParityDirection(
-        AXIS_VIEW,
-        _unit_sum((YAW,)),
-        ROLL_YAW_PLANE,
-        lateral,
-        uses_vane_gust=True,
-    )
+    yield ParityDirection(AXIS_VIEW, _unit_sum((YAW,)), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
     for s in lateral:
         rolls = aircraft.dominant_axis[s] == ROLL
         others = [other for other in lateral if other != s]
-        yield ParityDirection(
-            s,
-            _unit_sum((ROLL,)),
-            ROLL_YAW_PLANE,
-            others,
-            uses_vane_gust=rolls,
-        )
+        yield ParityDirection(s, _unit_sum((ROLL,)), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
     if not with_forces:
         return
-    for i, plane, tested in (
-        (NORMAL_INDEX, PITCH_PLANE, pitch),
-        (SIDE_INDEX, YAW_PLANE, lateral),
-    ):
+    for i, plane, tested in ((NORMAL_INDEX, PITCH_PLANE, pitch), (SIDE_INDEX, YAW_PLANE, lateral)):
         separable = aircraft.separated_by_force(FORCE_NAMES[i])
         for s in separable:
             pair = aircraft.dominant_axis[s], plane[1]
-            yield ParityDirection(
-                s,
-                _unit_sum(pair),
-                pair,
-                [other for other in tested if other != s],
-            )
+            yield ParityDirection(s, _unit_sum(pair), pair, [other for other in tested if other != s])
         if separable:
             yield ParityDirection(VANE_VIEW, _unit_sum(plane), plane, tested)
-            yield ParityDirection(
-                AXIS_VIEW,
-                _unit_sum(plane[1:]),
-                plane,
-                tested,
-                by_inertia=True,
-            )
+            yield ParityDirection(AXIS_VIEW, _unit_sum(plane[1:]), plane, tested, by_inertia=True)
 
 
 def _unit_sum(ones: tuple[int, ...]) -> tuple[float, ...]:
@@ -785,7 +696,7 @@ def required_size(aircraft: Aircraft) -> StatisticalSize:
 
 
 def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
-    """Fill the views of a stat record whose blocks and forces are already set up."""
+    """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
     subtracts = (
@@ -825,17 +736,14 @@ def _configure_filter(b: np.void, rates: np.void) -> None:
     b["n"], b["a"] = 1, 1.0
     b["P_xx"][0, 0] = rates["R_y"].max()
     b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
-    for name in (
-        "alarm_level",
-        "noise_share",
-        "eta_rate",
-    ):
+    for name in ("alarm_level", "noise_share", "eta_rate"):
         b[name] = rates[name]
 
 
 def _configure_regressors(view: np.void, d: ParityDirection, rates: np.void, forces: np.void) -> None:
-    """Fill the parts of a view's regressors: those of its rates, of its force, of the flow angle from
-    inertial motion, and that of the leak, which is worked out in flight."""
+    """Fill the tolerances of a view's regressors: those of its rates, of its force, of the flow angle from
+    inertial motion, and that of the leak, which is worked out in flight.
+    """
     parts = [rates["tol"][: rates["n_Z"]]]
     if any(d.m_0[SIDE_FORCE:]):
         f = forces["component"][d.plane_pair[1] - SIDE_FORCE]
@@ -850,7 +758,7 @@ def _configure_regressors(view: np.void, d: ParityDirection, rates: np.void, for
 
 
 def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
-    """Fill the hyps of a view: a step of its innovation, and a loss of each surface that it tests."""
+    """Fill the hypotheses of a view: a step of its innovation, and a loss of each surface that it tests."""
     # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
     # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
     untested = gusty and d.m_0[PITCH]
@@ -866,8 +774,8 @@ def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
 def fill_block_signatures(blocks, Gu, per_cubed):
     """Fill the signatures of the blocks of the rates, rad/s2.
 
-    Gu (3, n) rad/s2: effect of each surface, mean over the frame; per_cubed
-    rad/s2: pitch acceleration of a coefficient 1 of alpha^3.
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame; per_cubed rad/s2: pitch acceleration of a
+    coefficient 1 of alpha^3.
     """
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:

@@ -10,6 +10,22 @@ declared noise. An error e of an air-data reading changes f + G u by e times its
 to first order. The derivative depends on the flight condition and is evaluated in flight. A steady error is a
 constant times a known regressor, like an error of a coefficient; noise is model noise. dpt is worked out from
 the engine's power, airspeed and dynamic pressure, so it has their errors.
+
+Symbols of the kernels:
+
+    nu (3,) rad/s2                innovation of the frame
+    eta (3,) rad/s2               bound on the uncertainty
+    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; F = f + G u of the design model, rad/s2
+    w                             one over the number of instants in a frame
+    dt s, k                       duration and number of the frame
+    b, h, v                       block, hypothesis, view
+    s, i, j                       surface, axis, reading or term
+    tab                           the table of the moments' terms (design.model)
+    ds, dm, dF                    change of signals, monomials and F per unit of a reading
+    L, M, N                       rolling, pitching and yawing moment, N m (per unit of a reading)
+    fies, of (n,)                 isolation estimators; number of that of each surface's loss, or -1
+    lo, hi                        bounds on a log-likelihood ratio
+    cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
 from collections.abc import Iterator
@@ -47,11 +63,7 @@ from beaver_ftc.diagnosis.bounds import (
     moment_axis,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.forces import (
-    FORCES_RECORD,
-    TrimState,
-    configure_forces,
-)
+from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD, TrimState, configure_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
@@ -76,12 +88,12 @@ from beaver_ftc.diagnosis.detection.parity import (
     view_dtype,
 )
 from beaver_ftc.diagnosis.gusts import (
+    FORCE_ERROR_SHARE,
     GUST_RECORD,
     MIN_UNMEASURED_SHARES,
-    FORCE_ERROR_SHARE,
+    add_gust_noise,
     configure_gust,
     configure_gust_speed,
-    add_gust_noise,
 )
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
@@ -116,20 +128,13 @@ HypothesisEntry = tuple[int, int, int, int]
 def hypotheses_by_block(
     aircraft: Aircraft,
 ) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
-    """Axes and rows of each block: the losses of the surfaces that turn about its axes, and what they
-    are held against. Roll and yaw are there twice, see above."""
-    pitch = (
-        *_loss_rows(aircraft, PITCH_AXES),
-        *_step_rows(PITCH_AXES),
-        (ALPHA_CUBED_MOMENT, -1, 1, 0),
-    )
+    """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
+    are held against. Roll and yaw are there twice, see above.
+    """
+    pitch = (*_loss_rows(aircraft, PITCH_AXES), *_step_rows(PITCH_AXES), (ALPHA_CUBED_MOMENT, -1, 1, 0))
     lateral = (*_loss_rows(aircraft, LATERAL_AXES), *_step_rows(LATERAL_AXES))
     pitch, lateral = ((*rows, *_growing_rows(rows)) for rows in (pitch, lateral))
-    return (
-        (PITCH_AXES, pitch),
-        (LATERAL_AXES, lateral),
-        (LATERAL_AXES, lateral),
-    )
+    return ((PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral))
 
 
 def _loss_rows(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
@@ -153,10 +158,7 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
     n_tones = 0
     for d in directions:
         if d.nulled >= 0 and any(d.m_0[SIDE_FORCE:]):
-            kinds += [
-                STEP_FAULT,
-                *(LOSS for _ in d.tested_losses),
-            ]
+            kinds += [STEP_FAULT, *(LOSS for _ in d.tested_losses)]
             n_tones += N_TONES
         elif d.nulled == AXIS_VIEW and not d.by_inertia:
             n_tones += N_TONES
@@ -164,7 +166,7 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
 
 
 def _quantile(p: float) -> float:
-    """Of the normal distribution; of a p that is too small for a number, that of the smallest."""
+    """Quantile p of the normal distribution; of a p that is too small for a number, that of the smallest."""
     return NormalDist().inv_cdf(max(p, float_info.min))
 
 
@@ -190,7 +192,7 @@ def configure_statistics(
     trim: TrimState,
     rate_hz: float,
 ) -> None:
-    """Fill the stat part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
+    """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
     stat, settings = fdi["statistical"], fdi_config.statistical
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
@@ -206,22 +208,14 @@ def configure_statistics(
     configure_gust(gust, declared, mass)
     views = fdi_config.compares_across(n_instants)
     n_tests = count_tests(
-        aircraft,
-        *(list_directions(aircraft, declared.uses_accelerometers) if views else ()),
+        aircraft, *(list_directions(aircraft, declared.uses_accelerometers) if views else ())
     )
     _configure_levels(cfg, fdi_config, aircraft, n_tests, rate_hz)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
     _configure_blocks(stat, errors, aircraft)
     _configure_growth(stat, fdi_config, declared, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
-    _configure_noise(
-        stat,
-        drift_frequency(settings, aircraft),
-        declared,
-        model,
-        trim,
-        dt_s,
-    )
+    _configure_noise(stat, drift_frequency(settings, aircraft), declared, model, trim, dt_s)
     tol = coefficient_bounds(declared, model, mass, *trim[1:])
     _configure_tolerances(stat, aircraft, tol)
     configure_readings(stat, errors, fdi["bound"]["declared_errors"])
@@ -265,9 +259,7 @@ def _configure_vaneless(stat: np.void, declared: Declared) -> None:
     stat["vaneless"] = gust
     vaneless = stat["vaneless"]
     vaneless["output"]["gusty"] *= gust["output"]["uses_accelerometers"]
-    vaneless["memory"]["share"] = np.minimum(
-        np.add(MIN_UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0
-    )
+    vaneless["memory"]["share"] = np.minimum(np.add(MIN_UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0)
 
 
 def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
@@ -334,11 +326,7 @@ def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
 
 
 def _configure_growth(
-    stat: np.void,
-    fdi_config: FdiConfig,
-    declared: Declared,
-    rate: float,
-    dt_s: float,
+    stat: np.void, fdi_config: FdiConfig, declared: Declared, rate: float, dt_s: float
 ) -> None:
     """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
     not grow."""
@@ -354,12 +342,7 @@ def _configure_growth(
 
 
 def _configure_noise(
-    stat: np.void,
-    omega: float,
-    declared: Declared,
-    model: np.void,
-    trim: TrimState,
-    dt_s: float,
+    stat: np.void, omega: float, declared: Declared, model: np.void, trim: TrimState, dt_s: float
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
     u."""
@@ -367,13 +350,7 @@ def _configure_noise(
     sigma_x = float(sigma[:3].max())
     eta = max(declared.constant_rad_s2)
     level = float(stat["test"]["alarm_level"])
-    stat["noise"]["q"] = derive_intensity(
-        eta,
-        omega,
-        sigma_x,
-        level,
-        dt_s,
-    )
+    stat["noise"]["q"] = derive_intensity(eta, omega, sigma_x, level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
     stat["noise"]["Q0"] = F_x**2 @ sigma[:3] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `add_readings` says
@@ -384,34 +361,31 @@ def _configure_noise(
 def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
     """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
 
-    An uncertainty of eta sin(omega t) moves the test for a step by eta omega sqrt(2 sqrt 2 / i w0),
-    w0 = (i / n)^(1/4), for a walk of intensity i and gyro noise of density n = noise^2 dt (theory.md).
-    Almost without noise w0 is the frame rate. The evidence for a loss under a moving command grows together
-    with the uncertainty while both have the same sign: by eta sqrt(omega / i) times 1.204, the largest
-    value of sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then
-    takes up no more than the other half. eta rad/s2; omega, noise rad/s; level in standard deviations.
+    An uncertainty of eta sin(omega t) moves the test for a step by eta omega sqrt(2 sqrt 2 / i w0), w0 = (i /
+    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt (theory.md). Almost without
+    noise w0 is the frame rate. The evidence for a loss under a moving command grows together with the
+    uncertainty while both have the same sign: by eta sqrt(omega / i) times 1.204, the largest value of sin(z)
+    / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no more
+    than the other half.
+
+    eta rad/s2; omega, sigma rad/s; level in standard deviations.
     """
     eta = max(eta, likelihood.MIN_ETA_RAD_S2)
     iw = 8.0 * sqrt(2.0) * (eta * omega / level) ** 2  # of i w0
     i_loss = 4.0 * (1.204 * eta / level) ** 2 * omega
     i_step = (iw * (sigma**2 * dt_s) ** 0.25) ** 0.8
-    return (
-        max(
-            hypot(i_step, i_loss),
-            iw * dt_s,
-        )
-        / eta**2
-    )
+    return max(hypot(i_step, i_loss), iw * dt_s) / eta**2
 
 
 def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> float:
-    """Return length, m, of the drift in the second block of roll and yaw, or of pitch without gust estimate.
+    """Return length V tau, m, of the drift in the second block of roll and yaw, or of pitch without gust
+    estimate.
 
-    gust_m: correlation length of the gust, m; 0 in still air. The drift returns as soon as
-    a bounded uncertainty permits: over the longest window T an uncertainty that oscillates with the fault
-    moves a test, for a drift of intensity i and lag tau, by eta_bar sqrt(T / 2 i) / tau; half the alarm level
-    is left for this. The drift returns no later than the gust. A gust with a longer correlation length is
-    represented by a stronger one, of equal power at low frequency and more power at high frequency.
+    gust_m: correlation length of the gust, m; 0 in still air. The drift returns as soon as a bounded
+    uncertainty permits: over the longest window T an uncertainty that oscillates with the fault moves a test,
+    for a drift of intensity i and lag tau, by eta sqrt(T / 2 i) / tau; half the alarm level is left for this.
+    The drift returns no later than the gust. A gust with a longer correlation length is represented by a
+    stronger one, of equal power at low frequency and more power at high frequency.
     """
     if stat["noise"]["q"] == 0.0:
         # 0 in still air: nothing is declared that drifts, and the two views are one
@@ -432,7 +406,7 @@ def _configure_tolerances(stat: np.void, aircraft: Aircraft, tol: np.ndarray) ->
 
 
 def configure_readings(stat: np.void, errors: SensorErrors, err: np.void) -> None:
-    """Add the readings of the air data to the regressors of the blocks."""
+    """Add the readings of the air data to the regressors of the blocks; err: of `errors_dtype`."""
     tol = np.zeros(N_INPUT_READINGS)
     sigma = stat["noise"]["sigma"]
     for name, j in _READING_OF.items():
@@ -451,7 +425,10 @@ def configure_readings(stat: np.void, errors: SensorErrors, err: np.void) -> Non
 
 @kernel
 def fill_signal_slopes(tab, err, y, j, ds):
-    """Fill ds (N_SIGNALS,): change of a table's signals per unit of a reading."""
+    """Fill ds (N_SIGNALS,), the change of the table's signals per unit of reading j.
+
+    ds_j = 1 (vanes)      ds_k = -s_k / V (normalised rates, by V)      ds_dpt by V, qdyn and kW
+    """
     ds[:] = 0.0
     if j < AIRSPEED:  # a vane
         ds[j] = 1.0
@@ -466,9 +443,10 @@ def fill_signal_slopes(tab, err, y, j, ds):
 
 @kernel
 def fill_slopes(model, y, u, j, dm, dF):
-    """Fill dF (3,), rad/s2 per unit of the reading.
+    """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
 
-    dm: the change of the monomials per unit of it.
+    L, M, N = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
+    dF = (Pl L + Pn N, Qm M, Rl L + Rn N)
     """
     tab, qS = model.moments, y[QDYN] * model.S
     for i in range(3):
@@ -478,41 +456,24 @@ def fill_slopes(model, y, u, j, dm, dF):
     L = qS * model.b * dF[0]
     M = qS * model.c * dF[1]
     N = qS * model.b * dF[2]
-    (
-        dF[0],
-        dF[1],
-        dF[2],
-    ) = (
-        model.Pl * L + model.Pn * N,
-        model.Qm * M,
-        model.Rl * L + model.Rn * N,
-    )
+    (dF[0], dF[1], dF[2]) = (model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N)
 
 
 @kernel
 def add_readings(w, noise, blocks, err, model, y, u):
-    """Add this instant, a `w` of the frame, to the readings' regressors, rad/s2 per
-    unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
+    """Add an instant to the readings' regressors, rad/s2 per unit, and fill the model noise as it is now.
+
+        Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
+
+    sigma (readings,): noise of the readings. The terms of `model.moments` are evaluated at this instant.
+    """
     tab = model.moments
     dF = noise.dF
     noise.Q[:] = noise.Q0
     for j in range(N_INPUT_READINGS):
         fill_signal_slopes(tab, err, y, j, noise.ds)
-        directional(
-            tab,
-            tab.signal,
-            tab.power,
-            noise.ds,
-            noise.dm,
-        )
-        fill_slopes(
-            model,
-            y,
-            u,
-            j,
-            noise.dm,
-            dF,
-        )
+        directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
+        fill_slopes(model, y, u, j, noise.dm, dF)
         for i in range(3):
             noise.Q[i] += (dF[i] * noise.sigma[j]) ** 2
         pitch = blocks[likelihood.PITCH_BLOCK]
@@ -557,8 +518,7 @@ NOISE_RECORD = record(
     # whether errors of the air data count; their noise, units of the readings
     noisy=int, sigma=N_INPUT_READINGS,
     # scratch
-    zC=MAX_TERMS, ds=N_SIGNALS,
-    dm=MAX_MONOMIALS, dF=3,
+    zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, dF=3,
 )  # fmt: skip
 
 # Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
@@ -571,26 +531,15 @@ def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         test=TESTING_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
-        block=(block_dtype(size.rate_size), N_FILTER_BLOCKS),
-        n_views=int, views=(view_dtype(size.view_size), size.n_views),
-        tone_test_config=TONE_RECORD,
-        forces=FORCES_RECORD, gust=GUST_RECORD, vaneless=GUST_RECORD,
+        block=(block_dtype(size.rate_size), N_FILTER_BLOCKS), n_views=int,
+        views=(view_dtype(size.view_size), size.n_views), tone_test_config=TONE_RECORD, forces=FORCES_RECORD,
+        gust=GUST_RECORD, vaneless=GUST_RECORD,
     )  # fmt: skip
 
 
 @kernel
-def update_blocks(
-    cfg,
-    eta,
-    blocks,
-    gust,
-    nu,
-    dt,
-    k,
-    alarmed,
-    may_end=False,
-):
-    """Update the blocks with frame k, of dt s: innovation and bound `eta`, both (3,) rad/s2.
+def update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end=False):
+    """Update the blocks with frame k: g = whitened nu - acc_mean, the gust's mean effect.
 
     alarmed: the detector has raised its alarm; may_end: a loss may end.
     """
@@ -611,20 +560,12 @@ def update_blocks(
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
         hi_decay = cfg.forget if may_end else 0.0
-        likelihood.update_block(
-            b,
-            eta,
-            cfg.regress,
-            dt,
-            decay,
-            hi_decay,
-            cfg.mapped,
-        )
+        likelihood.update_block(b, eta, cfg.regress, dt, decay, hi_decay, cfg.mapped)
 
 
 @kernel
 def add_axes_turn(gust, b):
-    """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
+    """P_dd <- P_dd + Q_scale var_turn: what a fast turn of the gusts' axes may change in the drift."""
     for i in range(b.n):
         for j in range(b.n):
             b.P_dd[i, j] += b.Q_scale * gust.output.var_turn[b.axes[i], b.axes[j]]
@@ -632,7 +573,7 @@ def add_axes_turn(gust, b):
 
 @kernel
 def filter_known(blocks, gust, nu, dt):
-    """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
+    """Whiten nu (3,), the innovation after known faults; the state x_known tracks its slowly varying mean."""
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
             b.nu[i] = nu[axis] - gust.output.acc_mean[axis]
@@ -641,9 +582,9 @@ def filter_known(blocks, gust, nu, dt):
 
 @kernel
 def fill_unmodelled(blocks, gust, out):
-    """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
+    """out = d + acc, (3,) rad/s2: the acceleration that the control law's model lacks.
 
-    It is the estimated drift plus the effect of the gust estimated from the vanes.
+    d: estimated drift; acc: effect of the gust that the vanes measure.
     """
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
@@ -664,12 +605,7 @@ def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
             if h.alarms:
                 keep_score(alarm, cfg.alarm_level, h.score, h.axis)
     for v in views:
-        keep_score(
-            alarm,
-            cfg.alarm_level,
-            parity.view_alarm_score(v, views, cfg, forces, gust),
-            v.alarm_axis,
-        )
+        keep_score(alarm, cfg.alarm_level, parity.view_alarm_score(v, views, cfg, forces, gust), v.alarm_axis)
     if alarm.ratio > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
@@ -682,7 +618,7 @@ def keep_score_peak(alarm):
 
 @kernel
 def keep_score(alarm, level, score, axis):
-    """Keep a score if it is the largest."""
+    """Keep a score, standard deviations, if its ratio to the alarm level is the largest."""
     ratio = score / level
     if ratio > alarm.ratio:
         alarm.ratio, alarm.axis = ratio, axis
@@ -703,10 +639,7 @@ def write_scores(cfg, blocks, views, forces, gust, row):
                 row[col] = max(row[col], h.score / cfg.alarm_level)
     for v in views:
         col = row.size - 3 + v.alarm_axis
-        row[col] = max(
-            row[col],
-            parity.view_alarm_score(v, views, cfg, forces, gust) / cfg.alarm_level,
-        )
+        row[col] = max(row[col], parity.view_alarm_score(v, views, cfg, forces, gust) / cfg.alarm_level)
 
 
 @kernel
@@ -717,10 +650,10 @@ def loss_remains(fies, of, s):
 
 @kernel
 def best_alternative(b, fies, of, s, revived=False):
-    """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
+    """max_h lo_h over all alternatives h to the loss of surface s in block b.
 
-    Excluded losses are no alternatives, unless `revived`: as evidence decays, an uncertainty
-    that correlates with the commands may support them again.
+    Excluded losses are no alternatives, unless `revived`: as evidence decays, an uncertainty that correlates
+    with the commands may support them again.
     """
     lo = 0.0
     for h in b.hypothesis[: b.n_h]:
@@ -734,10 +667,7 @@ def best_alternative(b, fies, of, s, revived=False):
 
 @kernel
 def loss_bound(b, s, ended):
-    """Upper bound on the log-likelihood ratio of a loss of this surface, or, if `ended`, of its end.
-
-    It is 0 if the block has no such h.
-    """
+    """max_h hi_h over the losses of surface s in block b, or, if `ended`, over their ends; 0 without any."""
     hi = 0.0
     for h in b.hypothesis[: b.n_h]:
         if h.surface == s and (h.kind == LOSS_END) == ended:
@@ -747,12 +677,11 @@ def loss_bound(b, s, ended):
 
 @kernel
 def confirms_loss(cfg, blocks, fies, of, s):
-    """True if a loss of this surface explains the data better than all alternatives.
+    """True if a loss of surface s explains the data better than all alternatives:
 
-    Its log-likelihood ratio must be larger by more than `margin`.
+        lo_loss - max_alternatives lo > margin      in some block
 
-    fies: of the isolation; of (n,): of each surface's loss, or -1. If the estimator
-    is weakly excluded by DAMAGE_EXCLUDES, excluded losses are alternatives as well.
+    If the estimator is weakly excluded by DAMAGE_EXCLUDES, excluded losses are alternatives as well.
     """
     revived = of[s] >= 0 and fies[of[s]].weak == DAMAGE_EXCLUDES
     for b in blocks:
@@ -766,25 +695,16 @@ def confirms_loss(cfg, blocks, fies, of, s):
 
 
 @kernel
-def excludes_loss(
-    cfg,
-    blocks,
-    fies,
-    of,
-    s,
-    pitch_ends,
-    abrupt,
-):
-    """True if an alternative explains the data better than a loss of this surface.
+def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
+    """True if an alternative explains the data better than a loss of surface s:
 
-    Its log-likelihood ratio must be larger by more than `margin`.
+        best - max(hi_loss, hi_end) > margin,   hi_loss < share best,   hi_end < end_share best
 
-    Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
-    only. A loss that is not declared `abrupt` may grow. A constant theta then explains only a part of its
-    effect, so the loss is excluded only if its ratio is also below MIN_LLR_SHARE of the
-    best. The same holds for a loss that begins inside a frame of several instants, and for the end of a loss
-    there. The end of a loss in pitch counts only if `pitch_ends` is set: a fault outside the
-    class may look like it. Arguments as in `confirms_loss`.
+    best: the largest lo of the alternatives. Each block of roll and yaw is compared together with that of
+    pitch, because a loss acts on its own axes only. A loss that is not declared `abrupt` may grow. A constant
+    theta then explains only a part of its effect, so that share is MIN_LLR_SHARE instead of 1. The same holds
+    for a loss that begins inside a frame of several instants, and for the end of a loss there. The end of a
+    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     single = cfg.w == 1.0
@@ -792,14 +712,8 @@ def excludes_loss(
     end_share = 1.0 if single else MIN_LLR_SHARE
     for b in blocks[LATERAL_BLOCK:]:
         best = best_alternative(pitch, fies, of, s)
-        best = max(
-            best,
-            best_alternative(b, fies, of, s),
-        )
-        hi = max(
-            loss_bound(pitch, s, False),
-            loss_bound(b, s, False),
-        )
+        best = max(best, best_alternative(b, fies, of, s))
+        hi = max(loss_bound(pitch, s, False), loss_bound(b, s, False))
         hi_end = loss_bound(b, s, True)
         if pitch_ends:
             hi_end = max(hi_end, loss_bound(pitch, s, True))
@@ -811,7 +725,9 @@ def excludes_loss(
 
 @kernel
 def estimate_loss(blocks, s):
-    """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
+    """(theta, D): estimate in [-1, 0] of a loss of surface s, where the block knows it best, and one over its
+    variance.
+    """
     th, D = 0.0, 0.0
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:
@@ -822,9 +738,9 @@ def estimate_loss(blocks, s):
 
 @kernel
 def prepare_tests(cfg, noise, blocks, gust, bound, model, meas, u, dt):
-    """Prepare the next frame, of dt s: gust, regressors, drift and model noise at this instant.
+    """Prepare the next frame: gust, regressors, drift and model noise at this instant.
 
-    bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
+    u (n,): positions of healthy surfaces.
     """
     x, y = meas.x, meas.y
     if gust.output.gusty:
@@ -832,15 +748,7 @@ def prepare_tests(cfg, noise, blocks, gust, bound, model, meas, u, dt):
     if cfg.regress:
         for b in blocks:
             b.regressor[:] = 0.0
-        add_regressors(
-            cfg.w,
-            noise,
-            blocks,
-            bound.declared_errors,
-            model,
-            meas,
-            u,
-        )
+        add_regressors(cfg.w, noise, blocks, bound.declared_errors, model, meas, u)
     fill_noise(noise, blocks, gust, bound, model, meas, dt)
     if bound.error_map.n_boxes > 0:
         update_eta_rate(noise, blocks, bound.error_map, u)
@@ -850,21 +758,17 @@ def prepare_tests(cfg, noise, blocks, gust, bound, model, meas, u, dt):
 
 @kernel
 def update_eta_rate(noise, blocks, emap, u):
-    """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
-    surfaces."""
+    """The share of its bound by which a mapped uncertainty can change in the next frame.
+
+    eta_rate = min(rate0 + moved BOUNDS_PER_TRAVEL, 2),   moved = max_s |u_s - u_old_s| / travel_s
+    """
     moved = 0.0
     for s in range(u.size):
-        width = max(emap.travel_high[s] - emap.travel_low[s], MIN_TRAVEL_RAD)
-        moved = max(
-            moved,
-            abs(u[s] - emap.u_old[s]) / width,
-        )
+        width = max(emap.stop_hi[s] - emap.stop_lo[s], MIN_TRAVEL_RAD)
+        moved = max(moved, abs(u[s] - emap.u_old[s]) / width)
         emap.u_old[s] = u[s]
     for b in blocks:
-        b.eta_rate = min(
-            noise.rate0 + BOUNDS_PER_TRAVEL * moved,
-            BOUNDS_PER_TRAVEL * REVERSING_SHARE,
-        )
+        b.eta_rate = min(noise.rate0 + BOUNDS_PER_TRAVEL * moved, BOUNDS_PER_TRAVEL * REVERSING_SHARE)
 
 
 @kernel
@@ -873,20 +777,12 @@ def add_test_instant(cfg, noise, blocks, gust, bound, model, meas, u, dt):
     if gust.output.gusty:
         gusts.update_gust(gust, model, meas.x, meas.y, u, meas.attitude, dt)
     if cfg.regress:
-        add_regressors(
-            cfg.w,
-            noise,
-            blocks,
-            bound.declared_errors,
-            model,
-            meas,
-            u,
-        )
+        add_regressors(cfg.w, noise, blocks, bound.declared_errors, model, meas, u)
 
 
 @kernel
 def add_regressors(w, noise, blocks, err, model, meas, u):
-    """Add this instant, a `w` of the frame, to all regressors of unknown constants."""
+    """Add an instant, w of the frame, to the regressors of all unknown constants."""
     y = meas.y
     evaluate(model.moments, meas.x, y)
     add_coefficients(w, noise.zC, blocks, model, y, u)
@@ -896,17 +792,15 @@ def add_regressors(w, noise, blocks, err, model, meas, u):
 
 @kernel
 def fill_noise(noise, blocks, gust, bound, model, meas, dt):
-    """Fill the bound on the uncertainty, and of each block the drift intensity and the model noise: for the
-    bounded uncertainty and the unmeasured gust."""
+    """Fill eta, and of each block the drift's intensity Q_d, model noise Q_x and decay a.
+
+    eta = published bound + eta_u + mapped error
+    Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      Q_x = Q      a = exp(-dt V / length)
+    """
     eta, V = noise.eta, meas.y[AIRSPEED]
     eta[:] = 0.0
     add_published_bound(
-        meas.x,
-        model,
-        bound.inertia_coupling_error_share,
-        bound.const,
-        bound.earth_rate_rad_s,
-        eta,
+        meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
     mapped = bound.error_map.n_boxes > 0
     for i in range(3):
@@ -914,23 +808,13 @@ def fill_noise(noise, blocks, gust, bound, model, meas, dt):
         if mapped:
             eta[i] += min(bound.error_map.e_now[i], OFF_MAP_RAD_S2)
         if bound.error_map.one_free:
-            noise.eta_free[i] = extra_bound(
-                bound.error_map,
-                bound.error_map.n_levels - 1,
-                i,
-            )
+            noise.eta_free[i] = extra_bound(bound.error_map, bound.error_map.n_levels - 1, i)
     for k, b in enumerate(blocks):
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
                 b.Q_d[i, j] = 0.0
                 if gust.output.gusty:
-                    q_gust = gusts.unmeasured_drift(
-                        gust,
-                        V,
-                        axis,
-                        b.axes[j],
-                        k == likelihood.REVERTING_BLOCK,
-                    )
+                    q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], k == likelihood.REVERTING_BLOCK)
                     b.Q_d[i, j] = b.Q_scale * q_gust
             eta_min = max(eta[axis], likelihood.MIN_ETA_RAD_S2)
             q_eta = noise.q * eta_min * eta_min
@@ -942,8 +826,10 @@ def fill_noise(noise, blocks, gust, bound, model, meas, dt):
 
 @kernel
 def add_coefficients(w, z, blocks, model, y, u):
-    """Add this instant, a `w` of the frame, to the coefficients' regressors (n, 2)
-    rad/s2."""
+    """Add an instant to the coefficients' regressors (terms, 2) rad/s2: inertia times q S (b, c, b) z.
+
+    z (terms,): monomial of each term, with the deflection of its surface.
+    """
     tab = model.moments
     regressors(tab, tab.power, u, z)
     qS = w * y[QDYN] * model.S

@@ -117,7 +117,7 @@ REDUNDANCY_RECORD = record(
         # Declared turbulence: bound on a gust's speed; bound on its changes through each filter, which holds
         # up to max_airspeed_mps, and above low_m: below it a gust changes faster
         gust_max=float, gust_change=N_POLES, max_airspeed_mps=float,
-        low_m=float, w_max=float,
+        low_m=float, wind_max=float,
         # Declared errors of a reading z, SI: |error| <= e_zero +
         # e_slope |z|, of which const does not change
         e_zero=N_SENSORS, e_slope=N_SENSORS,
@@ -253,7 +253,7 @@ def configure_tests(config: np.void, declared: Declared) -> None:
     config["gust_max"], config["gust_change"] = bound_gusts(declared.air, initial.airspeed_mps, h)
     config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
     config["low_m"] = declared.air.low_m
-    config["w_max"] = declared.vertical_wind_mps
+    config["wind_max"] = declared.vertical_wind_mps
 
 
 def configure_errors(mon: np.void, declared: Declared, h: float) -> None:
@@ -636,7 +636,7 @@ def bound_flow(red, y, w_max, e_w):
     )
     e_climb = (y_past[AIRSPEED] + e_past[AIRSPEED]) * (e_tilt + e_vane) + e_past[AIRSPEED]
     tests[CLIMB_TEST].bound_per_s = (
-        c.w_max + c.gust_max + e_climb + POSITION_FACTOR * c.sample_time_s * a_recent
+        c.wind_max + c.gust_max + e_climb + POSITION_FACTOR * c.sample_time_s * a_recent
     )
     tests[CLIMB_TEST].bound_per_sample = e_new[ALTITUDE]
 
@@ -658,7 +658,7 @@ def bound_density(red, y):
     test, c, M = red.test[DENSITY_TEST], red.config, red.memory
     e = M.reading_bound
     e_new = M.e_new
-    climb = M.y_past[AIRSPEED] + M.e_past[AIRSPEED] + c.w_max + c.gust_max
+    climb = M.y_past[AIRSPEED] + M.e_past[AIRSPEED] + c.wind_max + c.gust_max
     e_log = bound_log(red, y, QDYN) + 2.0 * bound_log(red, y, AIRSPEED)
     test.bound_per_s = climb / DENSITY_SCALE_HEIGHT_M + e_log / c.sample_time_s
     test.bound_per_sample = e_new[QDYN] / max(y[QDYN] - e[QDYN], MIN_QDYN_PA)

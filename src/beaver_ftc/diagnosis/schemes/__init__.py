@@ -24,12 +24,8 @@ from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme
 from beaver_ftc.diagnosis.state import PLUGIN_SCHEME_NUMBER, SCHEME_KERNEL_PATHS, STATISTICAL_DETECTOR
 from beaver_ftc.diagnosis.types import registry
-from beaver_ftc.diagnosis.types.registry import FIRST_TYPE_WITH_SAME_NAME
-from beaver_ftc.diagnosis.types.verdict import (
-    DEDUCED_FAULTY,
-    TYPE_UNDECIDED,
-    any_type_of_name_remains,
-)
+from beaver_ftc.diagnosis.types.registry import SAME_NAME
+from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, name_remains
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import pairs_refused
@@ -40,16 +36,11 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of the
     statistical detector's record."""
     return record(
-        config=state.SHARED_CONFIG_RECORD,
-        bound=bound_dtype(n, size.n_map_boxes),
-        bank=filters.BANK_RECORD,
-        fdae=filters.FDAE_RECORD,
-        verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
-        isolation=isolation.isolation_dtype(n),
-        types=registry.fault_types_dtype(n),
-        statistical=statistical.statistical_dtype(size),
-        sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
-        engine_monitor=monitors.ENGINE_MONITOR_RECORD,
+        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
+        fdae=filters.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
+        isolation=isolation.isolation_dtype(n), types=registry.fault_types_dtype(n),
+        statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
+        published=published.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
     )  # fmt: skip
 
@@ -70,7 +61,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     monitors.configure_balance(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         published.reconfigure_published(fdi, declared, travel)
-    registry.configure_fault_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
+    registry.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
     fdi["types"]["config"]["has_eG"] = fdi["bound"]["has_eG"]
     conclusions.reset_conclusion(fdi["verdict"])
 
@@ -100,33 +91,25 @@ def _refuse_pairs(declared: Declared) -> None:
 def record_isolated_surfaces(fdi, t):
     """Record at t s which surfaces are isolated: those of a pair, or the isolated one; none once a sensor is
     found broken."""
-    done, monitor = fdi.verdict, fdi.sensor_monitor
+    found, monitor = fdi.verdict, fdi.sensor_monitor
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
-    sole = conclusions.isolated_surface(done, fdi.isolation.estimator)
+    sole = conclusions.isolated_surface(found, fdi.isolation.estimator)
     all_types, fies = fdi.config.diagnoses_all_types, fdi.isolation.estimator
     for s, surf in enumerate(fdi.types.surface):
-        isolated, kind = s == sole, done.fault_type
+        isolated, kind = s == sole, found.fault_type
         if fdi.types.pair.enabled:
             isolated, kind = surf.status.is_isolated, surf.status.fault_type
         j = fdi.layout.position[s] if all_types else fdi.layout.loss[s]
-        refuted = (
-            s == fdi.types.pair.first_pitch_fault_surface
-            and surf.status.can_be_at_fault_basis == DEDUCED_FAULTY
-        )
-        named = done.isolated_type[s] if isolated else TYPE_UNDECIDED
+        refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
+        named = found.isolated_type[s] if isolated else TYPE_UNDECIDED
         reason = conclusions.reason_of_withdrawal(
             fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER,
             void,
             j >= 0 and fies[j].excluded,
-            not all_types or (any_type_of_name_remains(surf, named) and not refuted),
+            not all_types or (name_remains(surf, named) and not refuted),
         )
         conclusions.update_interval(
-            done,
-            s,
-            isolated and not void,
-            t,
-            FIRST_TYPE_WITH_SAME_NAME[kind] if kind >= 0 else -1,
-            reason,
+            found, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
         )
 
 
@@ -134,11 +117,9 @@ def record_isolated_surfaces(fdi, t):
 def detection_share(bank, alarm, authority, likely):
     """The largest share of its threshold that the built-in detection reaches at this frame.
 
-    alarm: `ALARM` of the statistical detector; likely: whether its estimates
-    count.
-
-    Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
-    lower level could trade for power.
+    alarm: of the statistical detector (ALARM_RECORD); likely: whether its estimates count. Of two detectors,
+    the worst-case one counts beyond its bound only: it has no rate of false alarms that a lower level could
+    trade for power.
     """
     score = alarm.ratio if likely else 0.0
     if authority == STATISTICAL_DETECTOR:

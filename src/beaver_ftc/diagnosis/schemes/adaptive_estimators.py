@@ -23,10 +23,7 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
-from beaver_ftc.diagnosis.model_prediction import (
-    fill_old_effects,
-    innovation_known,
-)
+from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import pairs, registry, verdict
@@ -83,14 +80,7 @@ def start_filters(fdi, x):
 @kernel
 def update_filters(fdi, pred, meas):
     """Bring the detection filters from the frame before to this one: innovation, residuals and thresholds."""
-    filters.update_bank(
-        fdi.bank,
-        fdi.bound,
-        meas.x,
-        pred.x_before,
-        pred.means.F,
-        fdi.config.dt,
-    )
+    filters.update_bank(fdi.bank, fdi.bound, meas.x, pred.x_before, pred.means.F, fdi.config.dt)
 
 
 @kernel
@@ -104,16 +94,7 @@ def update_estimators(fdi, pred):
     iso = fdi.isolation
     means = pred.means
     detected = fdi.verdict.detected
-    isolation.update_effects(
-        iso,
-        fdi.bank,
-        bound,
-        cfg,
-        detected,
-        means.G,
-        means.Gu,
-        means.e_Gu,
-    )
+    isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
     if detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
         isolation.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
 
@@ -125,8 +106,7 @@ def begin_filters(fdi, pred, meas):
 
 
 NO_DIAGNOSIS = CompiledScheme(
-    begin_filters, skip_advance, skip_verdict, skip_prepare,
-    skip_substep
+    begin_filters, skip_advance, skip_verdict, skip_prepare, skip_substep
 )  # fmt: skip
 
 
@@ -168,13 +148,7 @@ def continue_isolation(fdi, meas, t, before):
 def worst_case_allows(fdi, fie, x, started):
     """Whether the fault of estimator fie is possible in the worst case; x (3,) rad/s: measured."""
     return isolation.fault_possible(
-        fdi.isolation,
-        fie,
-        fdi.bank,
-        fdi.bound.nu_max,
-        fdi.config.abrupt,
-        x,
-        started,
+        fdi.isolation, fie, fdi.bank, fdi.bound.nu_max, fdi.config.abrupt, x, started
     )
 
 
@@ -186,13 +160,7 @@ def likelihood_excludes(fdi, fie):
         return False
     hidden = fdi.sensor_monitor.config.enabled and stat.gust.output.gusty
     isolation.update_likelihood(
-        fie,
-        stat.test,
-        stat.block,
-        fdi.isolation,
-        fdi.layout.loss,
-        cfg.abrupt,
-        hidden,
+        fie, stat.test, stat.block, fdi.isolation, fdi.layout.loss, cfg.abrupt, hidden
     )
     return fie.unlikely == 1
 
@@ -204,14 +172,7 @@ def parity_excludes(fdi, fie):
     j = fdi.layout.position[fie.surface]
     views = stat.views[: stat.n_views]
     G = fdi.isolation.estimator[j].effect.regressor
-    return parity.views_exclude(
-        views,
-        stat.test,
-        stat.forces,
-        stat.gust,
-        fie.surface,
-        G,
-    )
+    return parity.views_exclude(views, stat.test, stat.forces, stat.gust, fie.surface, G)
 
 
 @kernel
@@ -284,22 +245,16 @@ def type_by_either(fdi, meas, t, started):
 @kernel
 def decide_type(fdi, t, started):
     """Decide which fault of every type, alone or two at a time, is there."""
-    types, done, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
+    types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
-    verdict.record_position_estimator_exclusions(types.surface, layout, fies)
+    verdict.record_exclusions(types.surface, layout, fies)
     if types.pair.enabled:
-        pairs.observe_pairs_and_judge_previous(types, layout, fies, bank, bound.nu_max)
-        conclusion.record_decision(
-            done,
-            pairs.decide_pair_isolation_and_accommodation(types, done, layout, t),
-        )
+        pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
+        conclusion.record_decision(found, pairs.decide_pairs(types, found, layout, t))
         return
     if started or fdi.isolation.config.reach:
-        registry.observe_frame_and_judge_previous(types, layout, fies, bank.output.innovation, bound)
-    conclusion.record_decision(
-        done,
-        verdict.decide_isolation_and_accommodation(types, done, layout, fies, t),
-    )
+        registry.observe_frame(types, layout, fies, bank.output.innovation, bound)
+    conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
 
 
 @apart
@@ -310,7 +265,7 @@ def skip_begin(fdi):
 @apart
 def begin_types(fdi):
     """Start the feasible sets of all types (IsolationVariant)."""
-    registry.restart_fault_types(fdi.types)
+    registry.restart_types(fdi.types)
 
 
 @apart
@@ -367,56 +322,12 @@ def update_tests(fdi, pred, meas, k, t):
     fill_block_signatures(blocks, means.Gu_old, unanticipated_pitch(pred.design, y, 1.0))
     alarmed = stat.alarm.detected_at_s >= 0.0
     may_end = not fdi.config.abrupt
-    statistical.update_blocks(
-        cfg,
-        eta,
-        blocks,
-        gust,
-        nu,
-        dt,
-        k,
-        alarmed,
-        may_end,
-    )
-    parity.turn_views(
-        views,
-        force,
-        gust,
-        fdi.bound,
-        means.G_old,
-        means.Gu_old,
-    )
-    parity.project_innovation(
-        views,
-        cfg.regress,
-        stat.noise,
-        blocks,
-        force,
-        gust,
-        vaneless,
-        nu,
-        y[AIRSPEED],
-    )
-    parity.update_views(
-        views,
-        cfg,
-        stat.tone_test_config,
-        y,
-        dt,
-        k,
-        alarmed,
-    )
+    statistical.update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end)
+    parity.turn_views(views, force, gust, fdi.bound, means.G_old, means.Gu_old)
+    parity.project_innovation(views, cfg.regress, stat.noise, blocks, force, gust, vaneless, nu, y[AIRSPEED])
+    parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
-    statistical.update_alarm(
-        stat.alarm,
-        cfg,
-        blocks,
-        views,
-        force,
-        gust,
-        t,
-        bounded,
-    )
+    statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)
     innovation_known(pred, meas.x, dt)
     statistical.filter_known(blocks, gust, pred.nu_known, dt)
 
@@ -425,25 +336,9 @@ def update_tests(fdi, pred, meas, k, t):
 def prepare_gusts(fdi, pred, meas, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
-    update_gusts(
-        stat.gust,
-        stat.vaneless,
-        stat.forces,
-        pred,
-        meas,
-        k,
-        dt,
-    )
+    update_gusts(stat.gust, stat.vaneless, stat.forces, pred, meas, k, dt)
     statistical.prepare_tests(
-        stat.test,
-        stat.noise,
-        stat.block,
-        stat.gust,
-        fdi.bound,
-        pred.design,
-        meas,
-        pred.u,
-        dt,
+        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, pred.design, meas, pred.u, dt
     )
 
 
@@ -453,15 +348,7 @@ def add_gust_instant(fdi, pred, meas):
     stat = fdi.statistical
     h = pred.w * fdi.config.dt
     statistical.add_test_instant(
-        stat.test,
-        stat.noise,
-        stat.block,
-        stat.gust,
-        fdi.bound,
-        pred.design,
-        meas,
-        pred.u,
-        h,
+        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, pred.design, meas, pred.u, h
     )
 
 
@@ -488,9 +375,7 @@ def update_forces(gust, vaneless, force, pred, meas, k, dt):
         gusts.store_accelerometer_reading(vaneless, meas.force)
         gusts.set_intensity(vaneless, meas.altitude)
         gusts.step_gust(vaneless, force.y_free, meas.attitude, dt, k)
-        gusts.fill_gust_effect(
-            vaneless, pred.design, meas.x, force.y_free, pred.u
-        )
+        gusts.fill_gust_effect(vaneless, pred.design, meas.x, force.y_free, pred.u)
         gusts.begin_gust_sums(vaneless, force.y_free[AIRSPEED], dt)
 
 
@@ -504,22 +389,14 @@ def begin_scheme(fdi, pred, meas):
 @apart
 def advance_estimators_to_frame(fdi, pred, meas, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
-    done, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
+    found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
     update_filters(fdi, pred, meas)
     if fdi.statistical.test.enabled:
         update_tests(fdi, pred, meas, k, t)
     update_estimators(fdi, pred)
     record_variant(fdi.config.variant, fdi, pred)
-    leaks = done.isolated_estimator >= 0 or done.target >= 0
-    filters.advance_fdae(
-        fdi.fdae,
-        bound,
-        pred.x_before,
-        pred.F_known,
-        done.detected,
-        leaks,
-        dt,
-    )
+    leaks = found.isolated_estimator >= 0 or found.target >= 0
+    filters.advance_fdae(fdi.fdae, bound, pred.x_before, pred.F_known, found.detected, leaks, dt)
 
 
 @apart
@@ -527,12 +404,12 @@ def update_verdict(fdi, pred, meas, t):
     """From residuals to the alarm and a verdict, unless a sensor is at fault (CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    before, done = fdi.verdict.detected, fdi.verdict
+    before, found = fdi.verdict.detected, fdi.verdict
     filters.fdae_residual(fdi.fdae, meas.x)
     axis = find_alarm_axis(fdi, meas.y, t)
     if axis >= 0:
-        conclusion.latch_alarm(done, axis, t)
-    if done.detected:
+        conclusion.latch_alarm(found, axis, t)
+    if found.detected:
         continue_isolation(fdi, meas, t, before)
         filters.evaluate_network(fdi.fdae.network, meas.y[ALPHA], meas.y[BETA])
 
@@ -542,9 +419,9 @@ def find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
     limit = fdi.bound.error_map.yaw_now
-    done = fdi.verdict
-    if not done.detected and monitors.detect_engine_failure(fdi.engine_monitor, limit, y):
-        conclusion.set_isolated(done, UNANTICIPATED, t)
+    found = fdi.verdict
+    if not found.detected and monitors.detect_engine_failure(fdi.engine_monitor, limit, y):
+        conclusion.set_isolated(found, UNANTICIPATED, t)
         return YAW
     return filters.alarm_axis(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
 
@@ -579,9 +456,5 @@ def plugin_update(fdi, pred, meas, t):
 
 
 PYTHON_PLUGIN = CompiledScheme(
-    begin_filters,
-    advance_estimators_to_frame,
-    plugin_update,
-    prepare_next_frame,
-    accumulate_substep,
+    begin_filters, advance_estimators_to_frame, plugin_update, prepare_next_frame, accumulate_substep
 )

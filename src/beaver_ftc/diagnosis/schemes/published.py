@@ -37,16 +37,16 @@ RATE_CENTRES_RAD_S, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspac
 N_CENTRES = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES_RAD_S), len(TRAVEL_SHARE_CENTRES))
 N_NODES = N_CENTRES[0] * N_CENTRES[1] * N_CENTRES[2]
 
-# c0, dc: of the centres, by axis and input. w_max: of a weight, projection P;
-# infinite without one. output: fhat, rad/s2.
+# c0, dc: first centre and spacing, by axis and input. w_max: of a weight, projection P; infinite without one.
+# part: Gaussians of each input. output: fhat, rad/s2.
 STATE_NETWORK_RECORD = record(
     config=record(gain=float, w_max=float, c0=(3, 3), dc=(3, 3)),
     memory=record(part=(3, N_CENTRES[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
     output=3,
 )
 
-# waits: whether the network waits for a residual outside the threshold; mu0: rad/s,
-# in the place of all adaptive thresholds, or 0.
+# waits: whether the network waits for a residual outside the threshold; mu0: rad/s, in the place of all
+# adaptive thresholds, or 0.
 PUBLISHED_CONFIG_RECORD = record(waits=int, mu0=float)
 PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_RECORD)
 
@@ -57,24 +57,15 @@ def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarra
     for i in range(3):
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
         for j, centres in enumerate(
-            (
-                ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD,
-                RATE_CENTRES_RAD_S,
-                deflections,
-            )
+            (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES_RAD_S, deflections)
         ):
-            (
-                net["config"]["c0"][i, j],
-                net["config"]["dc"][i, j],
-            ) = (
-                centres[0],
-                centres[1] - centres[0],
-            )
+            (net["config"]["c0"][i, j], net["config"]["dc"][i, j]) = (centres[0], centres[1] - centres[0])
 
 
 def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n)
-    rad: the stops."""
+    """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n) rad: the
+    stops.
+    """
     config, dt, iso = declared.fdi, 1.0 / declared.rate_hz, fdi["isolation"]
     options, pub = settings(DETECTORS, config.scheme, config.options), fdi["published"]
     pub["config"]["waits"] = options["dead_zone"]
@@ -82,10 +73,7 @@ def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) 
     configure_network(pub["network"], options["network_gain"], W_max, travel[:, fdi["layout"]["main"]])
     fdi["fdae"]["config"]["a"] = fdi["bank"]["config"]["a"][0] = euler_decay(config.detection_pole_per_s, dt)
     iso["config"]["a"] = euler_decay(config.isolation_pole_per_s, dt)
-    iso["config"]["gradient"], iso["config"]["gain"] = (
-        1,
-        options["adaptation_gain"],
-    )
+    iso["config"]["gradient"], iso["config"]["gain"] = (1, options["adaptation_gain"])
     iso["estimator"]["theta"] = options["initial_theta"]
     iso["config"]["free"] = not options["projection"]
     if not options["adaptive_threshold"]:
@@ -104,15 +92,8 @@ def euler_decay(lam: float, dt_s: float) -> float:
 
 @kernel
 def fill_input_basis(net, i, j, n, v):
-    """Fill part[j] with the Gaussians of that input of axis i at v; their squares
-    add up to 1."""
-    z = min(
-        max(
-            (v - net.config.c0[i, j]) / net.config.dc[i, j],
-            0.0,
-        ),
-        n - 1.0,
-    )
+    """part[j, k] = exp(-(z - k)^2 / 2) / |.|, z = (v - c0) / dc: Gaussians of input j of axis i at v."""
+    z = min(max((v - net.config.c0[i, j]) / net.config.dc[i, j], 0.0), n - 1.0)
     norm = np.sqrt(fill_gaussians(z, n, 0, net.memory.part[j]))
     for k in range(n):
         net.memory.part[j, k] /= norm
@@ -120,10 +101,9 @@ def fill_input_basis(net, i, j, n, v):
 
 @kernel
 def evaluate_state_network(net, main, x, y, u):
-    """Fill basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
+    """Fill basis, of unit length on each axis, and fhat = th^T basis, (3,) rad/s2, at (x, u).
 
-    x (3,) rad/s; y: measured signals; u (n,) rad; main (3,): the surface that leads each
-    axis.
+    main (3,): the surface that leads each axis.
     """
     for i in range(3):
         fill_input_basis(net, i, 0, N_CENTRES[0], y[ALPHA] if i == PITCH else y[BETA])
@@ -142,8 +122,7 @@ def evaluate_state_network(net, main, x, y, u):
 
 @kernel
 def train_state_network(net, eps, dt):
-    """th' = P{Gamma Z^T eps}, by a step of dt s; eps (3,), Z: the basis as it was
-    evaluated."""
+    """th <- clip(th + dt Gamma Z eps, w_max), Z: the basis as it was evaluated; eps (3,) rad/s."""
     for i in range(3):
         for n in range(N_NODES):
             w = net.memory.weights[i, n] + dt * net.config.gain * net.memory.basis[i, n] * eps[i]
@@ -165,8 +144,7 @@ def train_if_due(pub, fdae, detected, dt):
 
 @kernel
 def update_network(pub, fdae, main, x, y, u):
-    """Evaluate fhat for this frame, for the FDAE and the log; arguments as of
-    `evaluate_state_network`."""
+    """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
     evaluate_state_network(pub.network, main, x, y, u)
     set_network(fdae.network, pub.network.output)
 
@@ -187,15 +165,7 @@ def advance_estimators_to_frame(fdi, pred, meas, k, t):
     adaptive_estimators.update_filters(fdi, pred, meas)
     adaptive_estimators.update_estimators(fdi, pred)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    filters.advance_fdae(
-        fdi.fdae,
-        bound,
-        pred.x_before,
-        pred.means.F,
-        False,
-        False,
-        dt,
-    )
+    filters.advance_fdae(fdi.fdae, bound, pred.x_before, pred.means.F, False, False, dt)
     if pub.config.mu0 > 0.0:
         hold_thresholds(fdi, pub.config.mu0)
 
@@ -213,13 +183,13 @@ def update_verdict(fdi, pred, meas, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    before, done = fdi.verdict.detected, fdi.verdict
+    before, found = fdi.verdict.detected, fdi.verdict
     filters.fdae_residual(fdi.fdae, meas.x)
     axis = fdae_axis(fdi.fdae)
     update_network(fdi.published, fdi.fdae, fdi.layout.main, meas.x, meas.y, pred.u)
     if axis >= 0:
-        conclusion.latch_alarm(done, axis, t)
-    if done.detected:
+        conclusion.latch_alarm(found, axis, t)
+    if found.detected:
         adaptive_estimators.continue_isolation(fdi, meas, t, before)
 
 

@@ -111,7 +111,7 @@ def of(surface, *names):
 def of_stages(fdi, kernel):
     """What the arguments of kernels are called, of the stages of one diagnosis."""
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
-    later = "deflection" in kernel.__name__
+    later = "range" in kernel.__name__
     return {
         **dict.fromkeys(("c", "cfg", "config"), types["config"] if whole else fdi["config"]), "types": types, "surfs": types["surface"],
         **dict.fromkeys(("pair", "pair_record"), types["pair"]),

@@ -43,14 +43,14 @@ class FaultTypesConfig(NamedTuple):
 
     single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
     returns_lagged: a released surface returns by its actuator.
-    slowest_half_cycle_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
+    half_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
     1 where every frame is examined by itself; block_duration_s: its duration.
     """
 
     single_instant: bool
     n_substeps: int
     returns_lagged: bool
-    slowest_half_cycle_blocks: int
+    half_blocks: int
     frames_per_block: int
     block_duration_s: float
     dt_s: float
@@ -81,7 +81,7 @@ class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
     eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
-    changing part of a gyro's error. inertia_coupling_error_share, constant_part_of_error_bound_rad_s2: terms
+    changing part of a gyro's error. inertia_coupling_error_share, constant_error_rad_s2: terms
     of eta_bar. earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest +
     gyro_error_bound_per_rate |rate|, of the first what does not change, steady; zero where
     none is declared.
@@ -90,7 +90,7 @@ class DeclaredBounds(NamedTuple):
     eta_bar_rad_s2: np.ndarray
     changing_gyro_error_bound_rad_s: np.ndarray
     inertia_coupling_error_share: np.ndarray
-    constant_part_of_error_bound_rad_s2: np.ndarray
+    constant_error_rad_s2: np.ndarray
     earth_rate_rad_s: float
     gyro_error_bound_at_rest_rad_s: np.ndarray
     constant_gyro_error_bound_rad_s: np.ndarray
@@ -287,7 +287,7 @@ class DiagnosisReadout:
             eta_bar_rad_s2=bound["eta_bar"].copy(),
             changing_gyro_error_bound_rad_s=bound["n_gyro"].copy(),
             inertia_coupling_error_share=bound["inertia_coupling_error_share"].copy(),
-            constant_part_of_error_bound_rad_s2=bound["const"].copy(),
+            constant_error_rad_s2=bound["const"].copy(),
             earth_rate_rad_s=float(bound["earth_rate_rad_s"]),
             gyro_error_bound_at_rest_rad_s=at_rest,
             constant_gyro_error_bound_rad_s=constant,
@@ -353,9 +353,7 @@ def disable_diagnosis(fdi: np.void) -> None:
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
-def frame_arrays(
-    fdi: np.void, n_estimators: int, diagnoses_all_types: bool
-) -> dict[str, np.ndarray]:
+def frame_arrays(fdi: np.void, n_estimators: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies.
 
     eta_bar, noise: as of `DeclaredBounds`. offset, slope, spread (n_estimators, 3): effect of each
@@ -392,9 +390,7 @@ RECORDED_BLOCK_FIELDS = (
 )  # fmt: skip
 
 
-def alarm_arrays(
-    fdi: np.void, n_estimators: int, has_statistical_detector: bool
-) -> dict[str, np.ndarray]:
+def alarm_arrays(fdi: np.void, n_estimators: int, has_statistical_detector: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants the frames up to the alarm, not copies.
 
     reach_low, reach_high: what each hypothesis' fault can have done to the detection filters. Of the
@@ -476,9 +472,7 @@ def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
         int(hyp["surface"]),
         int(hyp["axis"]),
     )
-    return StatisticalHypothesis(
-        *place, bool(hyp["alarms"]), float(hyp["score"])
-    )
+    return StatisticalHypothesis(*place, bool(hyp["alarms"]), float(hyp["score"]))
 
 
 def read_sensor_monitor(mon: np.void) -> SensorMonitor:

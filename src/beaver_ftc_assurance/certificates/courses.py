@@ -171,7 +171,7 @@ def _exclude_oscillation(
     period."""
     for axis, lower in enumerate(bounds.lower.T):
         starts = run_starts(bounds.is_unexplained & (lower > bounds.command + MIN_POSITION_DIFFERENCE_RAD))
-        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.slowest_half_cycle_blocks)[
+        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.half_blocks)[
             :1
         ].tolist():
             run = range(int(starts[k]), k + 1)

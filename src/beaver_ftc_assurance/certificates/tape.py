@@ -13,12 +13,12 @@ from beaver_ftc.diagnosis.detection import N_SLOTS
 from beaver_ftc.loop import (
     FrameReadout,
     Loop,
+    alarm_flags,
     copy_memory,
     fly,
     give_back_memory,
     recorded_always,
     recorded_until_alarm,
-    alarm_flags,
     take_memory,
 )
 from beaver_ftc.scenario import Scenario

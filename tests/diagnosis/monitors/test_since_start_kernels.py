@@ -157,8 +157,8 @@ def test_small_errors_move_each_prediction_by_its_derivative():
     signed = {
         name: errors["C"][getattr(initial_errors, name)] / h
         for name in (
-            "PHI_Q", "PHI_R", "THETA_TURN", "PHI_DOWN", "PHI_SIDE", "THETA_G", "ALPHA_CLIMB", "VANE_ROLL", "VANE_YAW",
-            "ALPHA_FORCE", "BETA_FORCE", "SPEED_ALPHA", "SPEED_BETA", "SPEED_DENSITY",
+            "PHI_Q", "PHI_R", "THETA_TURN", "PHI_DOWN", "PHI_SIDE", "THETA_G", "ALPHA_CLIMB", "VANE_ROLL",
+            "VANE_YAW", "ALPHA_FORCE", "BETA_FORCE", "SPEED_ALPHA", "SPEED_BETA", "SPEED_DENSITY",
         )
     }  # fmt: skip
 

@@ -505,10 +505,7 @@ def test_how_much_an_own_error_may_explain(less, say):
 
 @pytest.mark.parametrize(("error", "say"), [(0.0029, GYRO_REFUTED), (0.0031, GYRO_OPEN)])
 def test_what_has_shown_and_is_gone_is_no_gyros(error, say):
-    assert (
-        asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, w_bound=(1, 1, 1))[0]
-        == say
-    )
+    assert asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, w_bound=(1, 1, 1))[0] == say
 
 
 def test_a_spike_within_the_attitudes_noise_says_nothing():
@@ -603,9 +600,7 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
 
 
 def test_a_bound_of_that_filter_is_never_below_zero():
-    monitor = new_watch(
-        D=np.diag([200.0, 1.0, 1.0]), w_bound=(1.0, 1.0, 1.0)
-    )
+    monitor = new_watch(D=np.diag([200.0, 1.0, 1.0]), w_bound=(1.0, 1.0, 1.0))
     watching.advance_gyro_estimate(monitor, np.zeros(3), np.zeros(3), DT)
     assert monitor["memory"]["w_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
 

@@ -80,14 +80,8 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["types"]["surface"][0]
-    assert (
-        known["sets"]["low"][fault_kinds.STUCK]
-        <= -0.26
-        <= known["sets"]["high"][fault_kinds.STUCK]
-    )
-    assert known["sets"]["high"][fault_kinds.STUCK] - known["sets"]["low"][
-        fault_kinds.STUCK
-    ] < np.deg2rad(4)
+    assert known["sets"]["low"][fault_kinds.STUCK] <= -0.26 <= known["sets"]["high"][fault_kinds.STUCK]
+    assert known["sets"]["high"][fault_kinds.STUCK] - known["sets"]["low"][fault_kinds.STUCK] < np.deg2rad(4)
     assert fault_finding_dict(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
@@ -99,10 +93,7 @@ def test_blocks_see_what_frames_do_not():
         plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position"][2]],
     )
     of_a_frame = 2 * plant.fdi["bound"]["nu_max"][2] / abs(estimator["effect"]["regressor"][2])
-    assert (
-        known["last"]["hi"] - known["last"]["lo"]
-        < 0.5 * of_a_frame
-    )
+    assert known["last"]["hi"] - known["last"]["lo"] < 0.5 * of_a_frame
 
 
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():

@@ -82,10 +82,7 @@ def test_the_surface_at_fault_is_never_excluded(surface, course):
 def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
     """Ablation: without what a surface at fault adds, and with the whole travel for the alarm as well."""
     assert not any(flown("jumps", seed=seed).position_excluded(ELEVATOR) for seed in range(4))
-    assert any(
-        flown("jumps", seed=seed, one_free=0).position_excluded(ELEVATOR)
-        for seed in range(4)
-    )
+    assert any(flown("jumps", seed=seed, one_free=0).position_excluded(ELEVATOR) for seed in range(4))
     for whole, found in ((0, True), (1, False)):
         changes = {"uncertainty": "hide", "two_free": whole}
         hidden = [flown("bias", seed=seed, **changes) for seed in range(4)]

@@ -176,9 +176,7 @@ def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval,
             place - 1e-3,
             place + 1e-3,
         )
-        assert registry.agrees_at_rest(surface) == (
-            stands and 0.0 <= place <= 0.2
-        ), place
+        assert registry.agrees_at_rest(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
@@ -227,9 +225,7 @@ def test_a_bias_keeps_the_offsets_that_explain_every_frame():
         surface["judged"]["u"],
     ) = 0.23, 0.4, 0.4
     judged(commanded_surface.bias_of_frame, fdi, surface, BIAS, 6)
-    assert (surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS]) == pytest.approx(
-        (-0.17, -0.15)
-    )
+    assert (surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS]) == pytest.approx((-0.17, -0.15))
     surface["last"]["u"] = 0.05
     assert on(commanded_surface.bias_range, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
     commands, surface["last"]["u"] = surface["commands"], -0.2
@@ -260,18 +256,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
             offset - 0.01,
             offset + 0.01,
         )
-        judged(
-            commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5
-        )
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(
-            commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5
-        )
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
@@ -314,9 +306,7 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
             place - 0.01,
             place + 0.01,
         )
-        judged(
-            commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5
-        )
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["has_run"][1] == ran
 
 
@@ -409,9 +399,7 @@ def test_an_oscillation_is_counted_by_half_cycles():
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
     assert commanded_surface.swing_has_shown(surface)
     assert not commanded_surface.swing_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
-    assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(
-        2 * np.pi / (10 * DT)
-    )
+    assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
     assert swing["square_past"] == pytest.approx(10 * 0.01)
@@ -419,9 +407,7 @@ def test_an_oscillation_is_counted_by_half_cycles():
 
 def test_the_amplitude_is_that_of_the_mean_square():
     fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
-    assert commanded_surface.swing_amplitude(fdi, 0, OSCILLATORY) == pytest.approx(
-        np.sqrt(2.0 * 0.01)
-    )
+    assert commanded_surface.swing_amplitude(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
 
 
 def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
@@ -510,9 +496,7 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
 @pytest.mark.parametrize(("least", "greatest", "hides"), [
     (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
 ])  # fmt: skip
-def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
-    least, greatest, hides
-):
+def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
     _, surface = new_surface()
     surface["commands"]["u_min"][0], surface["commands"]["u_max"][0] = (
         least,
@@ -542,9 +526,7 @@ def test_where_types_have_a_surface():
         0.25,
     )
     fdi["types"]["frame_index"] = 5
-    assert on(commanded_surface.loss_range, fdi, surface, CONSTANT_LOSS) == pytest.approx(
-        (-0.2, -0.05)
-    )
+    assert on(commanded_surface.loss_range, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
     assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.0, 0.0)
     surface["actuator"]["stop_lo"] = 0.1  # the lower stop is as near to neutral as it comes
     assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.1, 0.1)
@@ -582,9 +564,7 @@ def test_a_return_goes_by_the_actuator(instants):
     for _ in range(instants):
         path.append(place)
         place -= min(0.5 * place, 0.1)
-    assert on(held_surface.simulate_return, fdi, surface, 0.3) == pytest.approx(
-        (np.mean(path), place, 0.0)
-    )
+    assert on(held_surface.simulate_return, fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
@@ -596,9 +576,7 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["judged"]["kappa"] = (
-        0.25 * (G.max() - G.min()) / G.mean()
-    )
+    surface["judged"]["kappa"] = 0.25 * (G.max() - G.min()) / G.mean()
     mean, _, room = on(held_surface.simulate_return, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     (
@@ -617,9 +595,7 @@ def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
     assert on(held_surface.keep_returns, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx(
-        (0.22, 0.28)
-    )
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((0.22, 0.28))
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
         assert not on(held_surface.keep_returns, fdi, surface, STUCK)
@@ -661,9 +637,7 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == (0.1, 0.3)
     surface["judged"]["anomalous"] = 1
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx(
-        (0.05, 0.2)
-    )
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
     surface["judged"]["anomalous"] = 0
     on(held_surface.propagate_returns, fdi, surface, STUCK)
@@ -676,11 +650,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
 ):
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns_lagged"] = returns_lagged
-    elsewhere = (
-        held_surface.IS_RETURNING
-        if returns_lagged
-        else held_surface.IS_REFUTED
-    )
+    elsewhere = held_surface.IS_RETURNING if returns_lagged else held_surface.IS_REFUTED
     judged(held_surface.held_interval, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["sets"]["excluded"][STUCK] == (not returns_lagged)
     assert surface["release"]["released"][STUCK] == returns_lagged
@@ -720,9 +690,7 @@ def test_from_where_each_type_lets_go(kind):
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
-    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(
-        expected
-    )
+    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
@@ -742,13 +710,11 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
         held_surface.clear_releases(surface, which, kind)
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
-    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(
-        expected
-    )
+    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(expected)
 
 
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
+    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
     surface["stuck"]["lo_before"], surface["stuck"]["hi_before"] = (
         (0.0, 0.1),
         (0.2, 0.4),
@@ -756,9 +722,7 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.25, 0.26
     restore_sets(surface)
     assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.store_stuck(
-        surface, STUCK
-    )  # no earlier release: the later are the earlier ones now
+    held_surface.store_stuck(surface, STUCK)  # no earlier release: the later are the earlier ones now
     held = surface["release"]
     assert (held["back_lo"][0, STUCK], held["back_hi"][0, STUCK]) == (0.2, 0.3)
     assert not held_surface.may_return(surface, held_surface.LATER_SLOT, STUCK)
@@ -778,7 +742,7 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
 
 def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     """A block of frames in which the surface may be let go at any instant."""
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, is_anomalous_then=1)
+    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, anomalous_then=1)
     fdi["types"]["config"]["frames_per_block"] = len(commands)
     surface["commands"]["history"][1, : len(commands)] = commands
     surface["release"]["held_lo"][STUCK], surface["release"]["held_hi"][STUCK] = held
@@ -823,9 +787,7 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
-    surface["judged"]["lo"], surface["judged"]["hi"] = (
-        (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    )
+    surface["judged"]["lo"], surface["judged"]["hi"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
     assert on(held_surface.release_explains, fdi, surface, STUCK) == inside
     assert on(held_surface.keep_returns, fdi, surface, STUCK) == inside
     held = surface["release"]["held_lo"][STUCK] <= surface["release"]["held_hi"][STUCK]
@@ -846,12 +808,8 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     if joined:
         held["back_lo"][1, STUCK], held["back_hi"][1, STUCK] = 0.25, 0.251
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    low, high = (
-        on(held_surface.simulate_return, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1))
-    )
-    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx(
-        (low, high)
-    )
+    low, high = (on(held_surface.simulate_return, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((low, high))
     assert not held_surface.may_return(surface, held_surface.EARLIER_SLOT, STUCK)
     fdi["types"]["config"]["frames_per_block"], before = 1, held["back_hi"][1, STUCK].copy()
     held_surface.clear_releases(surface, held_surface.LATER_SLOT, STUCK)
@@ -876,9 +834,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
-    surface["judged"]["lo"], surface["judged"]["hi"] = (
-        (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    )
+    surface["judged"]["lo"], surface["judged"]["hi"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
     assert (
         on(
             held_surface.narrow_return,
@@ -906,7 +862,7 @@ def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
 
 
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
-    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
+    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
     surface["stuck"]["lo_before"], surface["stuck"]["hi_before"] = (
         (0.0, 0.1),
         (0.2, 0.4),
@@ -932,9 +888,7 @@ def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_co
             low,
             high,
         )
-        judged(
-            commanded_surface.update_swing, fdi, surface, OSCILLATORY, 10
-        )
+        judged(commanded_surface.update_swing, fdi, surface, OSCILLATORY, 10)
         assert swing["sign"] == 0, "on its command it is on no side of it"
 
 
@@ -965,9 +919,7 @@ def test_all_that_types_are_set_up_with_by_scenario_surface_and_actuator(keys, f
     actuators["real"], actuators["approach"] = 1, (0.2, 0.3, 0.4, 0.5)
     actuators["step"] = np.inf, np.radians(90.0) * instant_s, np.radians(2.5) * instant_s, np.inf
     travel = np.array([[0.05, -0.4, -0.3, -0.2], [0.5, 0.45, 0.35, -0.02]])
-    registry.configure_types(
-        types, layout, actuators, Declared.of(Scenario.model_validate(given)), travel
-    )
+    registry.configure_types(types, layout, actuators, Declared.of(Scenario.model_validate(given)), travel)
     config, pairs = types["config"], fdi.get("pairs", False)
     found = {name: config[name].item() for name in config.dtype.names if np.any(config[name])}
     expected = {

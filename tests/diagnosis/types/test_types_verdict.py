@@ -158,11 +158,7 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 )
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
     _, surface = one(*kinds)
-    same_name = (
-        verdict.SAME_NAME[sole_shown]
-        if sole_shown >= 0
-        else -1
-    )
+    same_name = verdict.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
     assert (verdict.choose_mode(surface) == GIVE_UP) == fixed
     assert verdict.sole_constant(surface) == one_type
     found = verdict.sole_shown(surface)
@@ -171,9 +167,7 @@ def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
     fdi = new_case(rudder=None)
-    assert [
-        bool(verdict.can_be_faulty(fdi["types"]["surface"][s])) for s in range(4)
-    ] == [
+    assert [bool(verdict.can_be_faulty(fdi["types"]["surface"][s])) for s in range(4)] == [
         True,
         True,
         False,
@@ -185,9 +179,7 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
         DEDUCED_FAULTY,
         0,
     )
-    assert [
-        bool(verdict.can_be_faulty(fdi["types"]["surface"][s])) for s in range(4)
-    ] == [
+    assert [bool(verdict.can_be_faulty(fdi["types"]["surface"][s])) for s in range(4)] == [
         False,
         True,
         True,
@@ -244,9 +236,7 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
         _, surface = one(direction, GROWING_BIAS)
         surface["growing_bias"]["has_run"][stop] = 1
         assert not verdict.can_be_another(surface, direction, True)
-        surface["growing_bias"]["has_run"][:] = (
-            1 - surface["growing_bias"]["has_run"]
-        )
+        surface["growing_bias"]["has_run"][:] = 1 - surface["growing_bias"]["has_run"]
         assert verdict.can_be_another(surface, direction, True)
     assert not verdict.can_be_another(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
     assert verdict.can_be_another(one(STUCK, GROWING_BIAS)[1], STUCK, False)
@@ -288,9 +278,7 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
 
 @pytest.mark.parametrize("kind", [STUCK, VARYING_LOSS, GROWING_BIAS])
 def test_what_a_stop_may_have_hidden_is_waited_for(kind):
-    fdi, surface = one(
-        kind, OSCILLATORY, evidence=99, n_unhidden=2 * PATIENCE - 1
-    )
+    fdi, surface = one(kind, OSCILLATORY, evidence=99, n_unhidden=2 * PATIENCE - 1)
     assert on(verdict.type_on_surface, fdi, surface) == -1
     leave(surface, kind)  # an oscillation that has been excluded is not
     assert on(verdict.type_on_surface, fdi, surface) == kind
@@ -315,23 +303,12 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
 def test_the_surface_at_fault():
     assert on(verdict.find_surface, new_case()) == NOT_ISOLATED
     assert on(verdict.find_surface, new_case(**NOBODY_ELSE)) == RUDDER
-    assert (
-        on(verdict.find_surface, new_case(rudder=None, **NOBODY_ELSE))
-        == UNANTICIPATED
-    )
+    assert on(verdict.find_surface, new_case(rudder=None, **NOBODY_ELSE)) == UNANTICIPATED
     pitch = {"aileron": None, "rudder": None, "flap": None}
-    assert (
-        on(verdict.find_surface, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
-    )
-    assert (
-        on(verdict.find_surface, new_case(elevator=(OSCILLATORY,), **pitch))
-        == NOT_ISOLATED
-    )
+    assert on(verdict.find_surface, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
+    assert on(verdict.find_surface, new_case(elevator=(OSCILLATORY,), **pitch)) == NOT_ISOLATED
     lateral = dict(NOBODY_ELSE)
-    assert (
-        on(verdict.find_surface, new_case(rudder=(OSCILLATORY,), **lateral))
-        == RUDDER
-    )
+    assert on(verdict.find_surface, new_case(rudder=(OSCILLATORY,), **lateral)) == RUDDER
 
 
 @pytest.mark.parametrize(
@@ -344,9 +321,7 @@ def test_the_surface_at_fault():
         (None, PATIENCE, 0, True),
     ],
 )  # fmt: skip
-def test_of_elevator_and_flap_the_one_a_constant_explains(
-    flap, evidence, has_eG, not_at_position
-):
+def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, has_eG, not_at_position):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     (
         fdi["types"]["surface"]["evidence"]["n_anomalous"][ELEVATOR],
@@ -358,9 +333,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
     fdi["types"]["surface"]["evidence"]["n_unhidden"][FLAP] = evidence
     assert bool(on(verdict.others_dismissed, fdi, ELEVATOR)) == not_at_position
     if flap is not None:
-        assert on(verdict.find_surface, fdi) == (
-            ELEVATOR if not_at_position else NOT_ISOLATED
-        )
+        assert on(verdict.find_surface, fdi) == (ELEVATOR if not_at_position else NOT_ISOLATED)
     fdi["types"]["surface"]["status"]["may_be_sole"][FLAP] = 0
     assert bool(on(verdict.others_dismissed, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
@@ -404,10 +377,7 @@ def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     assert on(verdict.presumed_surface, alone, NOT_ISOLATED) == AILERON
     assert on(verdict.presumed_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
     assert on(verdict.presumed_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
-    assert (
-        on(verdict.presumed_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED)
-        == NO_SURFACE
-    )
+    assert on(verdict.presumed_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
     fdi["verdict"]["isolated_estimator"] = 4 + FLAP
     assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == FLAP
 
@@ -462,9 +432,7 @@ def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(d
     fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_silent=0)
     fdi["types"]["config"]["dt"] = dt
     surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.1, 0.2
-    there = [
-        bool(on(verdict.fault_shows, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))
-    ]
+    there = [bool(on(verdict.fault_shows, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
     assert there.index(False) + 1 == round(0.2 / dt)
     assert not any(there[there.index(False) :])
 
@@ -701,9 +669,7 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert n_rest(low=0.0, high=0.14)[1]["evidence"]["n_rest"] == 0
     assert not n_rest(frames=PATIENCE)[1]["sets"]["excluded"][OSCILLATORY]
     assert n_rest(frames=PATIENCE + 1)[1]["sets"]["excluded"][OSCILLATORY]
-    assert not n_rest(frames=PATIENCE + 1, has_eG=1)[1]["sets"]["excluded"][
-        OSCILLATORY
-    ]
+    assert not n_rest(frames=PATIENCE + 1, has_eG=1)[1]["sets"]["excluded"][OSCILLATORY]
     fdi, surface = n_rest()
     fdi["types"]["surface"]["status"]["may_be_sole"] = 1, 1, 0, 1
     on(registry.count_rest, fdi, RUDDER)

@@ -9,8 +9,8 @@ import pytest
 from beaver_ftc.diagnosis.informed_test import (
     UNEXPLAINED_MEMORY_S,
     WhiteningFilter,
-    with_measured_gust,
     detection_probability,
+    with_measured_gust,
 )
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.loop.loop import Loop

@@ -201,9 +201,7 @@ class FaultType:
     deflection_relation: DeflectionRelation | None = None
     frames_test: str = ""
     estimate_parameter: Callable[[np.void, int, int], float | None] = _no_estimate
-    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = (
-        _no_estimate
-    )
+    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
     estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
 
 
@@ -222,9 +220,7 @@ def set_middle(srf, h):
 def feasible_set(fdi: np.void, s: int, h: int) -> tuple[float, float]:
     """The set of a type's parameter on surface s."""
     srf = fdi["types"]["surface"][s]
-    return float(srf["sets"]["low"][h]), float(
-        srf["sets"]["high"][h]
-    )
+    return float(srf["sets"]["low"][h]), float(srf["sets"]["high"][h])
 
 
 def middle_estimate(fdi: np.void, s: int, h: int) -> float:
@@ -344,34 +340,20 @@ def observe_surface(
     eff: what that supposes of the same frame or block, dtype EFFECT_RECORD.
     """
     last, cmd = srf.last, srf.commands
-    last.u = (
-        -eff.base[m] / eff.regressor[m]
-    )
-    last.kappa = (
-        0.25
-        * (cmd.G_max - cmd.G_min)
-        / abs(eff.regressor[m])
-    )
+    last.u = -eff.base[m] / eff.regressor[m]
+    last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.regressor[m])
     last.lo, last.hi = fie.theta_min, fie.theta_max
     for i in range(3):
-        if (
-            c.frames_per_block > 1
-            and i != m
-            and eff.regressor[i] != 0.0
-        ):
+        if c.frames_per_block > 1 and i != m and eff.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
-        lo, hi = isolation.consistent_on(
-            nu, nu_max, fie, eff, i
-        )
+        lo, hi = isolation.consistent_on(nu, nu_max, fie, eff, i)
         last.lo, last.hi = (
             max(last.lo, lo),
             min(last.hi, hi),
         )
     mark_stops(
         srf,
-        2.0
-        * (nu_max[m] + eff.e[m])
-        / abs(eff.regressor[m]),
+        2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]),
     )
 
 
@@ -379,12 +361,8 @@ def observe_surface(
 def mark_stops(srf, width):
     """Which stops can cut a deflection off unseen: those nearer to a healthy surface than
     `width` (rad), that of the interval which holds the true deflection."""
-    srf.last.hides[0] = (
-        srf.commands.u_min[0] - srf.actuator.stop_lo < width
-    )
-    srf.last.hides[1] = (
-        srf.actuator.stop_hi - srf.commands.u_max[0] < width
-    )
+    srf.last.hides[0] = srf.commands.u_min[0] - srf.actuator.stop_lo < width
+    srf.last.hides[1] = srf.actuator.stop_hi - srf.commands.u_max[0] < width
 
 
 @kernel
@@ -425,25 +403,17 @@ def set_anomalous(srf, anomalous):
 @kernel
 def clear_anomalies(srf):
     """Mark all three observations as not anomalous."""
-    srf.last.anomalous = srf.judged.anomalous = (
-        srf.earlier.anomalous
-    ) = 0
+    srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
 
 
 @kernel
 def last_error(srf):
     """Return the deflection error of the surface in the elapsed frame, rad: the middle of where it can have
     been."""
-    return (
-        0.5 * (srf.last.lo + srf.last.hi)
-        - srf.last.u
-    )
+    return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u
 
 
 def read_last_error(srf: np.void) -> float:
     """`last_error` of a record outside compiled code, rad."""
     last = srf["last"]
-    return float(
-        0.5 * (last["lo"] + last["hi"])
-        - last["u"]
-    )
+    return float(0.5 * (last["lo"] + last["hi"]) - last["u"])

@@ -24,9 +24,9 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    observe_error,
-    last_error,
     clear_anomalies,
+    last_error,
+    observe_error,
     registry,
     restore_first,
     set_anomalous,
@@ -40,8 +40,8 @@ from beaver_ftc.diagnosis.types.registry import (
 )
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
-    constant_remains,
     can_be_faulty,
+    constant_remains,
     type_remains,
 )
 
@@ -52,17 +52,12 @@ def latch_groups(pair, bank):
     for i in range(3):
         group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
         for m in range(bank.config.n_filters):
-            if (
-                abs(bank.output.residual[m, i])
-                > bank.output.threshold[m, i]
-            ):
+            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 pair.group_alarm[group] = 1
 
 
 @kernel
-def locate_lateral(
-    types, layout, est, nu, nu_max
-):
+def locate_lateral(types, layout, est, nu, nu_max):
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
     nu (3,), |eta| <= nu_max (3,) rad/s2."""
     a, r = layout.main[ROLL], layout.main[YAW]
@@ -73,41 +68,16 @@ def locate_lateral(
     Lr = rud.regressor[ROLL]
     Nr = rud.regressor[YAW]
     nu_L, nu_N = nu[ROLL], nu[YAW]
-    e_L = (
-        nu_max[ROLL] + ail.e[ROLL] + rud.e[ROLL]
-    )
-    e_N = (
-        nu_max[YAW] + ail.e[YAW] + rud.e[YAW]
-    )
-    det = (
-        La * Nr
-        - Na * Lr
-    )
+    e_L = nu_max[ROLL] + ail.e[ROLL] + rud.e[ROLL]
+    e_N = nu_max[YAW] + ail.e[YAW] + rud.e[YAW]
+    det = La * Nr - Na * Lr
     size = abs(det)
-    da = (
-        nu_L * Nr - nu_N * Lr
-    ) / det
-    e_a = (
-        e_L * abs(Nr)
-        + e_N * abs(Lr)
-    ) / size
-    reached = observe_error(
-        types.surface[a], da, e_a
-    )
-    dr = (
-        nu_N * La
-        - nu_L * Na
-    ) / det
-    e_r = (
-        e_N * abs(La)
-        + e_L * abs(Na)
-    ) / size
-    if not (
-        observe_error(
-            types.surface[r], dr, e_r
-        )
-        and reached
-    ):
+    da = (nu_L * Nr - nu_N * Lr) / det
+    e_a = (e_L * abs(Nr) + e_N * abs(Lr)) / size
+    reached = observe_error(types.surface[a], da, e_a)
+    dr = (nu_N * La - nu_L * Na) / det
+    e_r = (e_N * abs(La) + e_L * abs(Na)) / size
+    if not (observe_error(types.surface[r], dr, e_r) and reached):
         types.pair.lateral_outside = 1
 
 
@@ -118,9 +88,7 @@ def constant_range(c, srf, k):
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
-            h_lo, h_hi = possible_deflection_range(
-                c, srf, h, k
-            )
+            h_lo, h_hi = possible_deflection_range(c, srf, h, k)
             lo = min(lo, h_lo)
             hi = max(hi, h_hi)
     reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi
@@ -131,19 +99,12 @@ def constant_range(c, srf, k):
 
 
 @kernel
-def observe_pitch(
-    types, layout, est, nu, nu_max
-):
+def observe_pitch(types, layout, est, nu, nu_max):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
     s1 = types.pair.first_pitch
-    if (
-        s1 != NO_SURFACE
-        and not types.surface[s1].status.may_be_sole
-    ):
-        locate_second(
-            types, layout, est, nu, nu_max
-        )
+    if s1 != NO_SURFACE and not types.surface[s1].status.may_be_sole:
+        locate_second(types, layout, est, nu, nu_max)
         return
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
@@ -151,34 +112,20 @@ def observe_pitch(
 
 
 @kernel
-def locate_second(
-    types, layout, est, nu, nu_max
-):
+def locate_second(types, layout, est, nu, nu_max):
     """Find the position of the second surface, given the sets of the first."""
     s1 = types.pair.first_pitch
     s2 = layout.partner[s1]
     eff1 = est[layout.position[s1]].effect
     eff2 = est[layout.position[s2]].effect
     srf1 = types.surface[s1]
-    lo, hi = constant_range(
-        types.config, srf1, types.frame_index
-    )
-    set_known(
-        srf1, lo, hi
-    )
+    lo, hi = constant_range(types.config, srf1, types.frame_index)
+    set_known(srf1, lo, hi)
     M2 = eff2.regressor[PITCH]
     M1 = eff1.regressor[PITCH]
-    acc1 = M1 * last_error(
-        srf1
-    )
-    tol = (
-        abs(M1)
-        * 0.5
-        * (hi - lo)
-    )
-    tol += (
-        nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
-    )
+    acc1 = M1 * last_error(srf1)
+    tol = abs(M1) * 0.5 * (hi - lo)
+    tol += nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
     if not observe_error(
         types.surface[s2],
         (nu[PITCH] - acc1) / M2,
@@ -192,15 +139,9 @@ def observe_pairs(types, layout, est, bank, nu_max):
     """Observe the elapsed frame, plane by plane, and judge the one before; nu_max (3,):
     bound on the innovation."""
     latch_groups(types.pair, bank)
-    registry.observe_surfaces(
-        types, layout, est, bank.output.innovation, nu_max
-    )
-    locate_lateral(
-        types, layout, est, bank.output.innovation, nu_max
-    )
-    observe_pitch(
-        types, layout, est, bank.output.innovation, nu_max
-    )
+    registry.observe_surfaces(types, layout, est, bank.output.innovation, nu_max)
+    locate_lateral(types, layout, est, bank.output.innovation, nu_max)
+    observe_pitch(types, layout, est, bank.output.innovation, nu_max)
     registry.judge_frame(types)
 
 
@@ -226,17 +167,11 @@ def isolate_lateral(types, layout, t):
     yaw_alone = can_be_faulty(yaw)
     both = not roll_alone and not yaw_alone
     refuted = (
-        pair.lateral_outside == 1
-        or not verdict.any_type_remains(roll)
-        or not verdict.any_type_remains(yaw)
+        pair.lateral_outside == 1 or not verdict.any_type_remains(roll) or not verdict.any_type_remains(yaw)
     )
     outside = both and refuted
-    open_yet = both and not (
-        verdict.explains_flight(roll) and verdict.explains_flight(yaw)
-    )
-    isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (
-        outside or open_yet
-    )
+    open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
+    isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
     update_status(
         roll,
         isolates and not yaw_alone,
@@ -261,23 +196,13 @@ def store_first(types, s):
     pair, srf, new = types.pair, types.surface[s], False
     kept = srf.first_sets
     for h in range(N_CONSTANT):
-        new = (
-            new
-            or srf.sets.excluded[h] != kept.excluded[h]
-        )
-    pair.n_unstored = (
-        pair.n_unstored + 1 if new else 0
-    )
-    if (
-        pair.first_pitch != s
-        or pair.n_unstored >= types.config.half_frames
-    ):
+        new = new or srf.sets.excluded[h] != kept.excluded[h]
+    pair.n_unstored = pair.n_unstored + 1 if new else 0
+    if pair.first_pitch != s or pair.n_unstored >= types.config.half_frames:
         pair.first_pitch, pair.n_unstored = s, 0
         kept.low[:], kept.high[:] = srf.sets.low, srf.sets.high
         kept.excluded[:] = 1
-        kept.excluded[:N_CONSTANT] = srf.sets.excluded[
-            :N_CONSTANT
-        ]
+        kept.excluded[:N_CONSTANT] = srf.sets.excluded[:N_CONSTANT]
 
 
 @kernel
@@ -295,33 +220,19 @@ def begin_second(types, layout):
 @kernel
 def dismiss_varying(c, srf):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    imitated = verdict.can_be_another(
-        srf, verdict.sole_constant(srf), False
-    )
-    doubt = (
-        imitated or verdict.may_be_hidden(c, srf)
-    )
+    imitated = verdict.can_be_another(srf, verdict.sole_constant(srf), False)
+    doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
-    return (
-        long_enough
-        and verdict.would_have_shown(c, srf)
-        and not doubt
-    )
+    return long_enough and verdict.would_have_shown(c, srf) and not doubt
 
 
 @kernel
 def detect_second(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
-    if (
-        types.pair.first_pitch == NO_SURFACE
-        or layout.partner[types.pair.first_pitch] < 0
-    ):
+    if types.pair.first_pitch == NO_SURFACE or layout.partner[types.pair.first_pitch] < 0:
         return False
     srf1 = types.surface[types.pair.first_pitch]
-    if srf1.status.may_be_sole and not (
-        can_be_faulty(srf1)
-        and constant_remains(srf1)
-    ):
+    if srf1.status.may_be_sole and not (can_be_faulty(srf1) and constant_remains(srf1)):
         begin_second(types, layout)
     return not srf1.status.may_be_sole
 
@@ -333,11 +244,7 @@ def pitch_type(c, srf):
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
     kind = verdict.type_on_surface(c, srf)
-    return (
-        verdict.TYPE_UNDECIDED
-        if kind >= 0 and MODE[kind] == GIVE_UP
-        else kind
-    )
+    return verdict.TYPE_UNDECIDED if kind >= 0 and MODE[kind] == GIVE_UP else kind
 
 
 @kernel
@@ -348,23 +255,15 @@ def isolate_pitch(types, layout, t):
         s2 = layout.partner[types.pair.first_pitch]
         srf2 = types.surface[s2]
         anomalous = srf2.evidence.n_anomalous > 0
-        possible = can_be_faulty(
-            srf2
-        ) and verdict.any_type_remains(srf2)
+        possible = can_be_faulty(srf2) and verdict.any_type_remains(srf2)
         update_status(
             srf1,
             possible or not anomalous,
             srf1.status.fault_type,
             t,
         )
-        shows = (
-            anomalous
-            and possible
-            and verdict.explains_flight(srf2)
-        )
-        update_status(
-            srf2, shows, verdict.type_on_surface(types.config, srf2), t
-        )
+        shows = anomalous and possible and verdict.explains_flight(srf2)
+        update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
         return
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
@@ -372,9 +271,7 @@ def isolate_pitch(types, layout, t):
             update_status(
                 srf,
                 s == sole,
-                pitch_type(types.config, srf)
-                if s == sole
-                else -1,
+                pitch_type(types.config, srf) if s == sole else -1,
                 t,
             )
 
@@ -382,11 +279,7 @@ def isolate_pitch(types, layout, t):
 @kernel
 def sole_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = (
-        verdict.find_surface(types, layout)
-        if types.pair.group_alarm[PITCH_GROUP]
-        else NO_SURFACE
-    )
+    s = verdict.find_surface(types, layout) if types.pair.group_alarm[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not constant_remains(types.surface[s]):
         return NO_SURFACE
     if dismiss_varying(types.config, types.surface[s]):
@@ -405,19 +298,10 @@ def decide_pairs(types, past, layout, t):
     for s, srf in enumerate(types.surface):
         status = srf.status
         earliest = types.surface[max(first, 0)].status
-        if status.is_isolated and (
-            first < 0
-            or status.isolated_at_s < earliest.isolated_at_s
-        ):
+        if status.is_isolated and (first < 0 or status.isolated_at_s < earliest.isolated_at_s):
             first = s
-    estimator, isolated_at_s, kind, typed_at_s = (
-        first_finding(
-            types, past, layout, first, outside, t
-        )
-    )
-    lead, mode = accommodate_pairs(
-        types, layout
-    )
+    estimator, isolated_at_s, kind, typed_at_s = first_finding(types, past, layout, first, outside, t)
+    lead, mode = accommodate_pairs(types, layout)
     return (
         estimator,
         isolated_at_s,
@@ -429,9 +313,7 @@ def decide_pairs(types, past, layout, t):
 
 
 @kernel
-def first_finding(
-    types, past, layout, s, outside, t
-):
+def first_finding(types, past, layout, s, outside, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
     if s >= 0:
@@ -444,11 +326,7 @@ def first_finding(
             status.typed_at_s,
         )
     estimator = state.UNANTICIPATED if outside else state.NOT_ISOLATED
-    isolated_at_s = (
-        t
-        if estimator != past.isolated_estimator
-        else past.isolated_at_s
-    )
+    isolated_at_s = t if estimator != past.isolated_estimator else past.isolated_at_s
     return estimator, isolated_at_s, -1, past.typed_at_s
 
 
@@ -484,12 +362,8 @@ def accommodate_pairs(types, layout):
     for s, srf in enumerate(types.surface):
         verdict.set_mode(srf, -1)
         if acts_on(types, layout, s):
-            possible = srf.status.is_isolated == 1 or can_be_faulty(
-                srf
-            )
-            own = (
-                verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
-            )
+            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
+            own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
             if verdict.fault_shows(types.config, srf, own, possible):
                 verdict.set_mode(srf, own)
                 leads = s == layout.main[PITCH] and own in (

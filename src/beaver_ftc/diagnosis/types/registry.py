@@ -39,13 +39,13 @@ from beaver_ftc.diagnosis.types import (
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
-    observe_surface,
-    intersect_set,
-    exclude_type,
-    reset_feasible,
-    put_set,
-    set_anomalous,
     allow_reach,
+    exclude_type,
+    intersect_set,
+    observe_surface,
+    put_set,
+    reset_feasible,
+    set_anomalous,
     shift_observations,
     table,
 )
@@ -54,16 +54,12 @@ from beaver_ftc.scenario.declared import Declared
 BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
 )
-DEFAULT_SERVO_RAD_S = (
-    pi / 3.0
-)  # of an actuator with no declared rate limit: the aircraft's default
+DEFAULT_SERVO_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
 def _load_types() -> tuple[FaultType, ...]:
     """Those of a constant parameter first, then by rank: a type's number is its place."""
-    names = sorted(
-        f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__)
-    )
+    names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
     rows = [row for name in names for row in import_module(name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.has_constant_parameter, row.sort_rank, row.name)))
 
@@ -73,9 +69,7 @@ N_TYPES = len(TYPES)
 N_CONSTANT = sum(row.has_constant_parameter for row in TYPES)
 TYPE_NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
 DESCRIPTIONS_IN_TYPE_ORDER: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
-SAME_NAME = tuple(
-    TYPE_NAMES.index(name) for name in TYPE_NAMES
-)  # the first type of the same name
+SAME_NAME = tuple(TYPE_NAMES.index(name) for name in TYPE_NAMES)  # the first type of the same name
 
 
 def _type_column(name: str) -> np.ndarray:
@@ -122,25 +116,16 @@ ERROR_TYPES = np.array(
     ),
     dtype=int,
 )
-END_TYPE = np.array(
-    [
-        TYPE_NAMES.index(row.end_type) if row.end_type else -1
-        for row in TYPES
-    ]
-)
+END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
 
 def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direction: int = 0) -> int:
     """The number of a type, by its name in the table; stop_direction: of the stop to which it runs."""
     sought = (name, has_constant_parameter, stop_direction)
-    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(
-        sought
-    )
+    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _compile_kernel(
-    name: str, arguments: str, lines: list[str], namespace: dict[str, Any]
-) -> Kernel:
+def _compile_kernel(name: str, arguments: str, lines: list[str], namespace: dict[str, Any]) -> Kernel:
     """A kernel whose body is `lines`, in which `part_3` is a part of type 3.
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
@@ -152,9 +137,7 @@ def _compile_kernel(
 
 def _call_expression(h: int, arguments: str) -> str:
     """The call of a part of type `h`; the argument of that name is its number."""
-    given = (
-        str(h) if argument == "type_index" else argument for argument in arguments.split(", ")
-    )
+    given = (str(h) if argument == "type_index" else argument for argument in arguments.split(", "))
     return f"part_{h}({', '.join(given)})"
 
 
@@ -167,20 +150,13 @@ def _kernel_namespace(parts: dict[int, Kernel], **other_names: Any) -> dict[str,
     }
 
 
-def _call_each(
-    name: str, arguments: str, result: Kernel | None = None
-) -> Kernel:
+def _call_each(name: str, arguments: str, result: Kernel | None = None) -> Kernel:
     """A kernel that calls this part of every type; result(surface, h, interval): called with
     what that returns."""
     parts = _parts_of(name)
     parameters = ", ".join(argument for argument in arguments.split(", ") if argument != "type_index")
-    calls = {
-        h: _call_expression(h, arguments) for h in parts
-    }
-    lines = [
-        f"result_kernel(surface, {h}, {call})" if result else call
-        for h, call in calls.items()
-    ]
+    calls = {h: _call_expression(h, arguments) for h in parts}
+    lines = [f"result_kernel(surface, {h}, {call})" if result else call for h, call in calls.items()]
     return _compile_kernel(
         f"{name}_each",
         parameters,
@@ -193,13 +169,8 @@ def _call_one(name: str, arguments: str, default: Any) -> Kernel:
     """A kernel that returns what this part of the type `h` returns; `default` for
     a type without it."""
     parts = _parts_of(name)
-    lines = [
-        f"if type_index == {h}: return {_call_expression(h, arguments)}"
-        for h in parts
-    ]
-    parameters = (
-        arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
-    )
+    lines = [f"if type_index == {h}: return {_call_expression(h, arguments)}" for h in parts]
+    parameters = arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
     return _compile_kernel(
         f"{name}_of",
         parameters,
@@ -213,25 +184,17 @@ reset_memory_each = _call_each("reset_memory", "surface, type_index")
 parameter_range_each = _call_each("parameter_range", "surface", put_set)
 before_judging_frame_each = _call_each("before_judging_frame", "config, surface, type_index")
 on_skipped_frame_each = _call_each("on_skipped_frame", _FRAME_ARGUMENTS)
-consistent_each = _call_each(
-    "consistent_interval", _FRAME_ARGUMENTS, intersect_set
-)
+consistent_each = _call_each("consistent_interval", _FRAME_ARGUMENTS, intersect_set)
 on_possible_release_each = _call_each("on_possible_release", _FRAME_ARGUMENTS)
-set_after_each = _call_each(
-    "set_after_frame", "surface, type_index", put_set
-)
+set_after_each = _call_each("set_after_frame", "surface, type_index", put_set)
 propagate_release_each = _call_each("propagate_release", "config, surface, type_index")
 has_shown = _call_one("has_shown", "surface", True)
 motion_rules_out = _call_one("motion_rules_out", "surface, stop_direction", False)
-possible_deflection_range = _call_one(
-    "possible_deflection_range", _FRAME_ARGUMENTS, EMPTY_SET
-)
+possible_deflection_range = _call_one("possible_deflection_range", _FRAME_ARGUMENTS, EMPTY_SET)
 error_of_type = _call_one("deflection_error", "surface, type_index", np.nan)
 
 MAX_BLOCK = 256  # frames of a block
-N_KEPT = (
-    3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
-)
+N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
 # Commands to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
 COMMANDS_RECORD = record(
@@ -311,9 +274,7 @@ FAULT_PAIR_RECORD = record(
 )
 
 # Blocks of frames.
-FRAME_BLOCK_RECORD = record(
-    n_so_far=int, nu=3, nu_bound=3, n_start=3
-)
+FRAME_BLOCK_RECORD = record(n_so_far=int, nu=3, nu_bound=3, n_start=3)
 
 
 @lru_cache
@@ -369,9 +330,7 @@ def configure_types(
     c["abrupt"] = fdi.fault_profile == "abrupt"
     types["pair"]["first_pitch"], types["pair"]["enabled"] = -1, fdi.pairs
     names, h = declared.aircraft.surfaces, dt / declared.substeps
-    for s, (name, srf, lo, hi) in enumerate(
-        zip(names, types["surface"], *travel, strict=True)
-    ):
+    for s, (name, srf, lo, hi) in enumerate(zip(names, types["surface"], *travel, strict=True)):
         rate_deg_s = getattr(declared.servos, name).rate_limit_deg_s
         act = srf["actuator"]
         act["stop_lo"], act["stop_hi"] = lo, hi
@@ -383,12 +342,8 @@ def configure_types(
             servos["approach"][s],
             servos["step"][s],
         )
-        act["runaway"] = 0.5 * (
-            radians(rate_deg_s) or DEFAULT_SERVO_RAD_S
-        )
-        act["slow_step"] = min(
-            radians(fdi.slowest_rate_deg_s) * h, act["step"]
-        )
+        act["runaway"] = 0.5 * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
+        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["step"])
         srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
         srf["accommodation"]["mode"] = srf["status"]["fault_type"] = -1
 
@@ -407,9 +362,7 @@ def restart_surface(srf):
     parameter_range_each(srf)
     allow_reach(srf)
     srf.evidence.k_first = -1
-    srf.evidence.n_anomalous = srf.evidence.n_rest = (
-        srf.evidence.n_unhidden
-    ) = 0
+    srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
     reset_memory_each(srf)
 
 
@@ -424,9 +377,7 @@ def record_commands(types, u, ext):
         cmd = srf.commands
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
-                cmd.history[b, :n] = (
-                    cmd.history[b - 1, :n]
-                )
+                cmd.history[b, :n] = cmd.history[b - 1, :n]
                 cmd.cmd_min[b], cmd.cmd_max[b] = (
                     cmd.cmd_min[b - 1],
                     cmd.cmd_max[b - 1],
@@ -438,32 +389,20 @@ def record_commands(types, u, ext):
             )
             cmd.u_min[0], cmd.u_max[0] = np.inf, -np.inf
             cmd.G_min, cmd.G_max = np.inf, -np.inf
-        p = min(
-            max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi
-        )
+        p = min(max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi)
         cmd.history[0, types.block.n_so_far] = p
         cmd.cmd_min[0], cmd.cmd_max[0] = (
             min(cmd.cmd_min[0], p),
             max(cmd.cmd_max[0], p),
         )
-        cmd.u_min[0] = min(
-            cmd.u_min[0], ext.u_min[s]
-        )
-        cmd.u_max[0] = max(
-            cmd.u_max[0], ext.u_max[s]
-        )
-        cmd.G_min = min(
-            cmd.G_min, ext.G_min[s]
-        )
-        cmd.G_max = max(
-            cmd.G_max, ext.G_max[s]
-        )
+        cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
+        cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
+        cmd.G_min = min(cmd.G_min, ext.G_min[s])
+        cmd.G_max = max(cmd.G_max, ext.G_max[s])
 
 
 @kernel
-def observe_surfaces(
-    types, layout, est, nu, nu_max
-):
+def observe_surfaces(types, layout, est, nu, nu_max):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
     nu_max (3,): on nu (3,) without a fault, rad/s2.
@@ -474,9 +413,7 @@ def observe_surfaces(
         set_anomalous(srf, anomalous)
         fie, axis = est[layout.position[s]], layout.dominant_axis[s]
         eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
-        observe_surface(
-            types.config, srf, fie, axis, nu, nu_max, eff
-        )
+        observe_surface(types.config, srf, fie, axis, nu, nu_max, eff)
 
 
 @kernel
@@ -514,16 +451,9 @@ def judge_frame(types):
         before_judging_frame_each(c, srf)
         if c.returns_lagged and types.frame_index > 0:
             on_possible_release_each(c, srf, k)
-        if (
-            c.abrupt
-            and srf.accommodation.mode == GIVE_UP
-            and not srf.judged.anomalous
-        ):
+        if c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous:
             count_rest(types, s)
-        elif srf.judged.anomalous and (
-            c.single_instant
-            or (srf.earlier.anomalous and srf.last.anomalous)
-        ):
+        elif srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous)):
             count_anomaly(srf)
             judge_types(c, srf, k)
         else:
@@ -531,10 +461,7 @@ def judge_frame(types):
         if c.returns_lagged and types.frame_index > 0:
             set_after_each(srf)
             propagate_release_each(c, srf)
-        if (
-            srf.judged.hides[0]
-            or srf.judged.hides[1]
-        ):
+        if srf.judged.hides[0] or srf.judged.hides[1]:
             srf.evidence.n_unhidden = 0
     types.frame_index += 1
 
@@ -586,12 +513,8 @@ def extend_block(types, layout, est, nu, bound):
         return
     block.n_so_far = 0
     for i in range(3):
-        block.nu_bound[i] += (
-            block.n_start[i] + bound.n_gyro[i]
-        ) / c.block_duration_s
-    observe_surfaces(
-        types, layout, est, block.nu, block.nu_bound
-    )
+        block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
+    observe_surfaces(types, layout, est, block.nu, block.nu_bound)
     judge_frame(types)
 
 
@@ -606,9 +529,7 @@ def count_rest(types, s):
     if not agrees_at_rest(srf):
         return
     for i, other in enumerate(types.surface):
-        if i == s or (
-            srf.status.may_be_sole and other.status.may_be_sole
-        ):
+        if i == s or (srf.status.may_be_sole and other.status.may_be_sole):
             count_anomaly(other)
     srf.evidence.n_rest += 1
     if srf.evidence.n_rest > types.config.half_frames and not types.config.has_eG:
@@ -622,13 +543,7 @@ def agrees_at_rest(srf):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for h in range(N_TYPES):
         lo, hi = srf.sets.low[h], srf.sets.high[h]
-        outside = (
-            srf.judged.lo > hi
-            or srf.judged.hi < lo
-        )
-        if (
-            REST[h] == REST_POSITION_IS_PARAMETER
-            and outside
-        ):
+        outside = srf.judged.lo > hi or srf.judged.hi < lo
+        if REST[h] == REST_POSITION_IS_PARAMETER and outside:
             return False
     return True

@@ -21,25 +21,25 @@ from beaver_ftc.diagnosis.types import (
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    set_middle,
     last_error,
     registry,
+    set_middle,
 )
 from beaver_ftc.diagnosis.types.registry import (
-    MODE,
     CAN_LOOK_LIKE,
+    END_TYPE,
     ERROR_TYPES,
     FOLLOWS_COMMAND,
-    SAME_NAME,
-    WAIT_HALF_CYCLES,
-    REST,
-    SERVES,
+    MODE,
     MUST_SHOW,
     N_CONSTANT,
     N_TYPES,
+    REST,
+    SAME_NAME,
+    SERVES,
     SHOW_HALF_CYCLES,
     STOP_SIDE,
-    END_TYPE,
+    WAIT_HALF_CYCLES,
     error_of_type,
     has_shown,
     motion_rules_out,
@@ -115,11 +115,7 @@ def explains_flight(srf):
 def would_have_shown(c, srf):
     """Whether each type that must show itself is excluded, or has had the time to, hidden by no stop."""
     for h in range(N_TYPES):
-        if (
-            type_remains(srf, h)
-            and srf.evidence.n_unhidden
-            < SHOW_HALF_CYCLES[h] * c.half_frames
-        ):
+        if type_remains(srf, h) and srf.evidence.n_unhidden < SHOW_HALF_CYCLES[h] * c.half_frames:
             return False
     return True
 
@@ -131,10 +127,7 @@ def sole_type(srf, n):
     kind = TYPE_UNDECIDED
     for h in range(n):
         if type_remains(srf, h):
-            if (
-                kind >= 0
-                and SAME_NAME[h] != SAME_NAME[kind]
-            ):
+            if kind >= 0 and SAME_NAME[h] != SAME_NAME[kind]:
                 return TYPE_UNDECIDED
             kind = h if kind < 0 else kind
     return kind
@@ -157,16 +150,10 @@ def sole_shown(srf):
 def may_be_hidden(c, srf):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
-    if (
-        not constant_remains(srf)
-        or srf.evidence.n_anomalous - srf.evidence.n_rest
-        >= c.half_frames
-    ):
+    if not constant_remains(srf) or srf.evidence.n_anomalous - srf.evidence.n_rest >= c.half_frames:
         return False
     for h in range(N_TYPES):
-        if REST[h] == REST_HIDES_TYPE and type_remains(
-            srf, h
-        ):
+        if REST[h] == REST_HIDES_TYPE and type_remains(srf, h):
             return True
     return False
 
@@ -176,14 +163,8 @@ def can_imitate(srf, h, apparent):
     """Whether a fault of type `h` may look like one of `apparent`, or of another type left of
     that name and of constant parameter."""
     for j in range(N_CONSTANT):
-        alike = (
-            SAME_NAME[j] == SAME_NAME[apparent]
-            and CAN_LOOK_LIKE[h, j]
-            and type_remains(srf, j)
-        )
-        if alike and not motion_rules_out(
-            srf, STOP_SIDE[j], h
-        ):
+        alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
+        if alike and not motion_rules_out(srf, STOP_SIDE[j], h):
             return True
     return False
 
@@ -194,9 +175,7 @@ def can_be_another(srf, apparent, dependent):
     `dependent`, one that does not follow the command."""
     if apparent >= 0:
         for h in range(N_CONSTANT, N_TYPES):
-            other = type_remains(srf, h) and (
-                dependent or not FOLLOWS_COMMAND[h]
-            )
+            other = type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h])
             if other and can_imitate(srf, h, apparent):
                 return True
     return False
@@ -208,11 +187,7 @@ def sole_surface(surfs, constant):
     SEVERAL_SURFACES."""
     sole = NO_SURFACE
     for s, srf in enumerate(surfs):
-        if (
-            srf.status.may_be_sole
-            and can_be_faulty(srf)
-            and (constant_remains(srf) or not constant)
-        ):
+        if srf.status.may_be_sole and can_be_faulty(srf) and (constant_remains(srf) or not constant):
             sole = s if sole == NO_SURFACE else SEVERAL_SURFACES
     return sole
 
@@ -229,18 +204,9 @@ def find_surface(types, layout):
     if s == NO_SURFACE:
         return UNANTICIPATED
     if s >= 0:
-        return (
-            s
-            if layout.dominant_axis[s] != PITCH
-            or explains_flight(types.surface[s])
-            else NOT_ISOLATED
-        )
+        return s if layout.dominant_axis[s] != PITCH or explains_flight(types.surface[s]) else NOT_ISOLATED
     s = sole_surface(types.surface, True)
-    return (
-        s
-        if s >= 0 and others_dismissed(types, s)
-        else NOT_ISOLATED
-    )
+    return s if s >= 0 and others_dismissed(types, s) else NOT_ISOLATED
 
 
 @kernel
@@ -252,11 +218,7 @@ def others_dismissed(types, sole):
     """
     c, n = types.config, 1
     for s, srf in enumerate(types.surface):
-        if (
-            s != sole
-            and srf.status.may_be_sole
-            and can_be_faulty(srf)
-        ):
+        if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
             if c.has_eG and any_type_remains(srf):
                 return False
             if not would_have_shown(c, srf):
@@ -265,34 +227,22 @@ def others_dismissed(types, sole):
                 if type_remains(srf, h):
                     if not FOLLOWS_COMMAND[h]:
                         return False
-                    n = max(
-                        n, WAIT_HALF_CYCLES[h]
-                    )
-    return (
-        types.surface[sole].evidence.n_anomalous
-        >= n * c.half_frames
-    )
+                    n = max(n, WAIT_HALF_CYCLES[h])
+    return types.surface[sole].evidence.n_anomalous >= n * c.half_frames
 
 
 @kernel
 def type_on_surface(c, srf):
     """The type of the fault on a surface, taken to be at fault; TYPE_UNDECIDED while more than one fits or
     one may yet show itself."""
-    if (
-        srf.evidence.n_anomalous < c.half_frames
-        or may_be_hidden(c, srf)
-    ):
+    if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED
     if c.has_eG:
         return sole_shown(srf)
     shown = would_have_shown(c, srf)
     if constant_remains(srf):
         kind = sole_constant(srf)
-        return (
-            kind
-            if shown and not can_be_another(srf, kind, True)
-            else TYPE_UNDECIDED
-        )
+        return kind if shown and not can_be_another(srf, kind, True) else TYPE_UNDECIDED
     return varying_type(srf, shown)
 
 
@@ -303,9 +253,7 @@ def varying_type(srf, shown):
     kind = sole_varying(srf, False)
     if kind == NO_TYPE:
         kind = sole_varying(srf, True)
-        return (
-            kind if kind >= 0 and has_shown(srf, kind) else TYPE_UNDECIDED
-        )
+        return kind if kind >= 0 and has_shown(srf, kind) else TYPE_UNDECIDED
     if kind < 0 or not shown:
         return TYPE_UNDECIDED
     for h in range(N_CONSTANT, N_TYPES):
@@ -320,10 +268,7 @@ def sole_varying(srf, must_show):
     that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
     kind = NO_TYPE
     for h in range(N_CONSTANT, N_TYPES):
-        if (
-            type_remains(srf, h)
-            and MUST_SHOW[h] == must_show
-        ):
+        if type_remains(srf, h) and MUST_SHOW[h] == must_show:
             kind = h if kind == NO_TYPE else TYPE_UNDECIDED
             if kind == TYPE_UNDECIDED:
                 return TYPE_UNDECIDED
@@ -339,22 +284,12 @@ def decide_single(types, past, layout, est, t):
     """
     s = find_surface(types, layout)
     estimator_past = past.isolated_estimator
-    s_past = (
-        est[estimator_past].surface
-        if estimator_past >= 0
-        else estimator_past
-    )
-    kind = (
-        type_on_surface(types.config, types.surface[s]) if s >= 0 else -1
-    )
+    s_past = est[estimator_past].surface if estimator_past >= 0 else estimator_past
+    kind = type_on_surface(types.config, types.surface[s]) if s >= 0 else -1
     isolated_at_s = t if s != s_past else past.isolated_at_s
     typed_at_s = t if kind != past.fault_type else past.typed_at_s
-    estimator = (
-        estimator_of_fault(layout, s, kind) if s >= 0 else s
-    )
-    lead, mode = decide_mode(
-        types, estimator, layout, est
-    )
+    estimator = estimator_of_fault(layout, s, kind) if s >= 0 else s
+    lead, mode = decide_mode(types, estimator, layout, est)
     return (
         estimator,
         isolated_at_s,
@@ -368,11 +303,7 @@ def decide_single(types, past, layout, est, t):
 @kernel
 def estimator_of_fault(layout, s, h):
     """The estimator that stands for a fault of this type (TYPE_UNDECIDED if open) on surface s."""
-    return (
-        layout.loss[s]
-        if h >= 0 and MODE[h] == SCALE_COMMAND
-        else layout.position[s]
-    )
+    return layout.loss[s] if h >= 0 and MODE[h] == SCALE_COMMAND else layout.position[s]
 
 
 @kernel
@@ -398,14 +329,8 @@ def serves_constants(srf, mode):
     is_own = False
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
-            is_own = (
-                is_own or MODE[h] == mode
-            )
-            serves_end = (
-                END_TYPE[h] >= 0
-                and type_remains(srf, END_TYPE[h])
-                and SERVES[mode, END_TYPE[h]]
-            )
+            is_own = is_own or MODE[h] == mode
+            serves_end = END_TYPE[h] >= 0 and type_remains(srf, END_TYPE[h]) and SERVES[mode, END_TYPE[h]]
             if not (SERVES[mode, h] or serves_end):
                 return False
     return is_own
@@ -415,10 +340,7 @@ def serves_constants(srf, mode):
 def serves_varying(srf, mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for h in range(N_CONSTANT, N_TYPES):
-        if (
-            type_remains(srf, h)
-            and MODE[h] == mode
-        ):
+        if type_remains(srf, h) and MODE[h] == mode:
             return True
     return False
 
@@ -474,13 +396,8 @@ def fault_shows(c, srf, mode, possible):
     """Whether the fault of a surface shows, or did a moment ago."""
     last, acc = srf.last, srf.accommodation
     p = deflection_error(srf, possible) + last.u
-    agrees = (
-        last.lo <= p <= last.hi
-        or mode == SCALE_COMMAND
-    )
-    acc.n_silent = (
-        0 if agrees else acc.n_silent + 1
-    )
+    agrees = last.lo <= p <= last.hi or mode == SCALE_COMMAND
+    acc.n_silent = 0 if agrees else acc.n_silent + 1
     silence_s = acc.n_silent * c.dt
     return silence_s < MAX_SILENCE_S - _TIME_TOLERANCE_S
 
@@ -508,9 +425,7 @@ def remaining_effectiveness(types, layout, est, s):
     srf = types.surface[s]
     if types.pair.enabled and can_be_faulty(srf):
         for h in range(N_CONSTANT):
-            if MODE[h] == SCALE_COMMAND and type_remains(
-                srf, h
-            ):
+            if MODE[h] == SCALE_COMMAND and type_remains(srf, h):
                 return set_middle(srf, h)
     return 1.0 + est[layout.loss[s]].theta[layout.dominant_axis[s]]
 
@@ -541,19 +456,11 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
         np.flatnonzero(status["is_isolated"]).tolist(),
         key=lambda s: status["isolated_at_s"][s],
     )
-    faults = [
-        _finding_on_surface(fdi, s, int(status["fault_type"][s]), names)
-        for s in isolated
-    ]
+    faults = [_finding_on_surface(fdi, s, int(status["fault_type"][s]), names) for s in isolated]
     alarms = fdi["types"]["pair"]["group_alarm"]
-    groups = [
-        np.flatnonzero(fdi["layout"]["group"] == group).tolist()
-        for group in range(len(alarms))
-    ]
+    groups = [np.flatnonzero(fdi["layout"]["group"] == group).tolist() for group in range(len(alarms))]
     if not alarms.any() and not faults and int(fdi["verdict"]["isolated_estimator"]) == NOT_ISOLATED:
-        alarms = np.ones_like(
-            alarms
-        )  # a statistical alarm by itself says of no plane that it is there
+        alarms = np.ones_like(alarms)  # a statistical alarm by itself says of no plane that it is there
     undecided = [
         {
             **_NO_FINDINGS,
@@ -569,11 +476,7 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
             **_find_one(fdi, names),
             "faults": tuple(undecided),
         }
-    texts = tuple(
-        text
-        for finding in undecided
-        for text in finding["candidates"]
-    )
+    texts = tuple(text for finding in undecided for text in finding["candidates"])
     return {**_NO_FINDINGS, "candidates": texts, "faults": tuple(undecided)}
 
 
@@ -610,13 +513,9 @@ def _finding_on_surface(fdi: np.void, s: int, kind: int, names: Sequence[str]) -
         "isolation_time_s": float(srf["status"]["isolated_at_s"]),
         "isolation_type": registry.TYPE_NAMES[kind] if kind >= 0 else None,
         "type_time_s": float(srf["status"]["typed_at_s"]) if kind >= 0 else None,
-        "candidates": (registry.TYPE_NAMES[kind],)
-        if kind >= 0
-        else tuple(_type_names(fdi, s)),
+        "candidates": (registry.TYPE_NAMES[kind],) if kind >= 0 else tuple(_type_names(fdi, s)),
         "estimate": estimate_fault_parameter(fdi, s, kind),
-        "estimate_interval": _ask_type(
-            kind, "estimate_parameter_interval", fdi, s, kind
-        ),
+        "estimate_interval": _ask_type(kind, "estimate_parameter_interval", fdi, s, kind),
         "frequency_rad_s": _ask_type(kind, "estimate_frequency_rad_s", fdi, s, kind),
     }
 
@@ -636,10 +535,7 @@ def _may_be_faulty(fdi: np.void, s: int) -> bool:
     srf = fdi["types"]["surface"][s]
     if srf["status"]["is_isolated"] or srf["status"]["basis"] == DEDUCED_FAULTY:
         return True
-    return not (
-        srf["status"]["basis"] == DEDUCED_HEALTHY
-        or srf["not_at_position"]
-    )
+    return not (srf["status"]["basis"] == DEDUCED_HEALTHY or srf["not_at_position"])
 
 
 def _type_names(fdi: np.void, s: int) -> list[str]:
@@ -650,34 +546,16 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
     """
     srf = fdi["types"]["surface"][s]
     kinds = [
-        h
-        for h, excluded in enumerate(srf["sets"]["excluded"])
-        if _may_be_faulty(fdi, s) and not excluded
+        h for h, excluded in enumerate(srf["sets"]["excluded"]) if _may_be_faulty(fdi, s) and not excluded
     ]
-    constant = [
-        h for h in kinds if h < registry.N_CONSTANT
-    ]
+    constant = [h for h in kinds if h < registry.N_CONSTANT]
     if constant and not fdi["types"]["config"]["has_eG"]:
         ev = srf["evidence"]
         half = fdi["types"]["config"]["half_frames"]
-        brief = (
-            ev["n_anomalous"] - ev["n_rest"]
-            < half
-        )
-        kinds = [
-            h
-            for h in kinds
-            if h in constant
-            or brief
-            or _counts_beside(h, constant)
-        ]
-    pitch_pair = (
-        fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
-    )
-    if pitch_pair and any(
-        registry.MODE[h] == GIVE_UP
-        for h in constant
-    ):
+        brief = ev["n_anomalous"] - ev["n_rest"] < half
+        kinds = [h for h in kinds if h in constant or brief or _counts_beside(h, constant)]
+    pitch_pair = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
+    if pitch_pair and any(registry.MODE[h] == GIVE_UP for h in constant):
         # if the other surface is off as well, each constant may be one of another type
         kinds += sorted(
             range(registry.N_CONSTANT),
@@ -686,20 +564,13 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
     return list(dict.fromkeys(registry.TYPE_NAMES[h] for h in kinds))
 
 
-def _counts_beside(
-    h: int, constant: list[int]
-) -> bool:
+def _counts_beside(h: int, constant: list[int]) -> bool:
     """Whether a varying type counts together with these constant ones: it may yet show itself, or looks like
     one of them."""
-    return bool(
-        registry.MUST_SHOW[h]
-        or registry.CAN_LOOK_LIKE[h, constant].any()
-    )
+    return bool(registry.MUST_SHOW[h] or registry.CAN_LOOK_LIKE[h, constant].any())
 
 
-def _candidate_texts(
-    fdi: np.void, surfaces: Iterable[int], names: Sequence[str]
-) -> Iterator[str]:
+def _candidate_texts(fdi: np.void, surfaces: Iterable[int], names: Sequence[str]) -> Iterator[str]:
     """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.
 
     Of one plane also both its surfaces, as `elevator+flap`.
@@ -713,11 +584,7 @@ def _candidate_texts(
     possible = [s for s in surfaces if _may_be_faulty(fdi, s)]
     for s in possible:
         kinds = _type_names(fdi, s)
-        yield from (
-            (f"{names[s]}:{kind}" for kind in kinds)
-            if kinds
-            else (names[s],)
-        )
+        yield from ((f"{names[s]}:{kind}" for kind in kinds) if kinds else (names[s],))
     if fdi["types"]["pair"]["enabled"]:
         yield "+".join(names[s] for s in surfaces)
     if not any(_type_names(fdi, s) for s in possible):

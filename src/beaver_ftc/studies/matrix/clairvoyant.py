@@ -13,10 +13,10 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.informed_test import (
     WhiteningFilter,
-    with_measured_gust,
     detection_probability,
     healthy_positions,
     term_acceleration,
+    with_measured_gust,
 )
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document

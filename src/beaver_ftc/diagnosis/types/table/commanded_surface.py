@@ -30,11 +30,11 @@ from beaver_ftc.diagnosis.types import (
     WAIT_FOR_SURFACE,
     DeflectionRelation,
     FaultType,
-    feasible_set,
-    set_middle,
     clip_travel,
+    feasible_set,
     middle_estimate,
     read_last_error,
+    set_middle,
 )
 
 
@@ -70,33 +70,20 @@ def loss_range(c, srf, h, k):
     lo = srf.sets.low[h]
     hi = srf.sets.high[h]
     u = srf.last.u
-    return min(lo * u, hi * u), max(
-        lo * u, hi * u
-    )
+    return min(lo * u, hi * u), max(lo * u, hi * u)
 
 
 @kernel
 def varying_loss_set(c, srf, h, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     lo, hi = loss_of_frame(srf)
-    changed = (
-        c.frames_per_block > 1
-        and srf.commands.u_min[1] < 0.0 < srf.commands.u_max[1]
-    )
-    return (
-        EMPTY_SET
-        if lo > hi and not changed
-        else UNLIMITED_SET
-    )
+    changed = c.frames_per_block > 1 and srf.commands.u_min[1] < 0.0 < srf.commands.u_max[1]
+    return EMPTY_SET if lo > hi and not changed else UNLIMITED_SET
 
 
 def theta_of_loss(fdi: np.void, s: int, h: int) -> float | None:
     """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
-    return (
-        middle_estimate(fdi, s, h) - 1.0
-        if fdi["types"]["pair"]["enabled"]
-        else theta_fitted(fdi, s, h)
-    )
+    return middle_estimate(fdi, s, h) - 1.0 if fdi["types"]["pair"]["enabled"] else theta_fitted(fdi, s, h)
 
 
 def theta_fitted(fdi: np.void, s: int, h: int) -> float:
@@ -148,22 +135,12 @@ def offset_of_frame(srf):
     cmd = srf.commands
     if hi < srf.actuator.stop_lo or lo > srf.actuator.stop_hi:
         return isolation.NO_THETA
-    p_min = lo - max(
-        u - cmd.u_min[1], 0.0
-    )
-    p_max = hi + max(
-        cmd.u_max[1] - u, 0.0
-    )
-    b_lo = (
-        lo - u
-        if p_min > srf.actuator.stop_lo
-        else -np.inf
-    )
+    p_min = lo - max(u - cmd.u_min[1], 0.0)
+    p_max = hi + max(cmd.u_max[1] - u, 0.0)
+    b_lo = lo - u if p_min > srf.actuator.stop_lo else -np.inf
     return (
         b_lo,
-        hi - u
-        if p_max < srf.actuator.stop_hi
-        else np.inf,
+        hi - u if p_max < srf.actuator.stop_hi else np.inf,
     )
 
 
@@ -183,12 +160,8 @@ def bias_middle(srf, h):
 @kernel
 def bias_range(c, srf, h, k):
     """The command and the offset, cut off by the stops."""
-    lo = mean_with_offset(
-        srf, srf.sets.low[h], srf.commands.u_min[0]
-    )
-    return lo, mean_with_offset(
-        srf, srf.sets.high[h], srf.commands.u_max[0]
-    )
+    lo = mean_with_offset(srf, srf.sets.low[h], srf.commands.u_min[0])
+    return lo, mean_with_offset(srf, srf.sets.high[h], srf.commands.u_max[0])
 
 
 @kernel
@@ -198,10 +171,7 @@ def mean_with_offset(srf, b, u_end):
     cmd = srf.commands
     act = srf.actuator
     mean = srf.last.u + b
-    stops = (
-        cmd.u_min[0] + b < act.stop_lo
-        or cmd.u_max[0] + b > act.stop_hi
-    )
+    stops = cmd.u_min[0] + b < act.stop_lo or cmd.u_max[0] + b > act.stop_hi
     return clip_travel(srf, u_end + b) if stops else mean
 
 
@@ -256,9 +226,7 @@ def narrow_offset(c, srf, lo, hi):
         M.has_run[0] = 1
     if lo > M.b_hi:
         M.has_run[1] = 1
-    tol = (
-        0.0 if c.single_instant else max_growth(c, srf)
-    )
+    tol = 0.0 if c.single_instant else max_growth(c, srf)
     M.b_lo, M.b_hi = (
         max(M.b_lo, lo - tol),
         min(M.b_hi, hi + tol),
@@ -280,16 +248,8 @@ def update_growing(c, srf, h, k):
     )
     was_up = M.up > 0.0
     was_down = M.down < 0.0
-    shrinks = (was_up and hi < M.up) or (
-        was_down and lo > M.down
-    )
-    return (
-        EMPTY_SET
-        if lo > hi
-        or (was_up and was_down)
-        or shrinks
-        else UNLIMITED_SET
-    )
+    shrinks = (was_up and hi < M.up) or (was_down and lo > M.down)
+    return EMPTY_SET if lo > hi or (was_up and was_down) or shrinks else UNLIMITED_SET
 
 
 @kernel
@@ -349,10 +309,7 @@ def reset_swing(srf, h):
 @kernel
 def add_square(c, srf, h):
     """Sum the squares of the deflection error."""
-    e = (
-        0.5 * (srf.judged.lo + srf.judged.hi)
-        - srf.judged.u
-    )
+    e = 0.5 * (srf.judged.lo + srf.judged.hi) - srf.judged.u
     srf.oscillatory.square += e**2
 
 
@@ -364,17 +321,10 @@ def update_swing(c, srf, h, k):
     keeps its sign.
     """
     M = srf.oscillatory
-    lo = (
-        srf.judged.lo - srf.judged.u
-    )
-    hi = (
-        srf.judged.hi - srf.judged.u
-    )
+    lo = srf.judged.lo - srf.judged.u
+    hi = srf.judged.hi - srf.judged.u
     sign = 1 if lo > 0.0 else (-1 if hi < 0.0 else 0)
-    if sign == 0 or (
-        not c.single_instant
-        and srf.judged.hides[0 if sign == 1 else 1]
-    ):
+    if sign == 0 or (not c.single_instant and srf.judged.hides[0 if sign == 1 else 1]):
         M.since = k + 1
         return UNLIMITED_SET
     if sign != M.sign:
@@ -411,13 +361,7 @@ def swing_has_shown(srf):
 def swing_amplitude(fdi: np.void, s: int, h: int) -> float | None:
     """Amplitude, rad."""
     M = fdi["types"]["surface"][s]["oscillatory"]
-    return float(
-        sqrt(
-            2.0
-            * M["square_past"]
-            / (M["last_end"] - M["first_end"])
-        )
-    )
+    return float(sqrt(2.0 * M["square_past"] / (M["last_end"] - M["first_end"])))
 
 
 def swing_frequency(fdi: np.void, s: int, h: int) -> float | None:
@@ -425,11 +369,7 @@ def swing_frequency(fdi: np.void, s: int, h: int) -> float | None:
     M = fdi["types"]["surface"][s]["oscillatory"]
     n = int(M["n_half"]) - 1
     frames = int(M["last_end"] - M["first_end"])
-    return (
-        n
-        * pi
-        / (float(fdi["types"]["config"]["block_duration_s"]) * frames)
-    )
+    return n * pi / (float(fdi["types"]["config"]["block_duration_s"]) * frames)
 
 
 OSCILLATORY = FaultType(
@@ -471,11 +411,7 @@ def update_creep(c, srf, h, k):
     if side == 0 or side != M.side or k != M.k_last + 1:
         M.lo, M.hi = lo, hi
     else:
-        away = (
-            lo > M.hi
-            if side == 1
-            else hi < M.lo
-        )
+        away = lo > M.hi if side == 1 else hi < M.lo
         narrow_creep(c, srf, M, side)
     M.lo, M.hi = (
         max(M.lo, lo),
@@ -491,12 +427,8 @@ def narrow_creep(c, srf, M, side):
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
 
     side: 1 if the surface is above its command, -1 if it is below."""
-    motion = (
-        c.n_substeps * c.frames_per_block * srf.actuator.slow_step
-    )
-    near = (
-        srf.actuator.slow_step / srf.actuator.approach_share
-    )
+    motion = c.n_substeps * c.frames_per_block * srf.actuator.slow_step
+    near = srf.actuator.slow_step / srf.actuator.approach_share
     lo, hi = orders_of_frame(c, srf)
     if side == 1:
         M.hi = min(
@@ -515,20 +447,14 @@ def orders_of_frame(c, srf):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     cmd = srf.commands
     b = 2 if c.single_instant else 1
-    return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(
-        cmd.cmd_max[2], cmd.cmd_max[b]
-    )
+    return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])
 
 
 @kernel
 def side_of_commands(c, srf):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
     lo, hi = orders_of_frame(c, srf)
-    return (
-        1
-        if srf.judged.lo > hi
-        else (-1 if srf.judged.hi < lo else 0)
-    )
+    return 1 if srf.judged.lo > hi else (-1 if srf.judged.hi < lo else 0)
 
 
 RATE_LIMIT = FaultType(

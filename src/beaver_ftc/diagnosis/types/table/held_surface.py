@@ -36,10 +36,10 @@ from beaver_ftc.diagnosis.types import (
     UNLIMITED_SET,
     DeflectionRelation,
     FaultType,
-    feasible_set,
-    set_middle,
     clip_travel,
+    feasible_set,
     middle_estimate,
+    set_middle,
 )
 
 EARLIER_SLOT, LATER_SLOT = 0, 1
@@ -60,10 +60,7 @@ def clear_releases(srf, b, h):
 @kernel
 def may_return(srf, b, h):
     """Whether a release of this type is possible."""
-    return (
-        srf.release.back_lo[b, h]
-        <= srf.release.back_hi[b, h]
-    )
+    return srf.release.back_lo[b, h] <= srf.release.back_hi[b, h]
 
 
 @kernel
@@ -110,11 +107,7 @@ def simulate_return(c, srf, p0, sign=0):
                 srf.actuator.step,
             )
             if sign != 0:
-                p = (
-                    min(p, p0)
-                    if sign == -1
-                    else max(p, p0)
-                )
+                p = min(p, p0) if sign == -1 else max(p, p0)
     return (
         total / n,
         p,
@@ -129,16 +122,9 @@ def release_explains(c, srf, h):
     hi = srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
-    low, _, tol_low = simulate_return(
-        c, srf, lo, -1
-    )
-    high, _, tol_high = simulate_return(
-        c, srf, hi, 1
-    )
-    return (
-        low - tol_low <= srf.judged.hi
-        and high + tol_high >= srf.judged.lo
-    )
+    low, _, tol_low = simulate_return(c, srf, lo, -1)
+    high, _, tol_high = simulate_return(c, srf, hi, 1)
+    return low - tol_low <= srf.judged.hi and high + tol_high >= srf.judged.lo
 
 
 @kernel
@@ -163,12 +149,8 @@ def narrow_return(c, srf, b, h):
     The mean over the frame rises with where the return began, and by no more than that.
     """
     rel = srf.release
-    low, _, tol_low = simulate_return(
-        c, srf, rel.back_lo[b, h]
-    )
-    high, _, tol_high = simulate_return(
-        c, srf, rel.back_hi[b, h]
-    )
+    low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h])
+    high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h])
     tol = max(tol_low, tol_high)
     u = srf.judged.u
     if (
@@ -179,20 +161,11 @@ def narrow_return(c, srf, b, h):
         <= HEALTHY_RAD
     ):
         return False
-    if (
-        low - tol > srf.judged.hi
-        or high + tol < srf.judged.lo
-    ):
+    if low - tol > srf.judged.hi or high + tol < srf.judged.lo:
         return False
-    lo = rel.back_lo[b, h] + max(
-        srf.judged.lo - low - tol, 0.0
-    )
-    hi = rel.back_hi[b, h] - max(
-        high - tol - srf.judged.hi, 0.0
-    )
-    set_return(
-        rel, b, h, lo, hi
-    )
+    lo = rel.back_lo[b, h] + max(srf.judged.lo - low - tol, 0.0)
+    hi = rel.back_hi[b, h] - max(high - tol - srf.judged.hi, 0.0)
+    set_return(rel, b, h, lo, hi)
     return True
 
 
@@ -211,9 +184,7 @@ def replace_earlier(srf, h):
 
 
 @kernel
-def set_return(
-    rel, b, h, lo, hi
-):
+def set_return(rel, b, h, lo, hi):
     """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
     (
         rel.back_lo[b, h],
@@ -229,16 +200,9 @@ def judge_held(c, srf, h, lo, hi):
     """Whether a type holds the surface between these positions (rad) in the judged frame: IS_HELD; or has
     released it, and the actuator may be bringing it back: IS_RETURNING; or neither explains it:
     IS_REFUTED."""
-    returns = (
-        c.returns_lagged
-        and keep_returns(c, srf, h)
-    )
+    returns = c.returns_lagged and keep_returns(c, srf, h)
     released = srf.release.released
-    if (
-        lo <= srf.judged.hi
-        and hi >= srf.judged.lo
-        and not released[h]
-    ):
+    if lo <= srf.judged.hi and hi >= srf.judged.lo and not released[h]:
         return IS_HELD
     if not returns:
         return IS_REFUTED
@@ -247,17 +211,10 @@ def judge_held(c, srf, h, lo, hi):
 
 
 @kernel
-def held_interval(
-    c, srf, h, lo, hi
-):
+def held_interval(c, srf, h, lo, hi):
     """The parameters that explain the judged frame: all if the surface is held there or returns from there,
     none otherwise."""
-    return (
-        EMPTY_SET
-        if judge_held(c, srf, h, lo, hi)
-        == IS_REFUTED
-        else UNLIMITED_SET
-    )
+    return EMPTY_SET if judge_held(c, srf, h, lo, hi) == IS_REFUTED else UNLIMITED_SET
 
 
 @kernel
@@ -283,12 +240,8 @@ def add_release(srf, h, lo, hi):
             lo,
             hi,
         )
-        rel.back_lo[LATER_SLOT, h] = min(
-            rel.back_lo[LATER_SLOT, h], lo
-        )
-        rel.back_hi[LATER_SLOT, h] = max(
-            rel.back_hi[LATER_SLOT, h], hi
-        )
+        rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
+        rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
 
 
 @kernel
@@ -299,12 +252,8 @@ def propagate_returns(c, srf, h):
         rel.released[h] = 0
     for b in (EARLIER_SLOT, LATER_SLOT):
         if may_return(srf, b, h):
-            _, lo, _ = simulate_return(
-                c, srf, rel.back_lo[b, h]
-            )
-            _, hi, _ = simulate_return(
-                c, srf, rel.back_hi[b, h]
-            )
+            _, lo, _ = simulate_return(c, srf, rel.back_lo[b, h])
+            _, hi, _ = simulate_return(c, srf, rel.back_hi[b, h])
             set_return(
                 rel,
                 b,
@@ -312,22 +261,11 @@ def propagate_returns(c, srf, h):
                 lo,
                 hi,
             )
-    if (
-        c.frames_per_block > 1
-        and rel.held_lo[h] <= rel.held_hi[h]
-    ):
-        _, lo, _ = simulate_return(
-            c, srf, rel.held_lo[h], -1
-        )
-        _, hi, _ = simulate_return(
-            c, srf, rel.held_hi[h], 1
-        )
-        rel.back_lo[LATER_SLOT, h] = min(
-            rel.back_lo[LATER_SLOT, h], lo
-        )
-        rel.back_hi[LATER_SLOT, h] = max(
-            rel.back_hi[LATER_SLOT, h], hi
-        )
+    if c.frames_per_block > 1 and rel.held_lo[h] <= rel.held_hi[h]:
+        _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1)
+        _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1)
+        rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
+        rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
 
 
 @kernel
@@ -339,9 +277,7 @@ def travel_range(srf):
 @kernel
 def reset_stuck(srf, h):
     """Set the possible jammed positions to the whole travel of the surface."""
-    srf.stuck.lo_before[:], srf.stuck.hi_before[:] = (
-        travel_range(srf)
-    )
+    srf.stuck.lo_before[:], srf.stuck.hi_before[:] = travel_range(srf)
     allow_before(srf, h)
 
 
@@ -364,9 +300,7 @@ def update_stuck(c, srf, h, k):
 def add_stuck_release(c, srf, h, k):
     """Add a release from the interval of the jammed position."""
     store_stuck(srf, h)
-    lo, hi, _ = frame_start(
-        c, srf, k
-    )
+    lo, hi, _ = frame_start(c, srf, k)
     add_release(
         srf,
         h,
@@ -404,9 +338,7 @@ def stuck_after(srf, h):
     if not srf.judged.anomalous:
         for b in (EARLIER_SLOT, LATER_SLOT):
             if may_return(srf, b, h):
-                return srf.stuck.lo_before[
-                    b
-                ], srf.stuck.hi_before[b]
+                return srf.stuck.lo_before[b], srf.stuck.hi_before[b]
     return srf.sets.low[h], srf.sets.high[h]
 
 
@@ -420,17 +352,13 @@ def stuck_range(c, srf, h, k):
 def update_float(c, srf, h, k):
     """It is at neutral, or at the stop that is nearest to it."""
     p = clip_travel(srf, 0.0)
-    return held_interval(
-        c, srf, h, p, p
-    )
+    return held_interval(c, srf, h, p, p)
 
 
 @kernel
 def add_float_release(c, srf, h, k):
     """Add a release from the neutral position."""
-    lo, hi, _ = frame_start(
-        c, srf, k
-    )
+    lo, hi, _ = frame_start(c, srf, k)
     p = clip_travel(srf, 0.0)
     add_release(
         srf,
@@ -562,12 +490,8 @@ def update_down(c, srf, h, k):
 @kernel
 def release_up(c, srf, h, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    lo, hi, k0 = (
-        frame_start(c, srf, k)
-    )
-    lo = max(
-        lo, runaway_low(c, srf, k0)
-    )
+    lo, hi, k0 = frame_start(c, srf, k)
+    lo = max(lo, runaway_low(c, srf, k0))
     if not c.single_instant and lo <= hi:
         hi = srf.actuator.stop_hi
     add_release(srf, h, lo, hi)
@@ -576,12 +500,8 @@ def release_up(c, srf, h, k):
 @kernel
 def release_down(c, srf, h, k):
     """The same downwards."""
-    lo, hi, k0 = (
-        frame_start(c, srf, k)
-    )
-    hi = min(
-        hi, runaway_high(c, srf, k0)
-    )
+    lo, hi, k0 = frame_start(c, srf, k)
+    hi = min(hi, runaway_high(c, srf, k0))
     if not c.single_instant and lo <= hi:
         lo = srf.actuator.stop_lo
     add_release(srf, h, lo, hi)

@@ -72,9 +72,7 @@ def detection_share(frames):
     """The built-in detection's statistic at this frame: see schemes.detection_share."""
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.authority
-    return largest_statistic(
-        fdi.bank, alarm, authority, weighs_statistics(fdi.statistical.test, authority)
-    )
+    return largest_statistic(fdi.bank, alarm, authority, weighs_statistics(fdi.statistical.test, authority))
 
 
 @kernel
@@ -145,7 +143,7 @@ def fly_on(frames, references, log, order):
 
 _ROW, _AXES = types.Array(types.float64, 1, "C"), types.NestedArray(types.float64, (3,))
 _NUMBERS = {
-    "k": types.int64, "mode": types.int64, "isolation_started_earlier": types.int64,
+    "k": types.int64, "mode": types.int64, "started": types.int64,
     "by_observer": types.boolean,
     "t": types.float64, "share": types.float64, "probe": types.float64,
     "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,

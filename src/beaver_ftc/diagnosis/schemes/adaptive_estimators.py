@@ -32,8 +32,8 @@ from beaver_ftc.scenario.diagnosis import FdiConfig
 
 class CompiledScheme(NamedTuple):
     """Lazy kernels (compiled.py), called with `fdi` (`fdi_dtype`), and `prediction` and `measured`, the
-    records of the prediction and the sensors. A row of plugins.yaml names
-    the scheme: `module`, whose SCHEME it is, or `module:NAME`.
+    records of the prediction and the sensors: the names of arguments are those of the frame's parts
+    (loop/stepping.py). A row of plugins.yaml names the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
     begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
     advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before
@@ -51,22 +51,22 @@ class CompiledScheme(NamedTuple):
 
 
 @apart
-def skip_advance(fdi, pred, meas, k, t):
+def skip_advance(fdi, prediction, measured, k, t):
     """The `advance_estimators_to_frame` of a scheme without estimators."""
 
 
 @apart
-def skip_verdict(fdi, pred, meas, t):
+def skip_verdict(fdi, prediction, measured, t):
     """The `update_verdict` of a scheme without a verdict."""
 
 
 @apart
-def skip_prepare(fdi, pred, meas, k):
+def skip_prepare(fdi, prediction, measured, k):
     """The `prepare_next_frame` of a scheme whose estimators need nothing but the means over the frame."""
 
 
 @apart
-def skip_substep(fdi, pred, meas):
+def skip_substep(fdi, prediction, measured):
     """The `accumulate_substep` of such a scheme."""
 
 
@@ -100,9 +100,9 @@ def update_estimators(fdi, pred):
 
 
 @apart
-def begin_filters(fdi, pred, meas):
+def begin_filters(fdi, prediction, measured):
     """Begin the detection filters, which the log records (CompiledScheme)."""
-    start_filters(fdi, meas.x)
+    start_filters(fdi, measured.x)
 
 
 NO_DIAGNOSIS = CompiledScheme(
@@ -115,8 +115,8 @@ class IsolationVariant(NamedTuple):
 
     begin_at_alarm(fdi): start with no knowledge of any fault.
     record_commands(fdi, prediction): record what each surface was commanded in the elapsed frame.
-    isolate(fdi, measured, t, isolation_started_earlier): exclude faults at t s, and decide;
-    isolation_started_earlier: it started a frame or more ago.
+    isolate(fdi, measured, t, started): exclude faults at t s, and decide; started: the
+    isolation started a frame or more ago.
     """
 
     begin_at_alarm: Callable[..., None]
@@ -202,42 +202,42 @@ def decide_loss(fdi, t):
 
 
 @apart
-def loss_by_worst_case(fdi, meas, t, started):
+def loss_by_worst_case(fdi, measured, t, started):
     """Isolate by the worst case alone (IsolationVariant)."""
-    exclude_worst_case(fdi, meas.x, t, started)
+    exclude_worst_case(fdi, measured.x, t, started)
     decide_loss(fdi, t)
 
 
 @apart(long_loops=True)
-def loss_by_either(fdi, meas, t, started):
+def loss_by_either(fdi, measured, t, started):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        possible = worst_case_allows(fdi, fie, meas.x, started) and not likelihood_excludes(fdi, fie)
+        possible = worst_case_allows(fdi, fie, measured.x, started) and not likelihood_excludes(fdi, fie)
         exclude_or_wait(fdi, fie, possible, t)
     decide_loss(fdi, t)
 
 
 @apart(long_loops=True)
-def loss_by_statistics(fdi, meas, t, started):
+def loss_by_statistics(fdi, measured, t, started):
     """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        worst_case_allows(fdi, fie, meas.x, started)
+        worst_case_allows(fdi, fie, measured.x, started)
         exclude_or_wait(fdi, fie, not likelihood_excludes(fdi, fie), t)
     decide_loss(fdi, t)
 
 
 @apart
-def type_by_worst_case(fdi, meas, t, started):
+def type_by_worst_case(fdi, measured, t, started):
     """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
-    exclude_worst_case(fdi, meas.x, t, started)
+    exclude_worst_case(fdi, measured.x, t, started)
     decide_type(fdi, t, started)
 
 
 @apart(long_loops=True)
-def type_by_either(fdi, meas, t, started):
+def type_by_either(fdi, measured, t, started):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        possible = worst_case_allows(fdi, fie, meas.x, started) and not parity_excludes(fdi, fie)
+        possible = worst_case_allows(fdi, fie, measured.x, started) and not parity_excludes(fdi, fie)
         exclude_or_wait(fdi, fie, possible, t)
     decide_type(fdi, t, started)
 
@@ -269,14 +269,14 @@ def begin_types(fdi):
 
 
 @apart
-def skip_commands(fdi, pred):
+def skip_commands(fdi, prediction):
     """The estimators have observed all that a loss needs (IsolationVariant)."""
 
 
 @apart
-def record_orders(fdi, pred):
+def record_orders(fdi, prediction):
     """Record the orders to each surface (IsolationVariant)."""
-    registry.record_commands(fdi.types, pred.commanded, pred.means)
+    registry.record_commands(fdi.types, prediction.commanded, prediction.means)
 
 
 ISOLATION_VARIANTS = {
@@ -302,10 +302,10 @@ def variant_row(config: FdiConfig) -> int:
 
 
 @apart(long_loops=True)
-def update_tests(fdi, pred, meas, k, t):
+def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
     stat = fdi.statistical
-    y = meas.y
+    y = measured.y
     eta = fdi.statistical.noise.eta
     cfg = stat.test
     blocks = stat.block
@@ -313,13 +313,13 @@ def update_tests(fdi, pred, meas, k, t):
     force = stat.forces
     views = stat.views[: stat.n_views]
     vaneless = stat.vaneless
-    means = pred.means
+    means = prediction.means
     nu, dt = fdi.bank.output.innovation, fdi.config.dt
-    gusts.finish_gust(gust, pred.w)
+    gusts.finish_gust(gust, prediction.w)
     if vaneless.output.gusty:
-        gusts.finish_gust(vaneless, pred.w)
+        gusts.finish_gust(vaneless, prediction.w)
     fill_old_effects(means)
-    fill_block_signatures(blocks, means.Gu_old, unanticipated_pitch(pred.design, y, 1.0))
+    fill_block_signatures(blocks, means.Gu_old, unanticipated_pitch(prediction.design, y, 1.0))
     alarmed = stat.alarm.detected_at_s >= 0.0
     may_end = not fdi.config.abrupt
     statistical.update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end)
@@ -328,27 +328,27 @@ def update_tests(fdi, pred, meas, k, t):
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
     statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)
-    innovation_known(pred, meas.x, dt)
-    statistical.filter_known(blocks, gust, pred.nu_known, dt)
+    innovation_known(prediction, measured.x, dt)
+    statistical.filter_known(blocks, gust, prediction.nu_known, dt)
 
 
 @apart(long_loops=True)
-def prepare_gusts(fdi, pred, meas, k):
+def prepare_gusts(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
-    update_gusts(stat.gust, stat.vaneless, stat.forces, pred, meas, k, dt)
+    update_gusts(stat.gust, stat.vaneless, stat.forces, prediction, measured, k, dt)
     statistical.prepare_tests(
-        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, pred.design, meas, pred.u, dt
+        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, prediction.design, measured, prediction.u, dt
     )
 
 
 @apart(long_loops=True)
-def add_gust_instant(fdi, pred, meas):
+def add_gust_instant(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
     stat = fdi.statistical
-    h = pred.w * fdi.config.dt
+    h = prediction.w * fdi.config.dt
     statistical.add_test_instant(
-        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, pred.design, meas, pred.u, h
+        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, prediction.design, measured, prediction.u, h
     )
 
 
@@ -380,38 +380,38 @@ def update_forces(gust, vaneless, force, pred, meas, k, dt):
 
 
 @apart
-def begin_scheme(fdi, pred, meas):
+def begin_scheme(fdi, prediction, measured):
     """Begin the filters, and fix the parity direction of each fault (CompiledScheme)."""
-    start_filters(fdi, meas.x)
-    filters.set_directions(fdi.isolation, pred.G)
+    start_filters(fdi, measured.x)
+    filters.set_directions(fdi.isolation, prediction.G)
 
 
 @apart
-def advance_estimators_to_frame(fdi, pred, meas, k, t):
+def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
-    update_filters(fdi, pred, meas)
+    update_filters(fdi, prediction, measured)
     if fdi.statistical.test.enabled:
-        update_tests(fdi, pred, meas, k, t)
-    update_estimators(fdi, pred)
-    record_variant(fdi.config.variant, fdi, pred)
+        update_tests(fdi, prediction, measured, k, t)
+    update_estimators(fdi, prediction)
+    record_variant(fdi.config.variant, fdi, prediction)
     leaks = found.isolated_estimator >= 0 or found.target >= 0
-    filters.advance_fdae(fdi.fdae, bound, pred.x_before, pred.F_known, found.detected, leaks, dt)
+    filters.advance_fdae(fdi.fdae, bound, prediction.x_before, prediction.F_known, found.detected, leaks, dt)
 
 
 @apart
-def update_verdict(fdi, pred, meas, t):
+def update_verdict(fdi, prediction, measured, t):
     """From residuals to the alarm and a verdict, unless a sensor is at fault (CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found = fdi.verdict.detected, fdi.verdict
-    filters.fdae_residual(fdi.fdae, meas.x)
-    axis = find_alarm_axis(fdi, meas.y, t)
+    filters.fdae_residual(fdi.fdae, measured.x)
+    axis = find_alarm_axis(fdi, measured.y, t)
     if axis >= 0:
         conclusion.latch_alarm(found, axis, t)
     if found.detected:
-        continue_isolation(fdi, meas, t, before)
-        filters.evaluate_network(fdi.fdae.network, meas.y[ALPHA], meas.y[BETA])
+        continue_isolation(fdi, measured, t, before)
+        filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
@@ -427,17 +427,17 @@ def find_alarm_axis(fdi, y, t):
 
 
 @apart
-def prepare_next_frame(fdi, pred, meas, k):
+def prepare_next_frame(fdi, prediction, measured, k):
     """Prepare the statistical detector, where it is declared (CompiledScheme)."""
     if fdi.statistical.test.enabled:
-        prepare_gusts(fdi, pred, meas, k)
+        prepare_gusts(fdi, prediction, measured, k)
 
 
 @apart
-def accumulate_substep(fdi, pred, meas):
+def accumulate_substep(fdi, prediction, measured):
     """The same for an instant inside the frame (CompiledScheme)."""
     if fdi.statistical.test.enabled:
-        add_gust_instant(fdi, pred, meas)
+        add_gust_instant(fdi, prediction, measured)
 
 
 SCHEME = CompiledScheme(
@@ -446,13 +446,13 @@ SCHEME = CompiledScheme(
 
 
 @apart
-def plugin_update(fdi, pred, meas, t):
+def plugin_update(fdi, prediction, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
-    filters.fdae_residual(fdi.fdae, meas.x)
+    filters.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     isolation.set_theta(fdi.isolation, fdi.verdict.isolated_estimator, fdi.plugin_verdict.theta)
     if fdi.verdict.detected:
-        filters.evaluate_network(fdi.fdae.network, meas.y[ALPHA], meas.y[BETA])
+        filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 PYTHON_PLUGIN = CompiledScheme(

@@ -159,13 +159,13 @@ def fdae_axis(fdae):
 
 
 @apart
-def advance_estimators_to_frame(fdi, pred, meas, k, t):
+def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     pub, bound, dt = fdi.published, fdi.bound, fdi.config.dt
-    adaptive_estimators.update_filters(fdi, pred, meas)
-    adaptive_estimators.update_estimators(fdi, pred)
+    adaptive_estimators.update_filters(fdi, prediction, measured)
+    adaptive_estimators.update_estimators(fdi, prediction)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    filters.advance_fdae(fdi.fdae, bound, pred.x_before, pred.means.F, False, False, dt)
+    filters.advance_fdae(fdi.fdae, bound, prediction.x_before, prediction.means.F, False, False, dt)
     if pub.config.mu0 > 0.0:
         hold_thresholds(fdi, pub.config.mu0)
 
@@ -179,18 +179,18 @@ def hold_thresholds(fdi, mu):
 
 
 @apart
-def update_verdict(fdi, pred, meas, t):
+def update_verdict(fdi, prediction, measured, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found = fdi.verdict.detected, fdi.verdict
-    filters.fdae_residual(fdi.fdae, meas.x)
+    filters.fdae_residual(fdi.fdae, measured.x)
     axis = fdae_axis(fdi.fdae)
-    update_network(fdi.published, fdi.fdae, fdi.layout.main, meas.x, meas.y, pred.u)
+    update_network(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
     if axis >= 0:
         conclusion.latch_alarm(found, axis, t)
     if found.detected:
-        adaptive_estimators.continue_isolation(fdi, meas, t, before)
+        adaptive_estimators.continue_isolation(fdi, measured, t, before)
 
 
 SCHEME = CompiledScheme(

@@ -30,23 +30,13 @@ else:
 THRUST_SIGNAL, YAW_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
 MAX_OFFSET_M = 0.05
 
-# n_engines: engines, 0 where they are not monitored. i_T, i_n: places of the signals
-# in y. yaw_per_thrust: a. slack: of the bound, per CT.
-BALANCE_CONFIG = record(
-    n_engines=int,
-    i_T=int,
-    i_n=int,
-    yaw_per_thrust=float,
-    slack=float,
-)
+# n_engines: engines, 0 where they are not monitored. i_T, i_n: places of CT and Cn in y. yaw_per_thrust: a.
+# slack: MAX_OFFSET_M / b.
+BALANCE_CONFIG = record(n_engines=int, i_T=int, i_n=int, yaw_per_thrust=float, slack=float)
 # A law has moved an engine apart: the levers are no longer alike.
 BALANCE_MEMORY = record(levers_apart=int)
 BALANCE_OUTPUT = record(engine_failed=int)  # an engine has failed
-ENGINE_MONITOR_RECORD = record(
-    config=BALANCE_CONFIG,
-    memory=BALANCE_MEMORY,
-    output=BALANCE_OUTPUT,
-)
+ENGINE_MONITOR_RECORD = record(config=BALANCE_CONFIG, memory=BALANCE_MEMORY, output=BALANCE_OUTPUT)
 
 
 def yaw_per_thrust(aircraft: Aircraft) -> float:
@@ -62,26 +52,23 @@ def configure_balance(config: np.void, aircraft: Aircraft) -> None:
     error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return
-    config["n_engines"], config["yaw_per_thrust"] = (
-        len(aircraft.effectors),
-        yaw_per_thrust(aircraft),
-    )
+    config["n_engines"], config["yaw_per_thrust"] = (len(aircraft.effectors), yaw_per_thrust(aircraft))
     config["i_T"], config["i_n"] = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))
     config["slack"] = MAX_OFFSET_M / aircraft.geometry.span_m
 
 
 @kernel
 def disable_if_apart(mon, levers):
-    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in
-    addition to the common one."""
+    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in addition to
+    the common one.
+    """
     for i in range(mon.config.n_engines):
         mon.memory.levers_apart |= levers[i] != 0.0
 
 
 @kernel
 def detect_engine_failure(mon, asymmetry, y):
-    """Whether an engine has failed, by these signals y or before; yaw: on |Cn - a CT|
-    here."""
+    """Whether an engine has failed, by these signals y or before; asymmetry: bound on |Cn - a CT| here."""
     c = mon.config
     if c.n_engines > 0 and not mon.memory.levers_apart:
         CT = y[c.i_T]

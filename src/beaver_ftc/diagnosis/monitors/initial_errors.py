@@ -8,32 +8,31 @@ The error x of the sensor is counted as
     alpha, beta, phi, theta    x = 2 sin((reading - truth) / 2): by so much the angle turns a unit vector
     airspeed                   x = reading / truth - 1
 
-The record of the hypotheses (INITIAL_ERRORS_RECORD) holds for each hypothesis, with h the time between two
-samples, s; test t; and filter pole m
+Of each hypothesis h the record holds, for test j and filter pole m,
 
-    H           W_t: bound on |effect on residual t in one sample| / |x|
-    H_m  W_tm: the same through the filter, W_tm <- decay_m W_tm + W_t
-    e                     b: bound on |x|. At the first sample it is as large as an aircraft can fly
-                                    (e_start). Then, at each sample,
-                                      b <- min(b + (1 - decay_slow) d, e_start)
-                                    and for each test, or pair of tests, that couples with the error
-                                      b <- min(b, (r + B + 2 d W_tm)
-                                                  / (EFFECT_LEFT C))
-    d              d: bound on the change of x within the memory of the slowest filter,
-                                    d = min(r + B + b W_tm, e_start), of the test that a change
-                                    of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
+    H    bound on |effect on residual j in one sample| / |x|
+    H_m  the same through the filter, H_m <- a_m H_m + H
+    C    lower bound, with sign, on the effect of a unit of x in one sample; C_m the same through the filter
+    e    bound on |x|. At the first sample it is as large as an aircraft can fly (e_start). Then, at each
+         sample,
+             e <- min(e + (1 - a_slow) d, e_start)
+         and for each test, or pair of tests, that couples with the error
+             e <- min(e, (r + B + 2 d H_m) / (EFFECT_LEFT C_m))
+    d    bound on the change of x within the memory of the slowest filter,
+             d = min(r + B + e H_m, e_start)
+         of the test that a change of x moves at once; for the airspeed r + B + e H_m times (1 + e) / V
 
-r: |filtered residual|; B: bound on it for sound sensors; C: filtered signed effect, a lower bound on the
-effect of a unit of x. Of several tests r + B + 2 d W_tm is the root of the sum of squares. For the airspeed
-it counts 1 + b times in the tests of flow; in that of the density 2 (1 + b) / V times r + B of SPEED is added
-to it. A test refutes a hypothesis with
+r: |filtered residual|; B: bound on it for sound sensors; a_m: decay of the filter per sample; h also the time
+between two samples, s, in the formulas of the effects. Of several tests r + B + 2 d H_m is the root of the
+sum of squares. For the airspeed it counts 1 + e times in the tests of flow; in that of the density
+2 (1 + e) / V times r + B of SPEED is added to it. A test refutes a hypothesis with
 
-    r > B + (b + d) W_tm
-    r > (1 + b + d) B + (b + d) W_tm     for the airspeed, in SPEED and the tests after it
+    r > B + (e + d) H_m
+    r > (1 + e + d) B + (e + d) H_m     for the airspeed, in SPEED and the tests after it
 
 since a residual is the sum of the effect of sound sensors, at most B, and of the effect of the error. So an
 error from the start, of any size, never excludes the broken sensor. Where sensor_monitor.py excludes a sensor
-by the effect that its error would have from now on, the limit is B + b W_tm with b as of the alarm.
+by the effect that its error would have from now on, the limit is B + e_alarm H_m, e as of the alarm.
 
 What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
 in body axes; p, q, r rad/s):
@@ -54,6 +53,8 @@ in body axes; p, q, r rad/s):
 
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
+
+red: record of the tests (redundancy.py, which says y and y_past); ini: record of the hypotheses.
 """
 
 import numpy as np
@@ -95,8 +96,7 @@ MIN_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which 
 EFFECT_LEFT = 0.8
 SLOW_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Places in `C`: effects of a unit of an error that are followed with their sign,
-# per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
+# Places in C. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
 # reading that is off comes first; VANE: of alpha and of beta.
 (
     PHI_Q,  # h q
@@ -121,7 +121,7 @@ SLOW_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
 
 @kernel
 def angle_of_chord(x):
-    """The angle, rad, whose 2 sin(angle / 2) is `chord`; half a turn for a longer one than 2."""
+    """The angle, rad, with 2 sin(angle / 2) = x; half a turn for x > 2."""
     return 2.0 * np.arcsin(min(0.5 * x, 1.0))
 
 
@@ -133,14 +133,18 @@ def chord_of_angle(angle):
 
 @kernel
 def standard_density(h):
-    """Return the density of the standard troposphere, kg/m3, at h."""
+    """Density of the standard troposphere, kg/m3, at the height h m."""
     T = max(1.0 - 2.25577e-5 * h, MIN_TEMPERATURE_RATIO)
     return 1.225 * T**4.2559
 
 
 @kernel
 def start_bounds(ini, y):
-    """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
+    """e_start: bound each error at the first sample: an aircraft can fly at the truth.
+
+    V_air: airspeed by dynamic pressure and height in the standard atmosphere, m/s; most, least: reading over
+    truth in the thickest and in the thinnest air.
+    """
     e = ini.e_start
     e[H_ALPHA] = chord_of_angle(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD)
     e[H_BETA] = chord_of_angle(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD)
@@ -148,10 +152,7 @@ def start_bounds(ini, y):
     V_air = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
         2.0 * max(y[QDYN], MIN_QDYN_PA) / standard_density(y[ALTITUDE])
     )
-    (
-        most,
-        least,
-    ) = (  # of reading and truth, in the thickest and in the thinnest air
+    (most, least) = (  # of reading and truth, in the thickest and in the thinnest air
         V / V_air * np.sqrt(1.0 + DENSITY_SHARE),
         V / V_air * np.sqrt(1.0 - DENSITY_SHARE),
     )
@@ -168,14 +169,13 @@ def change_test(h):
 
 @kernel
 def widen_bounds(red, ini):
-    """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
-    part of it that this filter forgets in a sample."""
+    """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
     lost = 1.0 - red.config.decay[SLOW_POLE]
     for i in range(N_INITIAL):
         j = change_test(i)
         most = ini.e_start[i]
         d = allowed_effect(red, j, SLOW_POLE) + ini.e[i] * ini.H_m[i, j, SLOW_POLE]
-        if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + b)
+        if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
             d *= (1.0 + ini.e[i]) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
         ini.d[i] = min(d, most)
         e = ini.e[i] + lost * ini.d[i]
@@ -184,10 +184,8 @@ def widen_bounds(red, ini):
 
 @kernel
 def fill_effects(red, ini, y):
-    """Fill `H` (N_INITIAL, RPM_TEST) and, with signs,
-    `C` (N_EFFECTS,).
-
-    Both are taken at the sample before, from which this sample, readings (N_SENSORS,), is predicted.
+    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,), taken at the sample before, from which y is
+    predicted.
     """
     y_past, h = red.memory.y_past, red.config.sample_time_s
     p, q, r = y_past[0], y_past[1], y_past[2]
@@ -215,15 +213,7 @@ def fill_effects(red, ini, y):
         # theta' = q cos(phi) - r sin(phi) there is no theta.
         H[H_PHI, ANGLE_TEST + i] = sec * (qr + sec * second)
         H[H_THETA, ANGLE_TEST + i] = sec * ((heading if i != 1 else 0.0) + sec_max * second)
-    (
-        C[PHI_Q],
-        C[PHI_R],
-        C[THETA_TURN],
-    ) = (
-        h * q,
-        h * r,
-        h * (q * np.sin(phi) + r * np.cos(phi)),
-    )
+    (C[PHI_Q], C[PHI_R], C[THETA_TURN]) = (h * q, h * r, h * (q * np.sin(phi) + r * np.cos(phi)))
     fill_flow_effects(red, ini, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
@@ -234,11 +224,11 @@ def fill_effects(red, ini, y):
 
 @kernel
 def fill_flow_effects(red, ini, V, p, q, r):
-    """Fill `H` and `C` for the tests of speed, flow and
-    climb, and by gravity.
+    """Fill H and C for the tests of speed, flow and climb, and by gravity.
 
-    V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
-    for the second order in h. x: the error of the row's hypothesis.
+    V m/s; p, q, r rad/s: of the sample before. h2: h times 1 + h (|a| / V + |p| + |q| + |r|), the second
+    order in h. sa, ca, sb, ...: sines and cosines of alpha, beta, phi, theta. x: the error of the row's
+    hypothesis.
     """
     M, h, g = red.memory, red.config.sample_time_s, red.config.g
     y, a = M.y_past, M.a
@@ -256,10 +246,7 @@ def fill_flow_effects(red, ini, V, p, q, r):
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
     a_normal = a[2] * ca - a[0] * sa
     a_side = a[1] * cb - (a[0] * ca + a[2] * sa) * sb
-    a_max = max(
-        M.a_size,
-        np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2),
-    )
+    a_max = max(M.a_size, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
     # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
     roll, yaw = p * ca + r * sa, p * sa - r * ca
     h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
@@ -305,16 +292,7 @@ def fill_flow_effects(red, ini, V, p, q, r):
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch = abs(y[THETA])
-    C[THETA_G] = (
-        h
-        * g
-        * np.cos(
-            min(
-                pitch + 0.5 * angle_of_chord(ini.e[H_THETA]),
-                0.5 * pitch + 0.25 * np.pi,
-            )
-        )
-    )
+    C[THETA_G] = h * g * np.cos(min(pitch + 0.5 * angle_of_chord(ini.e[H_THETA]), 0.5 * pitch + 0.25 * np.pi))
     # alpha: altitude' = V cos(beta) vert sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
@@ -334,7 +312,7 @@ def fill_flow_effects(red, ini, V, p, q, r):
 
 @kernel
 def filter_effects(red, ini):
-    """Pass effects per unit error, largest and signed, through the filters of the tests."""
+    """H_m <- a_m H_m + H, and C_m <- a_m C_m + C."""
     a = red.config.decay
     for i in range(N_INITIAL):
         for j in range(RPM_TEST):
@@ -347,50 +325,39 @@ def filter_effects(red, ini):
 
 @kernel
 def allowed_effect(red, j, m):
-    """Bound the effect of any error on a test through a filter: r + B, in the unit of the residual."""
+    """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
     test = red.test[j]
     return abs(test.r[m]) + test.B[m]
 
 
 @kernel
 def constant_effect(red, ini, h, j, m):
-    """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
-    through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
+    """r + B + 2 d H_m: bound on the effect of the present error of hypothesis h, had it been constant, on a
+    test through a filter. The error was up to d larger or smaller while the filter summed it.
+    """
     return allowed_effect(red, j, m) + 2.0 * ini.d[h] * ini.H_m[h, j, m]
 
 
 @kernel
 def tighten(ini, h, most, c):
-    """Lower the bound on an error whose effect is at most most, and at least c
-    a unit."""
+    """Lower e of hypothesis h, whose effect is at most `most`, and at least c a unit: e <- most / (0.8 c)."""
     if c > 0.0:
-        ini.e[h] = min(
-            ini.e[h],
-            most / (EFFECT_LEFT * c),
-        )
+        ini.e[h] = min(ini.e[h], most / (EFFECT_LEFT * c))
 
 
 @kernel
 def velocity_effect(red, ini, h, m):
     """The bound of `constant_effect` on the velocity, m/s, in any direction."""
     V = max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    angle = np.hypot(
-        constant_effect(red, ini, h, ALPHA_TEST, m),
-        constant_effect(red, ini, h, BETA_TEST, m),
-    )
-    return np.hypot(
-        constant_effect(red, ini, h, SPEED_TEST, m),
-        V * angle,
-    )
+    angle = np.hypot(constant_effect(red, ini, h, ALPHA_TEST, m), constant_effect(red, ini, h, BETA_TEST, m))
+    return np.hypot(constant_effect(red, ini, h, SPEED_TEST, m), V * angle)
 
 
 @kernel
 def turn_effect(red, ini, h, m):
-    """The bound of `constant_effect` on the rotation about the body's second and third axes,
-    rad."""
+    """The bound of `constant_effect` on the rotation about the body's second and third axes, rad."""
     return np.hypot(
-        constant_effect(red, ini, h, TURN_TEST + 1, m),
-        constant_effect(red, ini, h, TURN_TEST + 2, m),
+        constant_effect(red, ini, h, TURN_TEST + 1, m), constant_effect(red, ini, h, TURN_TEST + 2, m)
     )
 
 
@@ -399,40 +366,11 @@ def tighten_all(red, ini):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(red.config.decay.size):
         C = ini.C_m[:, m]
-        tighten(
-            ini,
-            H_PHI,
-            turn_effect(red, ini, H_PHI, m),
-            np.hypot(
-                C[PHI_Q],
-                C[PHI_R],
-            ),
-        )
-        tighten(
-            ini,
-            H_PHI,
-            velocity_effect(red, ini, H_PHI, m),
-            np.hypot(
-                C[PHI_DOWN],
-                C[PHI_SIDE],
-            ),
-        )
-        tighten(
-            ini,
-            H_THETA,
-            velocity_effect(red, ini, H_THETA, m),
-            C[THETA_G],
-        )
-        turn = np.hypot(
-            constant_effect(red, ini, H_THETA, TURN_TEST, m),
-            turn_effect(red, ini, H_THETA, m),
-        )
-        tighten(
-            ini,
-            H_THETA,
-            turn,
-            abs(C[THETA_TURN]),
-        )
+        tighten(ini, H_PHI, turn_effect(red, ini, H_PHI, m), np.hypot(C[PHI_Q], C[PHI_R]))
+        tighten(ini, H_PHI, velocity_effect(red, ini, H_PHI, m), np.hypot(C[PHI_DOWN], C[PHI_SIDE]))
+        tighten(ini, H_THETA, velocity_effect(red, ini, H_THETA, m), C[THETA_G])
+        turn = np.hypot(constant_effect(red, ini, H_THETA, TURN_TEST, m), turn_effect(red, ini, H_THETA, m))
+        tighten(ini, H_THETA, turn, abs(C[THETA_TURN]))
         tighten_vanes(red, ini, m)
         tighten_airspeed(red, ini, m)
 
@@ -443,48 +381,25 @@ def tighten_vanes(red, ini, m):
     C = ini.C_m[:, m]
     half = 0.5 * angle_of_chord(ini.e[H_ALPHA])
     c = np.cos(half) * abs(C[VANE_ROLL]) - np.sin(half) * abs(C[VANE_YAW]) - C[ALPHA_FORCE]
-    tighten(
-        ini,
-        H_ALPHA,
-        constant_effect(red, ini, H_ALPHA, CLIMB_TEST, m),
-        C[ALPHA_CLIMB],
-    )
-    tighten(
-        ini,
-        H_ALPHA,
-        constant_effect(red, ini, H_ALPHA, BETA_TEST, m),
-        c,
-    )
+    tighten(ini, H_ALPHA, constant_effect(red, ini, H_ALPHA, CLIMB_TEST, m), C[ALPHA_CLIMB])
+    tighten(ini, H_ALPHA, constant_effect(red, ini, H_ALPHA, BETA_TEST, m), c)
     c = np.cos(0.5 * angle_of_chord(ini.e[H_BETA])) * abs(C[VANE_ROLL]) - C[BETA_FORCE]
-    tighten(
-        ini,
-        H_BETA,
-        constant_effect(red, ini, H_BETA, ALPHA_TEST, m),
-        c,
-    )
+    tighten(ini, H_BETA, constant_effect(red, ini, H_BETA, ALPHA_TEST, m), c)
 
 
 @kernel
 def tighten_airspeed(red, ini, m):
     """Lower the bound on the error of the airspeed to what flow and density allow.
 
-    The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
+    The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
     C = ini.C_m[:, m]
     ratio = 1.0 + ini.e[H_AIRSPEED]
     tighten(
-        ini,
-        H_AIRSPEED,
-        ratio * constant_effect(red, ini, H_AIRSPEED, ALPHA_TEST, m),
-        abs(C[SPEED_ALPHA]),
+        ini, H_AIRSPEED, ratio * constant_effect(red, ini, H_AIRSPEED, ALPHA_TEST, m), abs(C[SPEED_ALPHA])
     )
-    tighten(
-        ini,
-        H_AIRSPEED,
-        ratio * constant_effect(red, ini, H_AIRSPEED, BETA_TEST, m),
-        abs(C[SPEED_BETA]),
-    )
+    tighten(ini, H_AIRSPEED, ratio * constant_effect(red, ini, H_AIRSPEED, BETA_TEST, m), abs(C[SPEED_BETA]))
     change = (
         2.0 * ratio * allowed_effect(red, SPEED_TEST, m) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
     )
@@ -498,7 +413,7 @@ def tighten_airspeed(red, ini, m):
 
 @kernel
 def update_bounds(red, ini, y):
-    """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
+    """Update all bounds by the sample y, which has just been tested."""
     if too_steep(red, y):
         ini.C_m[:] = 0.0
         return
@@ -510,8 +425,10 @@ def update_bounds(red, ini, y):
 
 @kernel
 def refutes_initial(red, ini, h, j):
-    """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
-    pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
+    """Whether a test's residual is larger than sound sensors and the error of hypothesis h explain: for a
+    pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
+    ones.
+    """
     test = red.test[j]
     x = ini.e[h] + ini.d[h]
     if j >= RPM_TEST:
@@ -526,14 +443,15 @@ def refutes_initial(red, ini, h, j):
 
 @kernel
 def store_bounds(ini):
-    """Keep the bounds of the moment of the alarm: later residuals may be the effect of another error."""
+    """e_alarm: e of the moment of the alarm, since later residuals may be the effect of another error."""
     ini.e_alarm[:] = ini.e
 
 
 @kernel
 def effect_at_alarm(ini, h, j, m):
-    """Bound the effect on a test, through a filter, of an error as large as that of a hypothesis could be at
-    the alarm: b W_tm, in the unit of the residual."""
+    """e_alarm H_m: bound on the effect, on a test through a filter, of an error as large as that of
+    hypothesis h could be at the alarm; in the unit of the residual.
+    """
     return ini.e_alarm[h] * ini.H_m[h, j, m]
 
 

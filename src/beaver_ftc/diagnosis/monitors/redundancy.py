@@ -7,11 +7,22 @@
     engine      speed and manifold pressure are as commanded
     equal       a sensor that no equation uses, and the reading that its row says it should equal
 
-h is the time between two samples, a JSBSim frame. The integration is that of JSBSim (rates held over the
-step; velocity by Adams and Bashforth's second order), so that residuals of sound sensors contain only what is
-left out here: the Earth turns and is round. Every residual passes filters of several poles, with a bound on
-the effect of the declared errors of all sensors together, as in detection/filters.py. Declared turbulence
-widens the bounds of flow and climb by the effect of its gusts within a filter's memory.
+The integration is that of JSBSim (rates held over the step; velocity by Adams and Bashforth's second order),
+so that residuals of sound sensors contain only what is left out here: the Earth turns and is round. Every
+residual passes filters of several poles, with a bound on the effect of the declared errors of all sensors
+together, as in detection/filters.py. Declared turbulence widens the bounds of flow and climb by the effect of
+its gusts within a filter's memory.
+
+    y, y_past, y_pred  (N_SENSORS,)  readings now, in the sample before, as predicted from that; SI
+    e, e_past, e_older (N_SENSORS,)  bounds on their errors: now, in the sample before, in that before it
+    e_new              (N_SENSORS,)  bound on the part of an error that changes from sample to sample
+    w, w_max                         body rates (3,), bound on |p| + |q| + |r|; rad/s
+    e_w                              sum of the bounds on the errors of the three gyros, rad/s
+    v, a, a_past       (3,)          velocity m/s, acceleration m/s2 with gravity, that of the sample before
+    q, q_past, q_pred  (4,)          attitude as unit quaternion, body to level axes, scalar first
+    h                                time between two samples, s: a JSBSim frame
+    i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
+    red, c, M                        record of the tests, its configuration, its memory
 
 This file also has the records of the sensor monitor, their configuration, and its finding in words.
 """
@@ -76,8 +87,7 @@ COUNTERPART_TEST = np.array(
     np.int64,
 )
 DUPLICATE_TOLERANCE = np.array(
-    [counterpart_and_tolerance.within for _, counterpart_and_tolerance in DUPLICATES],
-    float,
+    [counterpart_and_tolerance.within for _, counterpart_and_tolerance in DUPLICATES], float
 )
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
@@ -100,41 +110,32 @@ H_ALPHA, H_BETA, H_AIRSPEED, H_PHI, H_THETA = range(5)
 N_INITIAL, N_EFFECTS = 5, 14
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
-# sample, the first for each second of it. gust_gain: effect on the residual of 1 m/s
-# that a gust changes by. B: on r; B_s,
-# B_n: its parts. ratio: largest |r| /
-# B over the poles.
+# sample, the first for each second of it; past_bound: bound_per_sample of the sample before. gust_gain:
+# effect on the residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; B_s, B_n: its
+# parts by bound_per_s and by bound_per_sample. ratio: largest |r| / B over the poles.
 TEST_RECORD = record(
-    residual=float, bound_per_s=float, bound_per_sample=float, past_bound=float,
-    gust_gain=float, B=N_POLES,
-    r=N_POLES, B_s=N_POLES, B_n=N_POLES,
-    ratio=float,
+    residual=float, bound_per_s=float, bound_per_sample=float, past_bound=float, gust_gain=float,
+    r=N_POLES, B=N_POLES, B_s=N_POLES, B_n=N_POLES, ratio=float,
 )  # fmt: skip
 
 REDUNDANCY_RECORD = record(
     config=record(
-        sample_time_s=float, decay=N_POLES, g=float,
-        # Declared turbulence: bound on a gust's speed; bound on its changes through each filter, which holds
-        # up to max_airspeed_mps, and above low_m: below it a gust changes faster
-        gust_max=float, gust_change=N_POLES, max_airspeed_mps=float,
-        low_m=float, wind_max=float,
-        # Declared errors of a reading z, SI: |error| <= e_zero +
-        # e_slope |z|, of which const does not change
-        e_zero=N_SENSORS, e_slope=N_SENSORS,
-        const=N_SENSORS, drift=float,
+        sample_time_s=float, decay=N_POLES, g=float,  # of each filter per sample; m/s2
+        # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
+        # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
+        gust_max=float, gust_change=N_POLES, max_airspeed_mps=float, low_m=float,
+        wind_max=float,  # of the vertical wind, m/s
+        # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the
+        # attitude, rad/s
+        e_zero=N_SENSORS, e_slope=N_SENSORS, const=N_SENSORS, drift=float,
     ),
     memory=record(
-        # bounds on the error of each reading in this sample, and on the part of it that changes
-        reading_bound=N_SENSORS, e_new=N_SENSORS,
-        e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
-        # the sample before: readings; attitude; velocity m/s and acceleration m/s2, gravity included, in body
-        # axes; and the acceleration of the sample before that. predict_readings advances
-        # the last two vectors
-        y_past=N_SENSORS, q_past=4, v=3, a=3,
-        a_past=3,
-        # m/s2: in the elapsed step, in the two steps before it; of a_past
-        a_size=float, a_sizes=2,
-        a_size_past=float,
+        # bounds on the error of each reading: e; part of it that changes; part of it by drift, rad; before
+        reading_bound=N_SENSORS, e_new=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
+        # of the sample before; predict_readings advances v and a_past
+        y_past=N_SENSORS, q_past=4, v=3, a=3, a_past=3,
+        # m/s2: |a| in the elapsed step, in the two steps before it; of a_past
+        a_size=float, a_sizes=2, a_size_past=float,
         e_first=float,  # m/s2, in the first step only: no sample precedes it
         predicted_reading=N_SENSORS, scratch=4, q_pred=4,
         engine_commands=2,  # engine speed rpm, manifold pressure inHg
@@ -143,25 +144,18 @@ REDUNDANCY_RECORD = record(
 )  # fmt: skip
 
 INITIAL_ERRORS_RECORD = record(
-    # of each hypothesis, bounds on the sensor's error: at the first sample, now, at the alarm; and on the
-    # change of the error since. Units: see initial_errors.py
-    e_start=N_INITIAL, e=N_INITIAL,
-    e_alarm=N_INITIAL, d=N_INITIAL,
-    # bound on the effect of a unit of the error on a residual: in one sample, and through the filters
-    H=(N_INITIAL, RPM_TEST),
-    H_m=(N_INITIAL, RPM_TEST, N_POLES),
-    # effects of a unit with their sign
-    C=N_EFFECTS,
-    C_m=(N_EFFECTS, N_POLES),
+    # Symbols: initial_errors.py
+    e_start=N_INITIAL, e=N_INITIAL, e_alarm=N_INITIAL, d=N_INITIAL,
+    H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES), C=N_EFFECTS, C_m=(N_EFFECTS, N_POLES),
     refuted=(int, N_INITIAL, N_TESTS),  # since the alarm
 )  # fmt: skip
 
 MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
-    noisy=int,  # then a surface is isolated only once no gyro can be the cause
+    noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
-    D=(3, 3),  # D: body rates decay with rate' = -D rate
+    D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
 )  # fmt: skip
 
 MONITOR_MEMORY_RECORD = record(
@@ -169,31 +163,23 @@ MONITOR_MEMORY_RECORD = record(
     # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
     # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
     # largest size of turn_share
-    beyond=(3, 3, N_POLES), swing=(3, N_POLES),
-    c_max=(3, 3),
+    beyond=(3, 3, N_POLES), swing=(3, N_POLES), c_max=(3, 3),
     # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
     # largest size in the other samples of this frame, of the one before, of the one before that; its smallest
     # size there, of this frame and the one before
-    w_att=3, w_att_past=3,
-    peak=3, peak_past=3, peak_older=3,
-    floor=3, floor_past=3,
-    # W of sensor_monitor.py, rad/s, by axis: the gyro's error if the dynamics are right; and its bound
-    w=3, w_bound=3, w_bound_past=3,
-    w_past=3,
-    # a sensor with the reading that it should equal
-    agreed=(int, max(len(DUPLICATES), 1)),
-    # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
+    w_att=3, w_att_past=3, peak=3, peak_past=3, peak_older=3, floor=3, floor_past=3,
+    # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
+    w=3, w_bound=3, w_bound_past=3, w_past=3,
+    agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
+    # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
     # beyond it no gyro can be broken
-    gyros_excluded=int, gap=(3, N_POLES), gap_bound=(3, N_POLES),
-    gyro_verdict=(int, 3), replaced=(int, 3),
+    gyros_excluded=int, gap=(3, N_POLES), gap_bound=(3, N_POLES), gyro_verdict=(int, 3), replaced=(int, 3),
     n_same=(int, N_SENSORS), y_older=N_SENSORS, cleared=(int, N_SENSORS),
-    jump=float,  # m/s2, which fades
+    jump=float,  # of the accelerometers, m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings
-    n_since=int, r_sum=3, B_sum=3,
-    e_sum=3, y_min=3,
-    y_max=3,
-    climb=N_POLES,  # of an incidence with the error that its residuals show
+    n_since=int, r_sum=3, B_sum=3, e_sum=3, y_min=3, y_max=3,
+    climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
     dv=3,  # m/s, body axes: what the residuals add up to
 )  # fmt: skip
 
@@ -201,9 +187,8 @@ MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
     keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
     had_surface=int,  # a surface had been isolated just before the alarm
-    alarm_test=int,  # index of the test that has raised the alarm
-    # test with the largest ratio of this frame, and that ratio
-    worst_test_index=int, top_ratio=float,
+    alarm_test=int,  # test that has raised the alarm
+    worst_test_index=int, top_ratio=float,  # test with the largest ratio of this frame, and that ratio
     suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
 )  # fmt: skip
 
@@ -217,8 +202,7 @@ SENSOR_MONITOR_RECORD = record(
 
 
 def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.void, y: np.ndarray) -> None:
-    """Fill the monitor's record at the trim: y, the measured signals there; design: of the
-    designer.
+    """Fill the monitor's record at the trim: y, the measured signals there; design: model of the designer.
 
     A monitor that is not declared has found nothing, and its record holds no more than that.
     """
@@ -228,10 +212,7 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     if not declared.monitors_sensors:
         return
     initial = cast("Any", declared.initial)  # whose keys the aircraft names
-    config["substeps"], config["has_engine"] = (
-        declared.substeps,
-        declared.aircraft.has_engine_instruments,
-    )
+    config["substeps"], config["has_engine"] = (declared.substeps, declared.aircraft.has_engine_instruments)
     config["y_trim"][3:7] = y[:4]
     config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
@@ -264,15 +245,7 @@ def configure_errors(mon: np.void, declared: Declared, h: float) -> None:
     sensors = declared.sensors
     for i, name in enumerate(SENSORS):
         e = sensors[name]
-        (
-            tests["e_zero"][i],
-            tests["e_slope"][i],
-            tests["const"][i],
-        ) = (
-            e.worst,
-            e.slope,
-            e.steady,
-        )
+        (tests["e_zero"][i], tests["e_slope"][i], tests["const"][i]) = (e.worst, e.slope, e.steady)
         c["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
         drift = getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0)
         tests["drift"] = max(tests["drift"], abs(drift))
@@ -291,8 +264,8 @@ def n_frozen(noise: float, resolution: float) -> int:
 def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
     """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
 
-    The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
-    keeps 1 / 2 lam of its intensity.
+    The speed of a gust is a random walk of intensity Q (`Dryden.velocity_walk`); a filter with a pole of
+    lam 1/s keeps T = h / (1 - exp(-2 lam h)) of it. V m/s: airspeed in trim.
     """
     sigma = air.sigma_mps
     Q = air.velocity_walk(V, MAX_AIRSPEED_OVER_TRIM)
@@ -343,7 +316,7 @@ POSITION_FACTOR = 4.0 / 3.0
 
 @kernel
 def fill_quaternion(phi, theta, psi, out):
-    """Fill out (4,): the rotation from body to level axes, scalar first; Euler angles rad."""
+    """Fill out (4,) with q of the Euler angles, rad."""
     c1, c2, c3 = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
     s1, s2, s3 = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
     out[0] = c1 * c2 * c3 + s1 * s2 * s3
@@ -354,8 +327,7 @@ def fill_quaternion(phi, theta, psi, out):
 
 @kernel
 def advance_quaternion(q_past, w, h, out):
-    """Fill out (4,): the previous unit quaternion (4,) after h at body rates (3,) rad/s: one Euler
-    step."""
+    """Fill out (4,) with q_past after h s at body rates w: one Euler step, q_past (1, h w / 2) / |...|."""
     x = 0.5 * h * w[0]
     y = 0.5 * h * w[1]
     z = 0.5 * h * w[2]
@@ -369,7 +341,7 @@ def advance_quaternion(q_past, w, h, out):
 
 @kernel
 def small_turn(q_a, q_b, n):
-    """Component (1, 2, 3) in body axes of the small rotation from one attitude (4,) to the other, rad."""
+    """Component n (1, 2, 3), body axes, of the small rotation from attitude q_a to q_b, rad: 2 (q_a* q_b)_n."""
     a = q_a
     b = q_b
     i = n
@@ -382,8 +354,7 @@ def small_turn(q_a, q_b, n):
 
 @kernel
 def turn_share(y, i, j):
-    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (j 0, 1, 2), rad/rad,
-    at the attitude of the readings (N_SENSORS,)."""
+    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
     phi, theta = y[PHI], y[THETA]
     if i == 0:
         return (1.0, 0.0, -np.sin(theta))[j]
@@ -394,8 +365,10 @@ def turn_share(y, i, j):
 
 @kernel
 def turn_vector(w, h, v, out):
-    """Fill out (3,): the components of a constant vector (3,) in body axes that have turned at rates (3,)
-    rad/s for h."""
+    """Fill out (3,) with a constant vector v in body axes that have turned at rates w for h s (Rodrigues):
+
+    out = v - sine w x v + versine (w (w . v) - |w|^2 v),    tan(angle / 2) = h |w| / 2
+    """
     w_size = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
     angle = 2.0 * np.arctan(0.5 * h * w_size)
     sine = np.sin(angle) / w_size if w_size > 0.0 else 0.0
@@ -409,7 +382,7 @@ def turn_vector(w, h, v, out):
 
 @kernel
 def bound_readings(red, y):
-    """Fill the bounds on the error of each of the readings (N_SENSORS,), and on the part that changes."""
+    """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and e_new = e - const."""
     c, M = red.config, red.memory
     for i in range(N_SENSORS):
         size = abs(wrapped(y[i])) if i == PSI else abs(y[i])
@@ -422,7 +395,7 @@ def bound_readings(red, y):
 
 @kernel
 def store_sample(red, y, force):
-    """Store this sample for the next one; readings (N_SENSORS,) SI, force (3,) m/s2."""
+    """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
     M, g = red.memory, red.config.g
     M.y_past[:], M.e_older[:] = y, M.e_past
     M.e_past[:] = M.reading_bound
@@ -438,16 +411,16 @@ def store_sample(red, y, force):
 
 @kernel
 def vector_length(v):
-    """The length of a vector (3,)."""
+    """|v| of a vector (3,)."""
     return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
 
 
 @kernel
 def predict_readings(red):
-    """Fill y (N_SENSORS,): attitude, flow and altitude now, from the sample before.
+    """Fill y_pred: attitude, flow and altitude now, from the sample before.
 
-    Afterwards v is the predicted one, and a_past that of the sample before in
-    the present body axes.
+    v <- v + h (3/2 a - 1/2 a_past), turned by -h w. Afterwards v is the predicted one, and a_past that of the
+    sample before in the present body axes.
     """
     M, h = red.memory, red.config.sample_time_s
     w = M.y_past[:3]
@@ -466,10 +439,7 @@ def predict_readings(red):
     v = M.v
     climb = v[0] * np.sin(theta) - v[1] * np.sin(phi) * np.cos(theta) - v[2] * np.cos(phi) * np.cos(theta)
     y[ALTITUDE] = M.y_past[ALTITUDE] + h * climb
-    M.a_sizes[1], M.a_sizes[0] = (
-        M.a_sizes[0],
-        M.a_size,
-    )
+    M.a_sizes[1], M.a_sizes[0] = (M.a_sizes[0], M.a_size)
     M.a_size_past = vector_length(M.a_past)
     for i in range(3):
         x[i] = AB_NOW * M.a[i] - AB_PAST * M.a_past[i]
@@ -486,7 +456,7 @@ def predict_readings(red):
 
 @kernel
 def fill_residuals(red, y):
-    """Fill the residual of each test: readings (N_SENSORS,) minus their prediction."""
+    """Fill the residual of each test: y - y_pred; of the density log(rho / rho_past), rho = qdyn / V^2."""
     tests, M, y_pred = red.test, red.memory, red.memory.predicted_reading
     fill_quaternion(y[PHI], y[THETA], y[PSI], M.scratch)
     for i in range(3):
@@ -503,12 +473,9 @@ def fill_residuals(red, y):
 
 @kernel
 def pitch_bound(red, y):
-    """Bound |theta| in this sample and the one before, rad, by readings and their errors."""
+    """Bound |theta| in this sample and the one before, rad: |y| + e."""
     M = red.memory
-    return max(
-        abs(y[THETA]) + M.reading_bound[THETA],
-        abs(M.y_past[THETA]) + M.e_past[THETA],
-    )
+    return max(abs(y[THETA]) + M.reading_bound[THETA], abs(M.y_past[THETA]) + M.e_past[THETA])
 
 
 @kernel
@@ -519,18 +486,16 @@ def too_steep(red, y):
 
 @kernel
 def extrapolate_bound(red, i):
-    """Bound the error of 3/2 a - 1/2 a_before by the errors of the reading of a sensor in the two samples. A
-    constant error counts once."""
+    """Bound the error of 3/2 y - 1/2 y_before of sensor i: 3/2 e_past + 1/2 e_older - const."""
     return AB_NOW * red.memory.e_past[i] + AB_PAST * red.memory.e_older[i] - red.config.const[i]
 
 
 @kernel
 def bound_acceleration(red, w_max, e_w):
-    """Bound the error of the acceleration of the elapsed step, m/s2.
+    """e_a: bound on the error of the acceleration of the elapsed step, m/s2.
 
-    Its parts: errors of the accelerometers; gravity in the direction that the attitude gives it; turning the
-    previous acceleration into the present axes. w_max, e_w, rad/s: see
-    bound_residuals.
+    Its parts: errors of the accelerometers; gravity in the direction that the attitude gives it (e_tilt);
+    turning the previous acceleration into the present axes (e_turn).
     """
     c, M = red.config, red.memory
     e_tilt = extrapolate_bound(red, PHI) + extrapolate_bound(red, THETA)
@@ -549,7 +514,8 @@ def bound_attitude(red, y, w_max, e_w):
     """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
-    it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
+    it changes J. A momentary error (e_brief) turns an axis when it begins, and back when it ends with another
+    J. sec: largest 1 / cos(theta).
     """
     tests, c, M = red.test, red.config, red.memory
     e = M.e_past
@@ -577,7 +543,7 @@ def bound_attitude(red, y, w_max, e_w):
 
 @kernel
 def min_altitude(red, y):
-    """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
+    """Lower bound on the height in this sample and the one before, m: y - e of the altimeter."""
     M = red.memory
     h_min = y[ALTITUDE] - M.reading_bound[ALTITUDE]
     h_past = M.y_past[ALTITUDE] - M.e_past[ALTITUDE]
@@ -587,21 +553,15 @@ def min_altitude(red, y):
 @kernel
 def bound_flow(red, y, w_max, e_w):
     """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
-    kinematics with respect to each reading, times the bound on the reading's error."""
+    kinematics with respect to each reading, times the bound e of the reading.
+
+    sec: largest 1 / cos(beta); second: 1 and the second order in h; gust: how much faster a gust changes.
+    """
     tests, c, M = red.test, red.config, red.memory
     e, e_past = M.reading_bound, M.e_past
     e_new, y_past = M.e_new, M.y_past
-    V_min = max(
-        min(
-            y[AIRSPEED] - e[AIRSPEED],
-            y_past[AIRSPEED] - e_past[AIRSPEED],
-        ),
-        MIN_AIRSPEED_MPS,
-    )
-    beta_max = max(
-        abs(y[BETA]) + e[BETA],
-        abs(y_past[BETA]) + e_past[BETA],
-    )
+    V_min = max(min(y[AIRSPEED] - e[AIRSPEED], y_past[AIRSPEED] - e_past[AIRSPEED]), MIN_AIRSPEED_MPS)
+    beta_max = max(abs(y[BETA]) + e[BETA], abs(y_past[BETA]) + e_past[BETA])
     sec = 1.0 / np.cos(min(beta_max, MAX_PITCH_RAD))
     e_vane = e_past[ALPHA] + e_past[BETA]
     e_a = bound_acceleration(red, w_max, e_w)
@@ -611,29 +571,18 @@ def bound_flow(red, y, w_max, e_w):
     e_flow = (
         sec**2 * ((e_a + a_max * (e_vane + e_past[AIRSPEED] / V_min)) / V_min + w_max * e_vane) + sec * e_w
     )
-    tests[SPEED_TEST].gust_gain, tests[SPEED_TEST].bound_per_sample = (
-        gust,
-        e_new[AIRSPEED],
-    )
+    tests[SPEED_TEST].gust_gain, tests[SPEED_TEST].bound_per_sample = (gust, e_new[AIRSPEED])
     tests[SPEED_TEST].bound_per_s = (
         e_a + second * a_max * e_vane + c.sample_time_s * (a_max / V_min) ** 2 * e_past[AIRSPEED]
     )
     for j, i in ((ALPHA_TEST, ALPHA), (BETA_TEST, BETA)):
-        (
-            tests[j].gust_gain,
-            tests[j].bound_per_sample,
-            tests[j].bound_per_s,
-        ) = (
+        (tests[j].gust_gain, tests[j].bound_per_sample, tests[j].bound_per_s) = (
             gust * sec / V_min,
             e_new[i],
             second * e_flow,
         )
     e_tilt = e_past[PHI] + e_past[THETA]
-    a_recent = max(
-        a_max,
-        M.a_sizes[0],
-        M.a_sizes[1],
-    )
+    a_recent = max(a_max, M.a_sizes[0], M.a_sizes[1])
     e_climb = (y_past[AIRSPEED] + e_past[AIRSPEED]) * (e_tilt + e_vane) + e_past[AIRSPEED]
     tests[CLIMB_TEST].bound_per_s = (
         c.wind_max + c.gust_max + e_climb + POSITION_FACTOR * c.sample_time_s * a_recent
@@ -643,8 +592,10 @@ def bound_flow(red, y, w_max, e_w):
 
 @kernel
 def bound_log(red, y, i):
-    """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
-    constant error."""
+    """Bound the apparent change of log(y) of sensor i (qdyn or airspeed) by its constant error e:
+
+    e |1 / y - 1 / y_past| / (1 - e / y_min)
+    """
     e = red.config.const[i]
     y_past = red.memory.y_past[i]
     y_min = max(min(y[i], y_past), 1.0)
@@ -654,7 +605,7 @@ def bound_log(red, y, i):
 
 @kernel
 def bound_density(red, y):
-    """Fill the bounds of `bound_residuals` for the logarithm of the density."""
+    """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height."""
     test, c, M = red.test[DENSITY_TEST], red.config, red.memory
     e = M.reading_bound
     e_new = M.e_new
@@ -670,9 +621,8 @@ def bound_residuals(red, y):
     """Fill bound_per_s and bound_per_sample of each test: the largest effect of sound sensors with the
     declared errors.
 
-    The errors of the previous sample act through the prediction, those of this sample, readings (N_SENSORS,),
-    through the reading that is compared with it. e_w: sum of the bounds of the three gyros;
-    w_max: bound on |p| + |q| + |r|; rad/s.
+    The errors of the sample before act through the prediction, those of this sample through the reading that
+    is compared with it.
     """
     e = red.memory.e_past
     y_past = red.memory.y_past
@@ -685,7 +635,10 @@ def bound_residuals(red, y):
 
 @kernel
 def filter_test(red, test):
-    """Pass one test's residual through its filters, and find its largest ratio to the bound."""
+    """Pass one test's residual through its filters, a = exp(-pole h); find its largest ratio to the bound:
+
+    r <- a r + residual,    B = B_s + B_n + bound_per_sample + gust_gain gust_change,    ratio = max |r| / B
+    """
     c = red.config
     test.ratio = 0.0
     for m, a in enumerate(c.decay):
@@ -720,9 +673,9 @@ def compare_engine(red, y):
 
 @kernel
 def compare_duplicates(red, y, fresh):
-    """Compare each sensor that should equal another reading with that reading, in the samples in which it is
-    fresh; fresh (sampled sensors,). If they differ by more than the errors of both and
-    the tolerance of the two quantities, one of the two is broken."""
+    """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which it is
+    fresh; fresh (sampled sensors,): |y_i - y_j| / (tolerance + e_i + e_j) > 1 if one of the two is broken.
+    """
     M = red.memory
     for d in range(DUPLICATE.size):
         i = DUPLICATE[d]
@@ -739,15 +692,11 @@ def compare_duplicates(red, y, fresh):
 
 @kernel
 def start_tests(red, y, force):
-    """Start with the first sample, before which no reading is known: readings (N_SENSORS,),
-    force (3,) m/s2."""
+    """Start with the first sample, before which no reading is known; force (3,) m/s2."""
     M = red.memory
     bound_readings(red, y)
     store_sample(red, y, force)
-    M.e_older[:], M.a_past[:] = (
-        M.e_past,
-        M.a,
-    )
+    M.e_older[:], M.a_past[:] = (M.e_past, M.a)
     M.a_size = M.a_sizes[0] = vector_length(M.a) + FORCE_JUMP_M_S2
     M.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(red, y)
@@ -757,7 +706,7 @@ def start_tests(red, y, force):
 
 @kernel
 def run_tests(red, y, has_engine):
-    """Compare this sample of the readings (N_SENSORS,) with the one before."""
+    """Compare this sample y with the one before."""
     c, M = red.config, red.memory
     M.e_drift += c.sample_time_s * c.drift
     bound_readings(red, y)

@@ -31,8 +31,8 @@ broken (`measured.inertial`).
 
 *Gyro or attitude?* Both move the same tests. The dynamics of the rates separate them: a jump of a gyro is an
 acceleration that no model explains, a jump of the attitude is none. With D the damping of the rates (3, 3),
-1/s, the filter W' = -D W + innovation follows a gyro's error exactly, and stays within its bound for an error
-of the attitude (`judge_gyros`).
+1/s, and nu the innovation, rad/s2, the filter w' = -D w + nu follows a gyro's error exactly, and stays within
+its bound for an error of the attitude (`judge_gyros`).
 
 *Accelerometers or flow sensor?* A test of the flow (airspeed, incidence, sideslip) compares a flow sensor
 with the accelerometers, so an error of either moves it. An accelerometer's error e integrates into a velocity
@@ -45,7 +45,11 @@ error e t; an error of a flow sensor is a step, which its own reading contains. 
     or incidence, of that error would exceed the test of the density, or of the climb; if an accelerometer is
     frozen
 
-The direction of the spurious velocity, which the residuals add up to, says which accelerometer is broken.
+The direction of the spurious velocity dv, which the residuals add up to, says which accelerometer is broken.
+
+Symbols are those of redundancy.py and initial_errors.py; i sensor or axis, j test, m pole, d duplicate sensor,
+h hypothesis of initial_errors.py. mon: record of the monitor; M its memory, o its output, red the tests, ini
+the hypotheses, found the conclusion about surfaces, bank the detection filters, pred the model's prediction.
 """
 
 import numpy as np
@@ -151,9 +155,9 @@ def is_flow_test(j):
 
 @kernel
 def count_same(mon, y):
-    """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
-    of an accelerometer from one sample to the next, m/s2, which fades within
-    JUMP_MEMORY_S."""
+    """Count the samples for which each reading has been the very same, and find the largest jump of an
+    accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S.
+    """
     M, y_past = mon.memory, mon.redundancy.memory.y_past
     M.jump *= 1.0 - mon.redundancy.config.sample_time_s / JUMP_MEMORY_S
     for i in range(N_SENSORS):
@@ -198,7 +202,11 @@ def clear_accelerometers(mon):
 @kernel
 def flow_jumped(mon, y):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
-    jumps with it."""
+    jumps with it.
+
+    per_v, per_a: residual for a velocity error of 1 m/s, for an acceleration error of 1 m/s2 in one sample.
+    ddy: second difference of the reading.
+    """
     alarm, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
     i = flow_sensor(alarm)
     y_past = red.memory.y_past
@@ -214,8 +222,11 @@ def flow_jumped(mon, y):
 
 @kernel
 def sum_flow(mon, y):
-    """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
-    that of an error that a reading has had from the start; and find the range of each reading."""
+    """Add up, after the sample of the alarm, the residuals of the flow (r_sum), the part of sound sensors
+    (B_sum) and that of an error from the start (e_sum); and find the range of each reading.
+
+    alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
+    """
     red, M, ini = mon.redundancy, mon.memory, mon.initial_errors
     c = red.config
     for j in range(3):
@@ -231,14 +242,8 @@ def sum_flow(mon, y):
         h = flow_hypothesis(SPEED_TEST + j)
         M.B_sum[j] += c.sample_time_s * test.bound_per_s
         M.e_sum[j] += ini.e_alarm[h] * ini.H[h, SPEED_TEST + j]
-        M.y_min[j], M.y_max[j] = (
-            min(M.y_min[j], y_j),
-            max(M.y_max[j], y_j),
-        )
-    alpha = np.sign(M.r_sum[1]) * max(
-        abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1],
-        0.0,
-    )
+        M.y_min[j], M.y_max[j] = (min(M.y_min[j], y_j), max(M.y_max[j], y_j))
+    alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
     climb = c.sample_time_s * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA])
     for m in range(c.decay.size):
         M.climb[m] = c.decay[m] * M.climb[m] + climb
@@ -277,8 +282,9 @@ def other_test_contradicts(mon, y):
 
 @kernel
 def suspect_accelerometers(mon, by_gyro):
-    """Suspect the accelerometers along whose axis most of the spurious velocity is, unless a gyro explains
-    it."""
+    """Suspect the accelerometers along whose axis most of the spurious velocity dv is, unless a gyro explains
+    it. along, down, side: of dv, m/s, along and across the flow; sound: bound on |dv| of sound sensors.
+    """
     M, suspect = mon.memory, mon.output.suspect
     y_past = mon.redundancy.memory.y_past
     r = M.r_sum
@@ -327,11 +333,11 @@ VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alo
 RATE_POLE = 1
 
 # Gyro or attitude (judge_gyros)
-DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
+DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of w
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 MAX_DYNAMICS_PER_S = 10.0
 JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_ESTIMATED_SHARE = 0.7  # of a gyro's error, which W shows
+MIN_ESTIMATED_SHARE = 0.7  # of a gyro's error, which w shows
 SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
 MIN_TRANSIENT = 2.0  # of the size of a transient to the bound on noise: else noise may be all of it
 TRANSIENT_LEFT = 0.003  # of a jump of the attitude within a frame, in the next frame
@@ -347,8 +353,7 @@ FULL_GYRO_FACTOR = 2.0
 def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
-    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on
-    that innovation. found: about the surfaces, so far.
+    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
     """
     red, ini, y = mon.redundancy, mon.initial_errors, measured.signal
     M = mon.memory
@@ -364,10 +369,7 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     update_bounds(red, ini, y)
     count_same(mon, y)
     if M.substep == 0:
-        M.w_att_past[:], M.peak_older[:] = (
-            M.w_att,
-            M.peak_past,
-        )
+        M.w_att_past[:], M.peak_older[:] = (M.w_att, M.peak_past)
         M.peak_past[:] = M.peak
         M.floor_past[:] = M.floor
         M.peak[:], M.floor[:] = 0.0, 0.0
@@ -412,8 +414,9 @@ def begin_monitor(mon, measured, t):
 
 @kernel
 def advance_stage(mon):
-    """Widen the bound on W by a gyro's error of the first sample, which has caused no innovation. The first
-    frame shows no change of an error."""
+    """Widen the bound on w by a gyro's error of the first sample, which has caused no innovation. The first
+    frame shows no change of an error.
+    """
     M = mon.memory
     if M.substep == 0:
         M.stage += 1
@@ -424,8 +427,9 @@ def advance_stage(mon):
 
 @kernel
 def restart_comparison(M):
-    """Compare W with the attitude only from the next sample on: a test that restarts has no residual, and
-    shows neither an error nor its absence."""
+    """Compare w with the attitude only from the next sample on: a test that restarts has no residual, and
+    shows neither an error nor its absence.
+    """
     M.stage = 1
     M.gap[:] = 0.0
     M.gap_bound[:] = 0.0
@@ -436,8 +440,12 @@ def restart_comparison(M):
 
 @kernel
 def advance_gyro_estimate(mon, nu, eta, dt):
-    """Advance W (3,) rad/s, the gyro error if the dynamics are right, and its bound by the frame of dt s with
-    nu and eta (3,) rad/s2."""
+    """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
+
+    w <- w + dt (nu - D w),    B <- B + dt (eta + |D| B), with -D_ii on the diagonal of |D|
+
+    nu, eta (3,): innovation and its bound, rad/s2.
+    """
     M, D = mon.memory, mon.config.D
     w = M.w
     B = M.w_bound
@@ -456,9 +464,9 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 
 @kernel
 def exclude_gyros(mon):
-    """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
+    """Record that no gyro can be broken: w and the attitude disagree by more than both bounds.
 
-    Where the attitude is noisy, a surface is isolated only after that.
+    gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
     M, c = mon.memory, mon.redundancy.config
     for i in range(3):
@@ -466,12 +474,7 @@ def exclude_gyros(mon):
         e = M.w_bound[i] + DAMPING_TOLERANCE * abs(M.w[i])
         for m, a in enumerate(c.decay):
             M.gap[i, m] = a * M.gap[i, m] + test.residual + c.sample_time_s * M.w[i]
-            M.gap_bound[i, m] = advance_bound(
-                M.gap_bound[i, m],
-                e,
-                a,
-                c.sample_time_s,
-            )
+            M.gap_bound[i, m] = advance_bound(M.gap_bound[i, m], e, a, c.sample_time_s)
             if abs(M.gap[i, m]) > M.gap_bound[i, m] + test.B[m]:
                 M.gyros_excluded = 1
 
@@ -516,10 +519,7 @@ def find_worst(mon):
         o.worst_test_index, o.top_ratio = 0, 0.0
     for j in range(N_TESTS):
         if mon.redundancy.test[j].ratio > o.top_ratio:
-            o.worst_test_index, o.top_ratio = (
-                j,
-                mon.redundancy.test[j].ratio,
-            )
+            o.worst_test_index, o.top_ratio = (j, mon.redundancy.test[j].ratio)
 
 
 @kernel
@@ -550,16 +550,19 @@ def mark_isolated(mon, i, t):
 def judge_gyros(mon, bank, bound, dt):
     """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
 
-        the nu changes as by this jump of the gyro   the dynamics show an error   verdict
-        no                                                   yes or no                    refuted
-        yes                                                  yes                          confirmed
-        yes     no; the error is a transient, or so large that W would show it            refuted
-        yes     no; neither                                                               undecided
+        innovation changes as   the dynamics     verdict
+        by this jump of a gyro  show an error
+        (fits)                  (shows)
+        no                      yes or no        refuted
+        yes                     yes              confirmed
+        yes                     no               refuted if the error is a transient (brief), or so large that
+                                                 w would show it (not allowed)
+        yes                     no               undecided otherwise
 
     A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
     a gyro stays, and one that varies is not as small in every sample. If an error is there in every sample
-    and varies between them, as noise does, the nu cannot be compared with its jump: the nu
-    contains the errors as the frames begin, and the attitude shows those of the samples before.
+    and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
+    innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
     M, nu = mon.memory, bank.output.innovation
     axis = bank_axis(bank)
@@ -578,11 +581,7 @@ def judge_gyros(mon, bank, bound, dt):
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or axis >= 0 or abs(M.w[i]) > M.w_bound[i] + RATE_ROUNDING
         early = M.peak_older[i]
-        late = max(
-            abs(w_past),
-            M.peak_past[i],
-            abs(w),
-        )
+        late = max(abs(w_past), M.peak_past[i], abs(w))
         brief = late < TRANSIENT_LEFT * early and early > MIN_TRANSIENT * noise
         fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
         least = M.floor_past[i]
@@ -596,8 +595,9 @@ def judge_gyros(mon, bank, bound, dt):
 
 @kernel
 def exceeds_uncoupled(mon, j, first):
-    """Whether a test, one of the three from first on, exceeds its bound by more than an error
-    on one of the other two axes explains."""
+    """Whether test j, one of the three from `first` on, exceeds its bound by more than an error on one of the
+    other two axes explains.
+    """
     most = 0.0
     for i in range(3):
         most = max(most, abs(mon.redundancy.test[first + i].r[0]))
@@ -698,8 +698,9 @@ def frozen_suspect(mon):
 
 @kernel
 def suspect_flow(mon, vane, j, full):
-    """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude; all
-    of full's error turns the flow. No flow sensor moves the attitude's tests."""
+    """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude;
+    all of the error of gyro `full` turns the flow. No flow sensor moves the attitude's tests.
+    """
     if mon.output.alarm_test != j:
         return
     exceeded = mon.memory.exceeded
@@ -714,9 +715,9 @@ def suspect_flow(mon, vane, j, full):
 
 @kernel
 def gyro_hidden(mon, j, i, full):
-    """Whether an error of a gyro explains the test of the flow, and stays within the bound of the test of its
-    axis; full: all of its error turns the flow. Of another gyro's error a share does, by
-    kinematics."""
+    """Whether an error of gyro i explains the test j of the flow, and stays within the bound of the test of
+    its axis; full: all of its error turns the flow. Of another gyro's error a share does, by kinematics.
+    """
     red, y_past = mon.redundancy, mon.redundancy.memory.y_past
     alpha = y_past[ALPHA]
     roll = np.cos(alpha) if i == 0 else np.sin(alpha)
@@ -772,8 +773,9 @@ def suspect_attitude(mon):
 
 @kernel
 def explains_angles(mon, i):
-    """Whether no test of another angle (0, 1, 2: phi, theta, psi) shows an error that one of this angle from
-    the start does not explain."""
+    """Whether no test of another angle shows an error that one of angle i (phi, theta, psi) from the start
+    does not explain.
+    """
     for j in range(3):
         over = (
             mon.memory.exceeded[ANGLE_TEST + j]
@@ -787,10 +789,10 @@ def explains_angles(mon, i):
 
 @kernel
 def filter_beyond(mon, y):
-    """Filter what the tests of turning show beyond an error of one angle, for each of phi, theta and psi.
+    """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi.
 
-    An error that changes by e within a sample moves the residual of its angle by e and that of body axis j by
-    c_j e (turn_share). If this angle alone is wrong, r_j - c_j r_angle contains noise alone.
+    An error that changes by x within a sample moves the residual of its angle by x and that of body axis j by
+    c_j x (turn_share). If this angle alone is wrong, r_j - c_j r_i contains noise alone.
     """
     red, M = mon.redundancy, mon.memory
     for i in range(3):
@@ -807,8 +809,9 @@ def filter_beyond(mon, y):
 
 @kernel
 def explains_turns(mon, i):
-    """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
-    the residual of the angle's own test allows now, or as its residuals since the alarm have shown."""
+    """Whether an error x of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
+    residual of the angle's own test allows now, or as its residuals since the alarm have shown.
+    """
     M = mon.memory
     red, angle = mon.redundancy, mon.redundancy.test[ANGLE_TEST + i]
     e = red.memory.reading_bound
@@ -833,8 +836,7 @@ def explains_turns(mon, i):
 
 @kernel
 def worst_turn_axis(mon, i):
-    """The body axis (0, 1, 2) whose test of turning has the largest ratio of residual to bound; i
-    if none is larger than its own."""
+    """The body axis whose test of turning has the largest ratio; i if none is larger than its own."""
     axis, tests = i, mon.redundancy.test
     for j in range(3):
         if tests[TURN_TEST + j].ratio > tests[TURN_TEST + axis].ratio:
@@ -844,8 +846,7 @@ def worst_turn_axis(mon, i):
 
 @kernel
 def allows_isolation(mon, is_earlier):
-    """Whether a surface may be isolated; is_earlier: the alarm was a frame or more
-    ago."""
+    """Whether a surface may be isolated; is_earlier: the alarm was a frame or more ago."""
     if not mon.config.enabled:
         return True
     return (
@@ -887,12 +888,7 @@ def replace_readings(mon, pred, measured):
         if mon.output.is_reading_unused[i] and i < AX:
             y[i] = estimate_reading(mon, pred, y, i)
             any_replaced = True
-            slipstream = slipstream or i in (
-                AIRSPEED,
-                QDYN,
-                ENGINE_SPEED,
-                MANIFOLD,
-            )
+            slipstream = slipstream or i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD)
     if any_replaced:
         share_out(measured)
     if slipstream and mon.config.has_engine:
@@ -921,8 +917,8 @@ def estimate_reading(mon, pred, y, i):
 
 @kernel
 def estimate_rate(mon, pred, i):
-    """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
-    change since, with the surface faults that stay isolated.
+    """Body rate about axis i, rad/s: that of the attitude by the sample before, and the model's change since,
+    with the surface faults that stay isolated.
 
     The rate itself is used for the next sample: its own error shows there.
     """

@@ -409,10 +409,8 @@ _WHY_WITHDRAWN = {
 }
 
 
-def _withdrawn(fdi: np.void, surfaces: Sequence[str], what: str) -> tuple[dict[str, Any], ...]:
-    """What was named and is not any more, with the reason, as many as there is room for; what: `isolations`,
-    of surfaces, or `types`, of surfaces that are still named."""
-    gone = fdi["verdict"][f"withdrawn_{what}"][: int(fdi["verdict"][f"n_withdrawn_{what}"])]
+def _withdrawn(gone: np.ndarray, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
+    """What was named and is not any more, with the reason, as many as there is room for."""
     return tuple(
         {
             "fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]),
@@ -503,7 +501,7 @@ def landing_of(
     what changes in flight have ended, `windows` what was found in each."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
     tracking, envelope, supervisor = accounts["tracking"], accounts["envelope"], frame["supervisor"]
-    surfaces, departed = scenario.airframe.surfaces, int(frame["departed"])
+    surfaces, departed, found = scenario.airframe.surfaces, int(frame["departed"]), fdi["verdict"]
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     closest = tuple(
@@ -536,8 +534,8 @@ def landing_of(
         arrival=_by_channel(frame, "mean_deviation"),
         limits=_limits(frame, surfaces),
         changes=replaced,
-        withdrawn=_withdrawn(fdi, surfaces, "isolations"),
-        withdrawn_types=_withdrawn(fdi, surfaces, "types"),
+        withdrawn=_withdrawn(found["gone"][: int(found["n_gone"])], surfaces),
+        withdrawn_types=_withdrawn(found["withdrawn_types"][: int(found["n_gone_types"])], surfaces),
         windows=windows,
         inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["actuator_travel"], strict=True)},

@@ -33,7 +33,8 @@ from beaver_ftc.scenario.diagnosis import FdiConfig
 class CompiledScheme(NamedTuple):
     """Lazy kernels (compiled.py), called with `fdi` (`fdi_dtype`), and `prediction` and `measured`, the
     records of the prediction and the sensors: the names of arguments are those of the frame's parts
-    (loop/stepping.py). A row of plugins.yaml names the scheme: `module`, whose SCHEME it is, or `module:NAME`.
+    (loop/stepping.py). A row of plugins.yaml names the scheme: `module`, whose SCHEME it is, or
+    `module:NAME`.
 
     begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
     advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before

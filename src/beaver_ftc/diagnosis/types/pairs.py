@@ -79,7 +79,7 @@ def locate_lateral(types, layout, est, nu, nu_max):
 
 @kernel
 def constant_range(c, srf, k):
-    """Least and greatest deflection of a surface by frame k over all types of a constant that are left, rad."""
+    """Least and greatest deflection of a surface by frame k over the types of a constant left, rad."""
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):

@@ -27,14 +27,14 @@ def compared(gyro_error, fault, std=1e-3):
     att, blocks = np.zeros(1, attitude_dtype(capacity)), np.zeros(N_FILTER_BLOCKS, block_dtype(capacity))
     configure_attitude(att[0], D, std, 1e-3, 16.0, DT_S)
     for block, axes in zip(blocks, ((1, 0), (0, 2), (0, 2)), strict=True):
-        block["axes"], block["n_axes"], block["drift_decay_factor"] = axes, len(set(axes)), 1.0
-        block["drift_intensity"] = 1e-6 * np.eye(2)
+        block["axes"], block["n"], block["a"] = axes, len(set(axes)), 1.0
+        block["Q_d"] = 1e-6 * np.eye(2)
     x, found = np.zeros(3), []
     for e, e_before, phi in zip(gyro_error, [np.zeros(3), *gyro_error[:-1]], fault, strict=True):
         read, x = x + e_before, x + DT_S * (phi - D @ x)
         nu = (x + e - read) / DT_S + D @ read
         att["turn"] = -DT_S * e_before
-        blocks[0]["frame_innovation"][0], blocks[1]["frame_innovation"] = nu[1], nu[[0, 2]]
+        blocks[0]["nu"][0], blocks[1]["nu"] = nu[1], nu[[0, 2]]
         compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.zeros(3), False, DT_S)
         found.append(float(att["score"][0]))
     return np.array(found)

@@ -360,10 +360,13 @@ def monitor_sensors(frame):
     sensor_monitor.check_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
+    att = fdi.statistical.attitude
+    if att.enabled:
+        sensor_monitor.add_turn(monitor, att, frame.measured.signal)
+        if fdi.verdict.detected and att.gyro >= 0 and monitor.output.isolated_sensor < 0:
+            sensor_monitor.name_gyro(monitor, fdi.verdict, att.gyro, t)
     if monitor.output.alarmed and not (before or monitor.output.keeps_surface):
         reset_surface_diagnosis(fdi)
-    if fdi.statistical.attitude.enabled:
-        sensor_monitor.add_turn(monitor, fdi.statistical.attitude, frame.measured.signal)
 
 
 @kernel

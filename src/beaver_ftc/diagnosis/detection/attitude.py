@@ -1,4 +1,4 @@
-"""Whether the attitude shows the turn that the rates show: then no gyro is broken.
+"""Whether the attitude shows the turn that the rates show: if so no gyro is broken, if not one is.
 
 About each body axis let xi, rad/s, be the true rate less that of the gyro, and psi, rad, its integral:
 
@@ -23,12 +23,20 @@ surface
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
 
 are at most standard normal. If one exceeds the margin of isolation, no gyro is the cause.
+
+A gyro is broken if the rates raise an alarm and the attitude shows no turn for it: if
+
+    T <- a T + dA      E <- a E + dt e_T      (|T| - E) / std(T)
+
+exceeds the same margin about one axis, and no sum above does. e_T, rad/s, bounds what the constant errors of
+gyros and attitude turn.
 """
 
 from math import sqrt
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.detection.likelihood import (
     DRIFT_PRIOR_RAD_S2,
@@ -37,9 +45,11 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     BlockCapacity,
 )
 from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.scenario.declared import SensorErrors
 
 LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
 LOSS_MEMORIES_S = (2.0, 10.0)
+COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
 
@@ -58,17 +68,27 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         r=n, g_j=n, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
         R_j=(3, n_h, n, n_b),
         score=float,  # the larger sum of the frame, over its level
+        e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
+        T=(3, n_a), E=(3, n_a), T_std=n_a,
+        turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
+        turn_max=float,  # of |T| with sound gyros, rad
     )  # fmt: skip
 
 
-def configure_attitude(
-    att: np.void, D: np.ndarray, attitude_std_rad: float, gyro_std_rad_s: float, margin: float, dt_s: float
-) -> None:
+def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin: float, dt_s: float) -> None:
     """Fill the comparison; D (3, 3) 1/s. margin: difference of log-likelihood ratios that names a surface."""
-    att["enabled"], att["level"] = 1, sqrt(2.0 * margin)
-    att["D"], att["R"] = D, attitude_std_rad**2
-    att["a"], att["b"] = np.exp(-dt_s / np.array(LEAK_TIMES_S)), np.exp(-dt_s / np.array(LOSS_MEMORIES_S))
-    att["P_start"] = attitude_std_rad**2, gyro_std_rad_s**2, DRIFT_PRIOR_RAD_S2**2
+    angles, gyros = [errors[name] for name in ("phi", "theta", "psi")], [errors[name] for name in AXES]
+    v, w = max(each.random for each in angles), max(each.random for each in gyros)
+    a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
+    att["enabled"], att["level"], att["gyro"] = 1, sqrt(2.0 * margin), -1
+    att["D"], att["R"] = D, v**2
+    att["a"], att["b"] = a, np.exp(-dt_s / np.array(LOSS_MEMORIES_S))
+    att["P_start"] = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
+    att["T_std"] = np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2))
+    drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ("phi", "theta", "psi"))
+    att["e_0"] = [each.steady + drift for each in gyros]
+    att["e_slope"] = [each.slope for each in gyros]
+    att["tilt"] = angles[0].steady + angles[1].steady
     for i in range(3):
         np.fill_diagonal(att["P"][i], att["P_start"])
 
@@ -79,17 +99,19 @@ def restart(att):
     att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
     att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
     att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    att.T[:], att.E[:] = 0.0, 0.0
     for i in range(3):
         for k in range(3):
             att.P[i, k, k] = att.P_start[k]
 
 
 @kernel
-def compare_attitude(att, blocks, eta, with_Z, dt):
-    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score`.
+def compare_attitude(att, blocks, eta, with_Z, x, dt):
+    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score` and `gyro`.
 
-    eta (3,) rad/s2: bound of the uncertainty.
+    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates.
     """
+    sum_turns(att, x, dt)
     for i in range(3):
         b = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
         advance_axis(att, i, b, i // 2, eta[i], with_Z, dt)
@@ -97,6 +119,36 @@ def compare_attitude(att, blocks, eta, with_Z, dt):
     att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
     for i in range(3):
         att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
+    find_gyro(att)
+
+
+@kernel
+def sum_turns(att, x, dt):
+    """Advance T and E by a frame of dt s, and fill `turn_score`; x (3,) rad/s: measured rates."""
+    w = abs(x[0]) + abs(x[1]) + abs(x[2])
+    att.turn_max = 0.0
+    for i in range(3):
+        leak(att.T[i], att.a, att.turn[i])
+        leak(att.E[i], att.a, dt * (att.e_0[i] + att.e_slope[i] * abs(x[i]) + att.tilt * w))
+        att.turn_score[i] = 0.0
+        for m in range(att.a.size):
+            excess = (abs(att.T[i, m]) - att.E[i, m]) / (att.T_std[m] * att.level)
+            att.turn_max = max(att.turn_max, att.E[i, m] + att.T_std[m] * att.level)
+            att.turn_score[i] = max(att.turn_score[i], excess)
+
+
+@kernel
+def find_gyro(att):
+    """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1."""
+    att.gyro, worst = -1, 0
+    for i in range(3):
+        if att.turn_score[i] > att.turn_score[worst]:
+            worst = i
+    if att.turn_score[worst] > 1.0 >= att.score:
+        att.gyro = worst
+        for i in range(3):
+            if i != worst and att.turn_score[i] > max(1.0, COUPLED_SHARE * att.turn_score[worst]):
+                att.gyro = -1
 
 
 @kernel

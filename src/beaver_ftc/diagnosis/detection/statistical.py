@@ -235,9 +235,7 @@ def configure_statistics(
     _configure_lengths(stat, V, rate_hz)
     monitor = fdi["sensor_monitor"]["config"]
     if monitor["enabled"] and monitor["noisy"]:
-        v = max(errors[angle].random for angle in ("phi", "theta", "psi"))
-        w = max(errors[rate].random for rate in AXES)
-        configure_attitude(stat["attitude"], monitor["D"], v, w, float(stat["test"]["margin"]), dt_s)
+        configure_attitude(stat["attitude"], monitor["D"], errors, float(stat["test"]["margin"]), dt_s)
     if gust["output"]["gusty"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for name in ("n", "a", "R_y", "P_xx", "P_dd"):

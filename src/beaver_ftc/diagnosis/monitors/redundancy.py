@@ -174,7 +174,7 @@ MONITOR_MEMORY_RECORD = record(
     # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
     # beyond it no gyro can be broken
     gyros_excluded=int, gap=(3, N_POLES), gap_bound=(3, N_POLES), gyro_verdict=(int, 3), replaced=(int, 3),
-    n_same=(int, N_SENSORS), y_older=N_SENSORS, cleared=(int, N_SENSORS),
+    n_same=(int, N_SENSORS), y_older=N_SENSORS, cleared=(int, N_SENSORS), turn_max=float,
     jump=float,  # of the accelerometers, m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings

@@ -192,6 +192,21 @@ def clear_sensors(mon, y):
         frozen = frozen or is_frozen(mon, i)
     if frozen or sum_exceeds_range(mon) or other_test_contradicts(mon, y):
         M.cleared[flow] = 1
+    clear_gyros(mon, mon.redundancy.test[alarm])
+
+
+@kernel
+def clear_gyros(mon, flow):
+    """Clear each gyro whose axis does not turn as an error would that explains the test of the flow.
+
+    turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
+    """
+    M = mon.memory
+    for i in range(3):
+        turn = mon.redundancy.test[TURN_TEST + i]
+        for m in range(flow.r.size):
+            if M.turn_max > 0.0 and abs(turn.r[m]) < M.turn_max < abs(flow.r[m]) - flow.B[m]:
+                M.cleared[i] = 1
 
 
 @kernel
@@ -404,6 +419,17 @@ def add_turn(mon, att, y):
         return
     for i in range(3):
         att.turn[i] += mon.redundancy.test[TURN_TEST + i].residual
+    mon.memory.turn_max = att.turn_max
+
+
+@kernel
+def name_gyro(mon, found, i, t):
+    """Isolate gyro i at t s. What was concluded of surfaces is void, unless one was isolated before."""
+    o = mon.output
+    raise_alarm(mon, found, t)
+    if o.keeps_surface and found.isolated_estimator < 0:
+        o.keeps_surface, o.alarmed_at_s = 0, found.detected_at_s
+    mark_isolated(mon, i, t)
 
 
 @kernel
@@ -722,7 +748,7 @@ def suspect_flow(mon, vane, j, full):
     suspect[vane] = not (n > 0 or mon.memory.cleared[vane])
     for i in range(3):
         shown = n == 1 and exceeded[TURN_TEST + i] == 1
-        suspect[i] = shown or (n == 0 and gyro_hidden(mon, j, i, i == full))
+        suspect[i] = (shown or (n == 0 and gyro_hidden(mon, j, i, i == full))) and not mon.memory.cleared[i]
 
 
 @kernel

@@ -325,7 +325,7 @@ def update_tests(fdi, prediction, measured, k, t):
     may_end = not fdi.config.abrupt
     statistical.update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end)
     if stat.attitude.enabled:
-        attitude.compare_attitude(stat.attitude, blocks, eta, cfg.regress, dt)
+        attitude.compare_attitude(stat.attitude, blocks, eta, cfg.regress, measured.x, dt)
         if fdi.verdict.detected and stat.attitude.score > 1.0:
             fdi.sensor_monitor.memory.gyros_excluded = 1
     parity.turn_views(views, force, gust, fdi.bound, means.G_old, means.Gu_old)

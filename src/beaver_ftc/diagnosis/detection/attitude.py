@@ -65,7 +65,7 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
-        r=n, g_j=n, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
+        r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
         R_j=(3, n_h, n, n_b),
         score=float,  # the larger sum of the frame, over its level
         e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
@@ -112,6 +112,7 @@ def compare_attitude(att, blocks, eta, with_Z, x, dt):
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates.
     """
     sum_turns(att, x, dt)
+    att.xi[:] = att.s[:, 1]
     for i in range(3):
         b = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
         advance_axis(att, i, b, i // 2, eta[i], with_Z, dt)
@@ -163,7 +164,7 @@ def advance_axis(att, i, b, row, eta, with_Z, dt):
     att.r[n] = eta
     u = -b.nu[row]
     for j in range(3):
-        att.r[n + 1 + j] = att.D[i, j] * att.s[j, 1]
+        att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
         if j != i:
             u -= att.r[n + 1 + j]
     std = np.sqrt(S)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import (
     fault_range,
-    parity_range,
 )
 from beaver_ftc.diagnosis.model_prediction import (
     add_to_sums,
@@ -42,7 +41,7 @@ def over(frames):
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return fault_range(fie, 0), parity_range(fie)
+    return fault_range(fie, 0), fault_range(fie, 3)
 
 
 def record(substeps):

@@ -87,8 +87,8 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
     frames = record(n)
     prediction, fie = frames[0]["prediction"], frames[0]["fdi"]["isolation"]["estimator"][0]
     prediction["sums"]["Gu_first"][0, 0], prediction["sums"]["Gu"][0, 0] = (
-        moment0,
-        moment0 + (n - 1) * moment,
+        moment0 / n,
+        (moment0 + (n - 1) * moment) / n,
     )
     over(frames)
     fie["effect"]["regressor"][0], fie["effect"]["e"][0] = (

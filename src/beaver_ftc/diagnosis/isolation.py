@@ -283,12 +283,12 @@ def configure_isolation(
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
-    sharpen = config.sharpen
-    iso["config"]["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
-    iso["config"]["forget"] = exp(-dt / config.forgetting_time_s)
-    iso["config"]["a"] = exp(-config.isolation_pole_per_s * dt)
-    iso["config"]["reach"], iso["config"]["shared"] = (sharpen.memory, sharpen.shared_effectiveness)
-    iso["config"]["narrows"], iso["config"]["n_estimators"] = (sharpen.set_membership, len(rows))
+    sharpen, cfg = config.sharpen, iso["config"]
+    cfg["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
+    cfg["forget"] = exp(-dt / config.forgetting_time_s)
+    cfg["a"] = exp(-config.isolation_pole_per_s * dt)
+    cfg["reach"], cfg["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    cfg["narrows"], cfg["n_estimators"] = sharpen.set_membership, len(rows)
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
@@ -297,11 +297,10 @@ def configure_isolation(
             fie["skip"] = (1, 0, 1) if aircraft.dominant_axis[s] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
-    weak = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
-    iso["estimator"]["weak"] = weak
-    iso["config"]["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
+    iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
+    cfg["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
     losable = {name for damage in aircraft.damage.values() for name in damage.takes}
-    iso["config"]["losable"] = [name in losable for name in aircraft.surfaces]
+    cfg["losable"] = [name in losable for name in aircraft.surfaces]
 
 
 @kernel

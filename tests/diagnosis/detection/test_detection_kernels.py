@@ -165,7 +165,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_eG):
         1,
     )
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
-    record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
+    record["sums"]["F"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
     (
         record["sums"]["eGu"],

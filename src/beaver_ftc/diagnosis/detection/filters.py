@@ -281,12 +281,12 @@ _BETA_STEP = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control, net = declared.control, fdae["network"]
-    fdae["config"]["pole_per_s"] = declared.fdi.detection_pole_per_s
-    fdae["config"]["a"] = exp(-declared.fdi.detection_pole_per_s * (1.0 / declared.rate_hz))
-    net["config"]["gain"] = control.network_gain_per_s2
-    net["config"]["leak"] = control.network_leak_per_s
-    net["config"]["w_max"] = control.network_weight_limit_rad_s2
+    control, cfg, net = declared.control, fdae["config"], fdae["network"]["config"]
+    lam = declared.fdi.detection_pole_per_s
+    cfg["pole_per_s"], cfg["a"] = lam, exp(-lam * (1.0 / declared.rate_hz))
+    net["gain"] = control.network_gain_per_s2
+    net["leak"] = control.network_leak_per_s
+    net["w_max"] = control.network_weight_limit_rad_s2
 
 
 @kernel

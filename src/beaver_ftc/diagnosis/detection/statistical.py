@@ -28,7 +28,6 @@ Symbols of the kernels:
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
-from collections.abc import Iterator
 from math import exp, hypot, sqrt
 from statistics import NormalDist
 from sys import float_info
@@ -129,27 +128,20 @@ def hypotheses_by_block(
     aircraft: Aircraft,
 ) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
-    are held against. Roll and yaw are there twice, see above.
-    """
-    pitch = (*_loss_rows(aircraft, PITCH_AXES), *_step_rows(PITCH_AXES), (ALPHA_CUBED_MOMENT, -1, 1, 0))
-    lateral = (*_loss_rows(aircraft, LATERAL_AXES), *_step_rows(LATERAL_AXES))
-    pitch, lateral = ((*rows, *_growing_rows(rows)) for rows in (pitch, lateral))
-    return ((PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral))
-
-
-def _loss_rows(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
-    for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if name in aircraft.class_of_losses and axis in axes:
-            yield LOSS, s, axis, 1
-
-
-def _growing_rows(rows: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
-    losses = [(s, axis) for kind, s, axis, _ in rows if kind == LOSS]
-    return ((kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END))
-
-
-def _step_rows(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
-    return ((STEP_FAULT, -1, axis, 1) for axis in axes)
+    are held against. Roll and yaw are there twice, see above."""
+    blocks = []
+    for axes in (PITCH_AXES, LATERAL_AXES, LATERAL_AXES):
+        losses = [
+            (s, axis)
+            for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
+            if name in aircraft.class_of_losses and axis in axes
+        ]
+        rows = [(LOSS, s, axis, 1) for s, axis in losses]
+        rows += [(STEP_FAULT, -1, axis, 1) for axis in axes]
+        rows += [(ALPHA_CUBED_MOMENT, -1, 1, 0)] if axes == PITCH_AXES else []
+        rows += [(kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END)]
+        blocks.append((axes, tuple(rows)))
+    return tuple(blocks)
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
@@ -346,16 +338,14 @@ def _configure_noise(
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
     u."""
-    sigma = declared.sensors.each("random")
-    sigma_x = float(sigma[:3].max())
-    eta = max(declared.constant_rad_s2)
-    level = float(stat["test"]["alarm_level"])
-    stat["noise"]["q"] = derive_intensity(eta, omega, sigma_x, level, dt_s)
+    sigma, noise = declared.sensors.each("random"), stat["noise"]
+    eta, level = max(declared.constant_rad_s2), float(stat["test"]["alarm_level"])
+    noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
-    stat["noise"]["Q0"] = F_x**2 @ sigma[:3] ** 2
+    noise["Q0"] = F_x**2 @ sigma[:3] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `add_readings` says
-    stat["noise"]["Q"] = stat["noise"]["Q0"] + Q_y
-    stat["noise"]["eta_u"] = np.abs(G).sum(axis=1) * declared.deflection_rad
+    noise["Q"] = noise["Q0"] + Q_y
+    noise["eta_u"] = np.abs(G).sum(axis=1) * declared.deflection_rad
 
 
 def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
@@ -436,27 +426,35 @@ def fill_signal_slopes(tab, err, y, j, ds):
         for k in range(PH, RH + 1):
             ds[k] = -tab.signal[k] / y[AIRSPEED]
     if err.engine and j >= AIRSPEED:
-        by_V, by_q, by_kw = slipstream_slopes(y, err.kw1)
-        other = by_q if j == QDYN else by_kw
-        ds[_DPT] = by_V if j == AIRSPEED else other
+        ds[_DPT] = slipstream_slopes(y, err.kw1)[j - AIRSPEED]  # the readings from airspeed on, in this order
+
+
+@kernel
+def accelerate(model, L, M, N):
+    """(Pl L + Pn N, Qm M, Rl L + Rn N), rad/s2, by moments in N m."""
+    return model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N
+
+
+@kernel
+def add_row(b, k, w, F):
+    """Z_k <- Z_k + w F on the axes of block b; F (3,) rad/s2 per unit."""
+    for i, axis in enumerate(b.axes[: b.n]):
+        b.regressor[k, i] += w * F[axis]
 
 
 @kernel
 def fill_slopes(model, y, u, j, dm, dF):
     """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
 
-    L, M, N = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
-    dF = (Pl L + Pn N, Qm M, Rl L + Rn N)
+    (L, M, N) = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
     """
-    tab, qS = model.moments, y[QDYN] * model.S
+    tab, q = model.moments, y[QDYN]
     for i in range(3):
-        dF[i] = whole_sum(tab, i, dm, u)
+        C = whole_sum(tab, i, dm, u)
         if j == QDYN:
-            dF[i] += whole_sum(tab, i, tab.power, u) / y[QDYN]
-    L = qS * model.b * dF[0]
-    M = qS * model.c * dF[1]
-    N = qS * model.b * dF[2]
-    (dF[0], dF[1], dF[2]) = (model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N)
+            C += whole_sum(tab, i, tab.power, u) / q
+        dF[i] = q * model.S * (model.c if i == 1 else model.b) * C
+    dF[0], dF[1], dF[2] = accelerate(model, dF[0], dF[1], dF[2])
 
 
 @kernel
@@ -467,8 +465,7 @@ def add_readings(w, noise, blocks, err, model, y, u):
 
     sigma (readings,): noise of the readings. The terms of `model.moments` are evaluated at this instant.
     """
-    tab = model.moments
-    dF = noise.dF
+    tab, dF = model.moments, noise.dF
     noise.Q[:] = noise.Q0
     for j in range(N_INPUT_READINGS):
         fill_signal_slopes(tab, err, y, j, noise.ds)
@@ -476,12 +473,8 @@ def add_readings(w, noise, blocks, err, model, y, u):
         fill_slopes(model, y, u, j, noise.dm, dF)
         for i in range(3):
             noise.Q[i] += (dF[i] * noise.sigma[j]) ** 2
-        pitch = blocks[likelihood.PITCH_BLOCK]
-        pitch.regressor[pitch.n_Z - N_INPUT_READINGS + j, 0] += w * dF[1]
-        for b in blocks[LATERAL_BLOCK:]:
-            k = b.n_Z - N_INPUT_READINGS + j
-            b.regressor[k, 0] += w * dF[0]
-            b.regressor[k, 1] += w * dF[2]
+        for b in blocks:
+            add_row(b, b.n_Z - N_INPUT_READINGS + j, w, dF)
 
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
@@ -643,12 +636,6 @@ def write_scores(cfg, blocks, views, forces, gust, row):
 
 
 @kernel
-def loss_remains(fies, of, s):
-    """True if a loss of this surface has not been excluded."""
-    return of[s] < 0 or not fies[of[s]].excluded
-
-
-@kernel
 def best_alternative(b, fies, of, s, revived=False):
     """max_h lo_h over all alternatives h to the loss of surface s in block b.
 
@@ -659,8 +646,8 @@ def best_alternative(b, fies, of, s, revived=False):
     for h in b.hypothesis[: b.n_h]:
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
-        other = h.surface
-        if h.kind != LOSS or (other != s and (revived or loss_remains(fies, of, other))):
+        j = of[h.surface]
+        if h.kind != LOSS or (h.surface != s and (revived or j < 0 or not fies[j].excluded)):
             lo = max(lo, h.llr_lo)
     return lo
 
@@ -797,31 +784,28 @@ def fill_noise(noise, blocks, gust, bound, model, meas, dt):
     eta = published bound + eta_u + mapped error
     Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      Q_x = Q      a = exp(-dt V / length)
     """
-    eta, V = noise.eta, meas.y[AIRSPEED]
+    eta, emap, V, gusty = noise.eta, bound.error_map, meas.y[AIRSPEED], gust.output.gusty
     eta[:] = 0.0
     add_published_bound(
         meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
-    mapped = bound.error_map.n_boxes > 0
     for i in range(3):
         eta[i] += noise.eta_u[i]
-        if mapped:
-            eta[i] += min(bound.error_map.e_now[i], OFF_MAP_RAD_S2)
-        if bound.error_map.one_free:
-            noise.eta_free[i] = extra_bound(bound.error_map, bound.error_map.n_levels - 1, i)
+        if emap.n_boxes > 0:
+            eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
+        if emap.one_free:
+            noise.eta_free[i] = extra_bound(emap, emap.n_levels - 1, i)
     for k, b in enumerate(blocks):
+        reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
-                b.Q_d[i, j] = 0.0
-                if gust.output.gusty:
-                    q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], k == likelihood.REVERTING_BLOCK)
-                    b.Q_d[i, j] = b.Q_scale * q_gust
-            eta_min = max(eta[axis], likelihood.MIN_ETA_RAD_S2)
-            q_eta = noise.q * eta_min * eta_min
+                q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
+                b.Q_d[i, j] = b.Q_scale * q_gust
+            q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta
             b.calm.Q_d[i, i] = q_eta
             b.Q_x[i] = b.calm.Q_x[i] = noise.Q[axis]
-        b.a = np.exp(-dt * V / b.drift_correlation_length_m) if b.drift_correlation_length_m > 0.0 else 1.0
+        b.a = np.exp(-dt * V / length) if length > 0.0 else 1.0
 
 
 @kernel
@@ -832,20 +816,12 @@ def add_coefficients(w, z, blocks, model, y, u):
     """
     tab = model.moments
     regressors(tab, tab.power, u, z)
-    qS = w * y[QDYN] * model.S
-    qSb = qS * model.b
-    qSc = qS * model.c
-    pitch = blocks[likelihood.PITCH_BLOCK]
-    k = tab.free_from[1]
-    for j in range(tab.surface_to[1] - k):
-        pitch.regressor[j, 0] += model.Qm * qSc * z[k + j]
-    for b in blocks[LATERAL_BLOCK:]:
-        n, k = tab.surface_to[0], tab.free_from[2]
-        for j in range(n):
-            L = qSb * z[j]
-            b.regressor[j, 0] += model.Pl * L
-            b.regressor[j, 1] += model.Rl * L
-        for j in range(tab.surface_to[2] - k):
-            N = qSb * z[k + j]
-            b.regressor[n + j, 0] += model.Pn * N
-            b.regressor[n + j, 1] += model.Rn * N
+    for b in blocks:
+        k = 0
+        for axis in b.axes[: b.n]:
+            qSl = y[QDYN] * model.S * (model.c if axis == 1 else model.b)
+            for j in range(tab.free_from[axis], tab.surface_to[axis]):
+                M = qSl * z[j]
+                F = accelerate(model, M * (axis == 0), M * (axis == 1), M * (axis == 2))
+                add_row(b, k, w, F)
+                k += 1

@@ -53,13 +53,14 @@ PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_
 
 def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarray) -> None:
     """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
-    net["config"]["gain"], net["config"]["w_max"] = gain, W_max
+    cfg = net["config"]
+    cfg["gain"], cfg["w_max"] = gain, W_max
     for i in range(3):
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
         for j, centres in enumerate(
             (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES_RAD_S, deflections)
         ):
-            (net["config"]["c0"][i, j], net["config"]["dc"][i, j]) = (centres[0], centres[1] - centres[0])
+            cfg["c0"][i, j], cfg["dc"][i, j] = centres[0], centres[1] - centres[0]
 
 
 def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
@@ -68,19 +69,17 @@ def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) 
     """
     config, dt, iso = declared.fdi, 1.0 / declared.rate_hz, fdi["isolation"]
     options, pub = settings(DETECTORS, config.scheme, config.options), fdi["published"]
+    cfg = iso["config"]
     pub["config"]["waits"] = options["dead_zone"]
     W_max = options["network_limit_rad_s2"] if options["projection"] else np.inf
     configure_network(pub["network"], options["network_gain"], W_max, travel[:, fdi["layout"]["main"]])
     fdi["fdae"]["config"]["a"] = fdi["bank"]["config"]["a"][0] = euler_decay(config.detection_pole_per_s, dt)
-    iso["config"]["a"] = euler_decay(config.isolation_pole_per_s, dt)
-    iso["config"]["gradient"], iso["config"]["gain"] = (1, options["adaptation_gain"])
+    cfg["a"] = euler_decay(config.isolation_pole_per_s, dt)
+    cfg["gradient"], cfg["gain"] = 1, options["adaptation_gain"]
     iso["estimator"]["theta"] = options["initial_theta"]
-    iso["config"]["free"] = not options["projection"]
+    cfg["free"] = not options["projection"]
     if not options["adaptive_threshold"]:
-        pub["config"]["mu0"], iso["config"]["mu_kind"] = (
-            options["constant_threshold_rad_s"],
-            CONSTANT_THRESHOLD,
-        )
+        pub["config"]["mu0"], cfg["mu_kind"] = options["constant_threshold_rad_s"], CONSTANT_THRESHOLD
     if options["leave_out"]:
         iso["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
 

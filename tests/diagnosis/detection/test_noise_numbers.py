@@ -296,7 +296,7 @@ def set_up(alone, given):
     """Configure a detector by what a scenario declares."""
     declared = replace(Declared.of(Scenario.model_validate(given)), aircraft=AIRCRAFT)
     design = alone.frames[0]["prediction"]["design"]
-    statistical.configure_statistics(alone.fdi, declared.fdi, declared, design, MASS, LEVEL_FLIGHT, 50.0)
+    statistical.configure_statistics(alone.fdi, declared, design, MASS, LEVEL_FLIGHT, 50.0)
 
 
 def as_set_up(bounds):
@@ -356,9 +356,7 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    statistical.configure_statistics(
-        alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0
-    )
+    statistical.configure_statistics(alone.fdi, Declared.of(scenario), design, MASS, start, 50.0)
     total = bound_kernels.coefficient_bounds(declared_in(config, AIRCRAFT), design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
@@ -393,9 +391,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     statistical["gust"]["config"]["span"] = SPAN_M
     forces["in_use"], forces["component"]["var_acc"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    gusts.add_gust_noise(
-        statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt
-    )
+    gusts.add_gust_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = bound_kernels.gust_noise(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)

@@ -97,7 +97,7 @@ from beaver_ftc.diagnosis.gusts import (
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
+from beaver_ftc.scenario.diagnosis import Statistical
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
@@ -177,7 +177,6 @@ def derive_margin(p: float, rate_hz: float, aircraft: Aircraft) -> float:
 
 def configure_statistics(
     fdi: np.void,
-    fdi_config: FdiConfig,
     declared: Declared,
     model: np.void,
     mass: MassProperties,
@@ -185,7 +184,7 @@ def configure_statistics(
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
-    stat, settings = fdi["statistical"], fdi_config.statistical
+    stat, settings = fdi["statistical"], declared.fdi.statistical
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
@@ -198,18 +197,16 @@ def configure_statistics(
     stat["forces"]["in_use"] = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust(gust, declared, mass)
-    views = fdi_config.compares_across(n_instants)
+    views = declared.fdi.compares_across(n_instants)
     n_tests = count_tests(
         aircraft, *(list_directions(aircraft, declared.uses_accelerometers) if views else ())
     )
-    _configure_levels(cfg, fdi_config, aircraft, n_tests, rate_hz)
+    _configure_levels(cfg, declared, n_tests, rate_hz)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
-    _configure_blocks(stat, errors, aircraft)
-    _configure_growth(stat, fdi_config, declared, rate, dt_s)
+    tol = coefficient_bounds(declared, model, mass, *trim[1:])
+    _configure_blocks(stat, declared, tol, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
     _configure_noise(stat, drift_frequency(settings, aircraft), declared, model, trim, dt_s)
-    tol = coefficient_bounds(declared, model, mass, *trim[1:])
-    _configure_tolerances(stat, aircraft, tol)
     configure_readings(stat, errors, fdi["bound"]["declared_errors"])
     if views:
         configure_tones(
@@ -231,15 +228,13 @@ def configure_statistics(
         add_gust_noise(stat, errors, model, *trim[1:], dt_s)
 
 
-def _configure_levels(
-    cfg: np.void, fdi_config: FdiConfig, aircraft: Aircraft, n_tests: int, rate_hz: float
-) -> None:
+def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: float) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings = fdi_config.statistical
+    settings, aircraft = declared.fdi.statistical, declared.aircraft
     assert settings is not None
     cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
     cfg["margin"] = derive_margin(settings.misnaming, rate_hz, aircraft)
-    cfg["forget"] = exp(-1.0 / (rate_hz * fdi_config.forgetting_time_s))
+    cfg["forget"] = exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s))
     cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
 
 
@@ -258,37 +253,42 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
     """Fill the correlation length of the drift, m, of the block whose drift reverts to its mean and, where no
     vane measures the gust, of the pitch block; fill how much of a gust's drift each of them then has."""
     cfg, out = stat["gust"]["config"], stat["gust"]["output"]
-    reverting, pitch = stat["block"][-1], stat["block"][likelihood.PITCH_BLOCK]
-    roll_m = float(cfg["L_roll"]) if out["gusty"] else 0.0
-    gusts_m = rotation_lengths(cfg["span"]) if cfg["coarse_only"] else [roll_m]
-    reverting["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(min(gusts_m)))
-    if not out["gusty"]:
-        return
-    reverting["Q_scale"] = (roll_m / reverting["drift_correlation_length_m"]) ** 2
-    if out["measured"]:
-        return
-    pitch_m = float(rotation_lengths(cfg["span"])[1])
-    pitch["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, pitch_m)
-    pitch["Q_scale"] = (pitch_m / pitch["drift_correlation_length_m"]) ** 2
+    roll_m, rotations_m = float(cfg["L_roll"]) if out["gusty"] else 0.0, rotation_lengths(cfg["span"])
+    lengths = [(stat["block"][-1], min(rotations_m) if cfg["coarse_only"] else roll_m, roll_m)]
+    if out["gusty"] and not out["measured"]:
+        lengths.append((stat["block"][likelihood.PITCH_BLOCK], rotations_m[1], rotations_m[1]))
+    for b, longest_m, gust_m in lengths:
+        b["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(longest_m))
+        if out["gusty"]:
+            b["Q_scale"] = (gust_m / b["drift_correlation_length_m"]) ** 2
 
 
-def _configure_blocks(stat: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
-    wanted = hypotheses_by_block(aircraft)
+def _configure_blocks(stat: np.void, declared: Declared, tol: np.ndarray, rate: float, dt_s: float) -> None:
+    """Fill axes and hypotheses of each block, its level, and the tolerances tol of its unknown constants.
+
+    rate: largest change of the bounded uncertainty within a frame, over its bound. A loss that is declared
+    constant does not grow.
+    """
+    aircraft, cfg = declared.aircraft, stat["test"]
     losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
-    stat["test"]["n_scores"] = len(losses) + len(AXES)
-    for b, (axes, rows) in zip(stat["block"], wanted, strict=True):
-        b["n"], b["n_h"] = len(axes), len(rows)
-        b["n_Z"] = sum(moment_axis(term) in axes for term in aircraft.moments)
-        b["a"], b["Q_scale"] = 1.0, 1.0
+    left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
+    cfg["n_scores"], cfg["regress"] = len(losses) + len(AXES), bool(np.any(tol))
+    for b, (axes, all_rows) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
+        own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
+        b["n"], b["n_Z"], b["tol"][: len(own)] = len(axes), len(own), tol[own]
+        b["a"], b["Q_scale"], b["eta_rate"] = 1.0, 1.0, rate
+        b["alarm_level"] = cfg["alarm_level"]
+        b["noise_share"] = 0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE
         for i, axis in enumerate(axes):
             b["axes"][i] = axis
-            R = max(errors[AXES[axis]].random, MIN_GYRO_STD_RAD_S) ** 2
+            R = max(declared.sensors[AXES[axis]].random, MIN_GYRO_STD_RAD_S) ** 2
             b["R_y"][i] = b["P_xx"][i, i] = R
             b["P_dd"][i, i] = likelihood.DRIFT_PRIOR_RAD_S2**2
+        rows = [row for row in all_rows if row[0] not in left_out]
+        b["n_h"], b["hypothesis"]["decay"] = len(rows), exp(-KAPPA_PER_S * dt_s)
         likelihood.set_signs(b, [kind for kind, *_ in rows])
         for h, (kind, s, axis, alarms) in zip(b["hypothesis"], rows, strict=False):
-            h["kind"], h["surface"] = kind, s
-            h["axis"], h["alarms"] = axis, alarms
+            h["kind"], h["surface"], h["axis"], h["alarms"] = kind, s, axis, alarms
             h["column"] = losses.index(s) if kind == LOSS else len(losses) + axis
 
 
@@ -315,22 +315,6 @@ def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
         if aircraft.loses_surfaces
         else settings.uncertainty_rad_s
     )
-
-
-def _configure_growth(
-    stat: np.void, fdi_config: FdiConfig, declared: Declared, rate: float, dt_s: float
-) -> None:
-    """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
-    not grow."""
-    noise_free = declared.is_noise_free
-    for b in stat["block"]:
-        b["alarm_level"] = stat["test"]["alarm_level"]
-        b["noise_share"] = 0.0 if noise_free else LEVEL_NOISE_SHARE
-        b["eta_rate"] = rate
-        kinds = b["hypothesis"]["kind"][: b["n_h"]]
-        if fdi_config.fault_profile == "abrupt":
-            b["n_h"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
-        b["hypothesis"]["decay"] = exp(-KAPPA_PER_S * dt_s)
 
 
 def _configure_noise(
@@ -384,15 +368,6 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
     level = float(stat["test"]["alarm_level"])
     tau = sqrt(2.0 * T / stat["noise"]["q"]) / level
     return min(V * tau, gust_m or np.inf)
-
-
-def _configure_tolerances(stat: np.void, aircraft: Aircraft, tol: np.ndarray) -> None:
-    """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
-    axis = np.array([moment_axis(term) for term in aircraft.moments])
-    for b, axes in zip(stat["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
-        own = tol[np.isin(axis, axes)]
-        b["tol"][: own.size] = own
-    stat["test"]["regress"] = bool(np.any(tol))
 
 
 def configure_readings(stat: np.void, errors: SensorErrors, err: np.void) -> None:

@@ -113,11 +113,13 @@ def of_stages(fdi, kernel):
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
     later = "range" in kernel.__name__
     return {
-        **dict.fromkeys(("c", "cfg", "config"), types["config"] if whole else fdi["config"]), "types": types, "surfs": types["surface"],
+        **dict.fromkeys(("c", "cfg", "config"), types["config"] if whole else fdi["config"]),
+        "types": types, "surfs": types["surface"],
         **dict.fromkeys(("pair", "pair_record"), types["pair"]),
         **dict.fromkeys(("conclusion", "done", "found", "past"), fdi["verdict"]),
         "layout": fdi["layout"],
-        **dict.fromkeys(("iso", "isolation"), fdi["isolation"]), **dict.fromkeys(("est", "fies", "estimators"), fdi["isolation"]["estimator"]),
+        **dict.fromkeys(("iso", "isolation"), fdi["isolation"]),
+        **dict.fromkeys(("est", "fies", "estimators"), fdi["isolation"]["estimator"]),
         **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(
             ("shared", "shared_by_axes", "axes_share_theta"),
@@ -134,7 +136,7 @@ def of_stages(fdi, kernel):
         ),
         **dict.fromkeys(("noise", "n", "n_gyro"), fdi["bound"]["n_gyro"]),
         "dt": fdi["config"]["dt"],
-        **dict.fromkeys(("alarm", "statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),
+        "alarm": fdi["statistical"]["alarm"],
         **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
     }  # fmt: skip
 

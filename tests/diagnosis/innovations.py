@@ -179,9 +179,7 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical.configure_statistics(
-            self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz
-        )
+        statistical.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
         Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
         self.frame = 0

@@ -76,11 +76,6 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     assert not on(isolation.narrow_sets, fdi, fie)
 
 
-def test_the_dominant_axis_is_that_of_the_largest_effect():
-    effects = np.array([(3.0, 1, 2), (1, -3.0, 2), (1, 2, -3.0), (2, 2, 1)])
-    assert [isolation.largest_axis(Z) for Z in effects] == [0, 1, 2, 0]
-
-
 @pytest.mark.parametrize("instants", [1, 4])
 def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     """A position whose terms' errors grow with it: the room is a fixed point of where it can have been."""

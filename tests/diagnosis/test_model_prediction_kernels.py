@@ -19,7 +19,7 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     prediction["w"] = 1.0 / instants
     G, u = rng.uniform(0.5, 2.0, (5, 3, n)), rng.uniform(-0.3, 0.3, (5, n))
     for k in range(5):
-        prediction["sums"]["G"], prediction["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
+        prediction["sums"]["G"], prediction["sums"]["Gu"] = G[k], G[k] * u[k]
         model_prediction.fill_means(prediction, bound)
         model_prediction.fill_old_effects(prediction["means"])
         assert prediction["means"]["Gu"] == pytest.approx(G[k] * u[k])

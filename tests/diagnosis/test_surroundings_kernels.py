@@ -321,13 +321,12 @@ def test_the_row_is_that_of_a_flight_so_old(time_s, age):
     ],
 )
 def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_s, box):
-    record, out = new_map(time_s=time_s), np.full(3, 0.5)
+    record = new_map(time_s=time_s)
     y = Y.copy()
     y[2] = airspeed
-    bounds.add_mapped_bound(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.look_up_map(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]))
     age = 0 if time_s <= 10.0 else 1
     expected = record["e"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
-    assert out == pytest.approx(0.5 + expected)
     assert record["e_now"] == pytest.approx(np.full(3, expected))
     assert record["outside"] == (box is None)
     assert record["coordinates"][:7] == pytest.approx(
@@ -466,7 +465,8 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
 def take(fdi, given, t):
     """A frame's verdict of a plug-in, as the frame of the loop takes it."""
     on(conclusion.record_plugin_verdict, fdi, given, t)
-    isolation.set_theta(fdi["isolation"], fdi["verdict"]["isolated_estimator"], given["theta"])
+    if fdi["verdict"]["isolated_estimator"] >= 0:
+        fdi["isolation"]["estimator"]["theta"][fdi["verdict"]["isolated_estimator"]] = given["theta"]
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():

@@ -30,7 +30,7 @@ Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the
                                   magnitude as measured, a `w` the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
     C, dC; c, dc                  coefficient and its tolerance, of a moment's term; of inertia, dI (12,)
-    M, Ma, eM (3,) N m            moment; sum of its terms' magnitudes; bound on the error of this sum
+    L, M, N; Lw, Mw, Nw  N m      moments: sum of their terms' magnitudes, as measured and at worst
     q Pa, S m2, l m               dynamic pressure, wing area, span or chord
     z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
     b, j, k                       box, level of travel, row of time of the map
@@ -110,7 +110,7 @@ def errors_dtype(n: int) -> np.dtype:
         engine=int, kw0=float, kw1=float,
         # scratch: magnitudes as measured, and as large as they can be
         xa=3, ya=N_Y, ua=n, xw=3, yw=N_Y, uw=n, xr=3, sig=N_SIGNALS, ma=MAX_MONOMIALS, mw=MAX_MONOMIALS,
-        eG=(3, n), Ma=3, eM=3,
+        eG=(3, n),
     )  # fmt: skip
 
 
@@ -228,59 +228,51 @@ def fill_magnitudes(err, x, y, u):
 
 
 @kernel
-def fill_moments(err, model):
-    """Fill Ma = S l q sum |C| m and eM = S l (qw sum (|C| + dC) mw - q sum |C| m), (3,) N m; m: a term's
-    signals.
+def moment_sizes(err, model, i, s):
+    """(M, Mw), N m: magnitudes of the terms of moment i as measured, and the largest that the errors allow.
+
+        M = q S l sum |C| m |u|      Mw = qw S l sum (|C| + dC) mw uw
+
+    m, mw: product of a term's signals. s: the surface whose terms alone count, per rad; -1: all terms do.
     """
-    q = err.ya[QDYN]
-    qw = err.yw[QDYN]
-    tab = model.moments
-    for i in range(3):
-        C, Cw = 0.0, 0.0
-        for k in range(tab.free_from[i], tab.surface_to[i]):
-            c, s = abs(tab.value[k]), tab.surface[k]
-            C += c * err.ma[tab.monomial[k]] * (err.ua[s] if s >= 0 else 1.0)
-            mw = err.mw[tab.monomial[k]] * (err.uw[s] if s >= 0 else 1.0)
-            Cw += (c + err.dC[k]) * mw
-        Sl = model.S * (model.c if i == 1 else model.b)
-        err.Ma[i] = Sl * q * C
-        err.eM[i] = Sl * (qw * Cw - q * C)
-
-
-@kernel
-def product_bound(c, dc, s, sw):
-    """(|c| + dc) sw - |c| s: bound on the error of a coefficient times a signal."""
-    return (abs(c) + dc) * sw - abs(c) * s
-
-
-@kernel
-def moment_bound(err, i, c, dc):
-    """Bound the error of an inertia coefficient times the moment about axis i, rad/s2."""
-    M = err.Ma[i]
-    return product_bound(c, dc, M, M + err.eM[i])
-
-
-@kernel
-def rates_bound(err, i, j, c, dc):
-    """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
-    xa, xw = err.xa, err.xw
-    return product_bound(c, dc, xa[i] * xa[j], xw[i] * xw[j])
-
-
-@kernel
-def surface_moments(err, model, i, s):
-    """(q S l sum |C| m, qw S l sum (|C| + dC) mw) over the terms of surface s in moment i, N m per rad."""
-    C, Cw = 0.0, 0.0
-    tab = model.moments
-    for k in range(tab.free_to[i], tab.surface_to[i]):
-        if tab.surface[k] == s:
-            c = abs(tab.value[k])
-            C += c * err.ma[tab.monomial[k]]
-            Cw += (c + err.dC[k]) * err.mw[tab.monomial[k]]
+    tab, C, Cw = model.moments, 0.0, 0.0
+    for k in range(tab.free_from[i], tab.surface_to[i]):
+        at, c = tab.surface[k], abs(tab.value[k])
+        if s < 0 or at == s:
+            u, uw = (err.ua[at], err.uw[at]) if s < 0 <= at else (1.0, 1.0)
+            C += c * err.ma[tab.monomial[k]] * u
+            Cw += (c + err.dC[k]) * err.mw[tab.monomial[k]] * uw
     Sl = model.S * (model.c if i == 1 else model.b)
-    qSl = Sl * err.ya[QDYN]
-    qSlw = Sl * err.yw[QDYN]
-    return (qSl * C, qSlw * Cw)
+    return Sl * err.ya[QDYN] * C, Sl * err.yw[QDYN] * Cw
+
+
+@kernel
+def inertia_factors(w, x, L, M, N):
+    """What the twelve inertia coefficients multiply, in their order; w: factor of the rates x (3,)."""
+    p, q, r = w * x[0], w * x[1], w * x[2]
+    return p * q, q * r, L, N, p * p, p * r, r * r, M, p * q, q * r, L, N
+
+
+@kernel
+def add_product_bounds(err, model, s, eta):
+    """Add to eta the bound on the error of each inertia coefficient c times its factor f:
+
+        eta_i <- eta_i + sum (|c| + dI) fw - |c| f
+
+    s: the surface whose moments alone count, per rad; -1: all moments and the rates do.
+    """
+    w = 1.0 if s < 0 else 0.0
+    L, Lw = moment_sizes(err, model, 0, s)
+    M, Mw = moment_sizes(err, model, 1, s)
+    N, Nw = moment_sizes(err, model, 2, s)
+    f, fw = inertia_factors(w, err.xa, L, M, N), inertia_factors(w, err.xw, Lw, Mw, Nw)
+    c = (
+        *(model.Ppq, model.Pqr, model.Pl, model.Pn),
+        *(model.Qpp, model.Qpr, model.Qrr, model.Qm),
+        *(model.Rpq, model.Rqr, model.Rl, model.Rn),
+    )
+    for k in range(12):
+        eta[k // 4] += (abs(c[k]) + err.dI[k]) * fw[k] - abs(c[k]) * f[k]
 
 
 @kernel
@@ -289,16 +281,8 @@ def fill_eG(err, model, s):
 
     The declared bound is affine in |u_s|; this is its slope. `add_declared_bound` fills what it reads.
     """
-    dI = err.dI
-    eG = err.eG
-    L, Lw = surface_moments(err, model, 0, s)
-    M, Mw = surface_moments(err, model, 1, s)
-    N, Nw = surface_moments(err, model, 2, s)
-    eG[0, s] = product_bound(model.Pl, dI[2], L, Lw)
-    eG[0, s] += product_bound(model.Pn, dI[3], N, Nw)
-    eG[1, s] = product_bound(model.Qm, dI[7], M, Mw)
-    eG[2, s] = product_bound(model.Rl, dI[10], L, Lw)
-    eG[2, s] += product_bound(model.Rn, dI[11], N, Nw)
+    err.eG[:, s] = 0.0
+    add_product_bounds(err, model, s, err.eG[:, s])
 
 
 @kernel
@@ -309,49 +293,50 @@ def add_declared_bound(err, model, x, y, u, eta):
     monomials(model.moments, err.sig, err.ma)
     signals(model.moments, err.xr, err.yw, err.sig)
     monomials(model.moments, err.sig, err.mw)
-    fill_moments(err, model)
-    dI = err.dI
-    eta[0] += moment_bound(err, 0, model.Pl, dI[2]) + moment_bound(err, 2, model.Pn, dI[3])
-    eta[0] += rates_bound(err, 0, 1, model.Ppq, dI[0]) + rates_bound(err, 1, 2, model.Pqr, dI[1])
-    eta[1] += moment_bound(err, 1, model.Qm, dI[7]) + rates_bound(err, 0, 2, model.Qpr, dI[5])
-    eta[1] += rates_bound(err, 0, 0, model.Qpp, dI[4]) + rates_bound(err, 2, 2, model.Qrr, dI[6])
-    eta[2] += moment_bound(err, 0, model.Rl, dI[10]) + moment_bound(err, 2, model.Rn, dI[11])
-    eta[2] += rates_bound(err, 0, 1, model.Rpq, dI[8]) + rates_bound(err, 1, 2, model.Rqr, dI[9])
+    add_product_bounds(err, model, -1, eta)
+
+
+@kernel
+def is_between(lo, z, hi):
+    """lo <= z <= hi, but for rounding."""
+    slack = _EDGE * (1.0 + abs(z))
+    return lo - slack <= z <= hi + slack
 
 
 @kernel
 def in_box(emap, b):
     """Whether the state is in box b of the map."""
-    inside = True
     for i in range(emap.coordinates.size):
-        slack = _EDGE * (1.0 + abs(emap.coordinates[i]))
-        inside = inside and emap.lo[b, i] - slack <= emap.coordinates[i] <= emap.hi[b, i] + slack
-    return inside
+        if not is_between(emap.lo[b, i], emap.coordinates[i], emap.hi[b, i]):
+            return False
+    return True
 
 
 @kernel
 def outside_span(emap, i):
     """Whether coordinate i of the state is outside the range that the boxes span together."""
-    lo, hi = np.inf, -np.inf
-    for b in range(emap.n_boxes):
-        lo = min(lo, emap.lo[b, i])
-        hi = max(hi, emap.hi[b, i])
-    slack = _EDGE * (1.0 + abs(emap.coordinates[i]))
-    return not lo - slack <= emap.coordinates[i] <= hi + slack
+    n = emap.n_boxes
+    return not is_between(emap.lo[:n, i].min(), emap.coordinates[i], emap.hi[:n, i].max())
+
+
+@kernel
+def travel_share(emap, s, u):
+    """The share of its travel that surface s uses at u rad; 1 if it has no travel there."""
+    if u == 0.0:
+        return 0.0
+    stop = emap.stop_hi[s] if u > 0.0 else emap.stop_lo[s]
+    return u / stop if stop != 0.0 else 1.0
 
 
 @kernel
 def level_of_positions(emap, u):
     """Index of the least share of the travel that covers surfaces at u; the last index if all of the travel
-    may be used.
-    """
+    may be used."""
     if emap.two_free:
         return emap.n_levels - 1
     share = 0.0
     for s in range(u.size):
-        if u[s] != 0.0:
-            end = emap.stop_hi[s] if u[s] > 0.0 else emap.stop_lo[s]
-            share = max(share, u[s] / end) if end != 0.0 else 1.0
+        share = max(share, travel_share(emap, s, u[s]))
     return level_of_share(emap, share)
 
 
@@ -372,11 +357,7 @@ def share_used(emap, s, between, before, n):
     between: (low, high) rad, of the mean position over the instants; before: the share at the start of the
     frame, where the surface may still be at the first instant.
     """
-    share, (lo, hi) = 0.0, between
-    if hi > 0.0:
-        share = hi / emap.stop_hi[s] if emap.stop_hi[s] != 0.0 else 1.0
-    if lo < 0.0:
-        share = max(share, lo / emap.stop_lo[s] if emap.stop_lo[s] != 0.0 else 1.0)
+    share = max(travel_share(emap, s, between[0]), travel_share(emap, s, between[1]))
     if n > 1:
         share = max(before, (n * share + before) / (n - 1))
     return min(share, 1.0)
@@ -422,47 +403,26 @@ def extra_bound(emap, j, i):
 
 
 @kernel
-def add_mapped_bound(emap, x, y, u, eta):
-    """Add to eta the mapped error at this state."""
-    look_up_map(emap, x, y, u)
-    for i in range(3):
-        eta[i] += emap.e_now[i]
-
-
-@kernel
 def add_published_bound(x, model, share, const, earth, eta):
     """Add to eta the published bound, and what the Earth's rotation adds.
 
-    Published: share_i |cross term_i| + const_i [Zhang2005, sec. VII]. JSBSim integrates rates against
-    inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth |x| on any axis, and the inertia coupling multiplies it by `coupling_factors`.
+        eta_i <- eta_i + share_i |cross_i| + const_i + earth ((1 + k) (|p| + |q| + |r|) + k earth) + rounding
+
+    [Zhang2005, sec. VII] for the first two. JSBSim integrates rates against inertial space and reports them
+    against the Earth: the difference turns with the body, at no more than earth |x| on any axis. k >= 1: the
+    largest factor by which the inertia coupling multiplies a product of two rates.
     """
     p, q, r = x[0], x[1], x[2]
     w = abs(p) + abs(q) + abs(r)
-    kp, kq, kr = coupling_factors(model)
-    eta[0] += share[0] * abs(model.Pqr * q * r) + const[0] + earth_bound(earth, w, kp)
-    eta[1] += share[1] * abs(model.Qpr * p * r) + const[1] + earth_bound(earth, w, kq)
-    eta[2] += share[2] * abs(model.Rpq * p * q) + const[2] + earth_bound(earth, w, kr)
-
-
-@kernel
-def coupling_factors(model):
-    """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
-    least 1.
-    """
-    kp = abs(model.Ppq) + abs(model.Pqr)
-    kr = abs(model.Rpq) + abs(model.Rqr)
-    kq = abs(model.Qpr) + 2.0 * max(abs(model.Qpp), abs(model.Qrr))
-    return (max(kp, 1.0), max(kq, 1.0), max(kr, 1.0))
-
-
-@kernel
-def earth_bound(earth, w, k):
-    """earth ((1 + k) w + k earth) + rounding: bound on the acceleration by the Earth's rotation, rad/s2.
-
-    w: |p| + |q| + |r|, rad/s; k: factor of the inertia coupling; earth: rate of the Earth, rad/s.
-    """
-    return earth * ((1.0 + k) * w + k * earth) + ROUNDING_RAD_S2
+    cross = model.Pqr * q * r, model.Qpr * p * r, model.Rpq * p * q
+    factor = (
+        abs(model.Ppq) + abs(model.Pqr),
+        abs(model.Qpr) + 2.0 * max(abs(model.Qpp), abs(model.Qrr)),
+        abs(model.Rpq) + abs(model.Rqr),
+    )
+    for i in range(3):
+        k = max(factor[i], 1.0)
+        eta[i] += share[i] * abs(cross[i]) + const[i] + earth * ((1.0 + k) * w + k * earth) + ROUNDING_RAD_S2
 
 
 @kernel
@@ -486,19 +446,21 @@ def set_air_rotation(err, h):
 @kernel
 def fill_bound(bound, model, meas, u):
     """Fill eta_now, the bound on the uncertainty at this instant."""
-    x, y = meas.x, meas.y
-    bound.eta_now[:] = 0.0
-    if bound.declared_errors.given:
-        set_air_rotation(bound.declared_errors, meas.altitude)
-        add_declared_bound(bound.declared_errors, model, x, y, u, bound.eta_now)
+    x, y, err, emap, eta = meas.x, meas.y, bound.declared_errors, bound.error_map, bound.eta_now
+    eta[:] = 0.0
+    if err.given:
+        set_air_rotation(err, meas.altitude)
+        add_declared_bound(err, model, x, y, u, eta)
         if bound.has_eG:
             for s in range(u.size):
-                fill_eG(bound.declared_errors, model, s)
-    if bound.error_map.n_boxes > 0:
-        add_mapped_bound(bound.error_map, x, y, u, bound.eta_now)
-    rates = bound.declared_errors.xw if bound.declared_errors.given else x
+                fill_eG(err, model, s)
+    if emap.n_boxes > 0:
+        look_up_map(emap, x, y, u)
+        for i in range(3):
+            eta[i] += emap.e_now[i]
+    rates = err.xw if err.given else x
     add_published_bound(
-        rates, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, bound.eta_now
+        rates, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
 
 

@@ -106,23 +106,18 @@ def withdraw_conclusion(found):
 @kernel
 def update_interval(found, s, isolated, t, kind, reason):
     """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what is
-    withdrawn, and why. If a store is full, the latest one replaces the last.
+    withdrawn, and why.
     """
-    since = found.from_s[s]
-    before = found.isolated_type[s]
+    since, before = found.from_s[s], found.isolated_type[s]
     if isolated and since < 0.0:
         found.from_s[s] = t
     elif since >= 0.0 and not isolated:
-        store_withdrawn(
-            found.gone, found.n_gone, s, before, since, t, reason,
-        )  # fmt: skip
-        found.n_gone += 1
+        found.n_gone = store_withdrawn(found.gone, found.n_gone, s, before, since, t, reason)
         found.from_s[s] = -1.0
     elif before >= 0 and kind != before:
-        store_withdrawn(
-            found.withdrawn_types, found.n_gone_types, s, before, found.type_from_s[s], t, reason,
-        )  # fmt: skip
-        found.n_gone_types += 1
+        found.n_gone_types = store_withdrawn(
+            found.withdrawn_types, found.n_gone_types, s, before, found.type_from_s[s], t, reason
+        )
     kind = kind if isolated else -1
     if kind != before:
         found.isolated_type[s], found.type_from_s[s] = kind, t
@@ -130,10 +125,11 @@ def update_interval(found, s, isolated, t, kind, reason):
 
 @kernel
 def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
-    """Fill the next record of a store (MAX_WITHDRAWN,)."""
+    """Fill the next record of a store (MAX_WITHDRAWN,), or the last; returns how many there were."""
     gone = store[min(n, MAX_WITHDRAWN - 1)]
     gone.surface, gone.fault_type, gone.reason = s, kind, reason
     gone.from_s, gone.to_s = from_s, to_s
+    return n + 1
 
 
 @kernel
@@ -152,13 +148,6 @@ def reason_of_withdrawal(plugin, broken, excluded, left):
 def isolated_surface(found, fies):
     """The surface of the isolated fault, or -1."""
     return fies[found.isolated_estimator].surface if found.isolated_estimator >= 0 else -1
-
-
-@kernel
-def has_no_target(found):
-    """True if the law has no surface to accommodate: none is isolated or accommodated, and no plug-in
-    estimates effectiveness."""
-    return found.isolated_estimator < 0 and found.target < 0 and not found.has_effectiveness
 
 
 # 1 / variance of an effectiveness that is known to 0.05: it is precise enough to be applied at once
@@ -184,12 +173,15 @@ def assessment_dtype(n: int) -> np.dtype:
 
 @kernel
 def assess_surfaces(out, cfg, found, types, layout, fies, stat):
-    """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`."""
-    all_types = cfg.diagnoses_all_types
+    """Fill the assessment of this frame from the outputs of the stages; stat: of `statistical_dtype`.
+
+    The law has no target if no surface is isolated or accommodated, and no plug-in estimates effectiveness.
+    """
+    all_types, j = cfg.diagnoses_all_types, found.isolated_estimator
     at_fault = isolated_surface(found, fies)
-    out.held = 0
-    out.detected, out.diagnoses_all_types = found.detected, all_types
-    out.isolated_surface, out.lags, out.no_target = (at_fault, 0, has_no_target(found))
+    out.held, out.lags = 0, 0
+    out.detected, out.diagnoses_all_types, out.isolated_surface = found.detected, all_types, at_fault
+    out.no_target = j < 0 and found.target < 0 and not found.has_effectiveness
     for s in range(out.accommodation_mode.size):
         out.accommodation_mode[s] = types.surface[s].accommodation.mode if all_types else -1
         out.effectiveness[s], out.at_once[s] = 1.0, 0
@@ -199,11 +191,11 @@ def assess_surfaces(out, cfg, found, types, layout, fies, stat):
         elif out.accommodation_mode[s] >= 0:
             assess_surface(out, types, layout, fies, s)
         elif s == at_fault and not all_types:
-            likely = weighs_statistics(stat.test, cfg.authority)
-            precise = likely and statistical.estimate_loss(stat.block, s)[1] > MIN_INFORMATION
-            th = isolated_theta(cfg, found, layout, fies, stat, s)
-            out.effectiveness[s] = 1.0 + th
-            out.at_once[s] = precise
+            out.effectiveness[s] = 1.0 + isolated_theta(cfg, found, layout, fies, stat, s)
+            out.at_once[s] = (
+                weighs_statistics(stat.test, cfg.authority)
+                and statistical.estimate_loss(stat.block, s)[1] > MIN_INFORMATION
+            )
 
 
 @kernel
@@ -256,13 +248,13 @@ def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
 
     The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
-    unknown, all_types = out.unknown_acceleration, cfg.diagnoses_all_types
+    unknown = out.unknown_acceleration
     unknown[:] = 0.0
-    waits = found.target >= 0 and found.accommodation_mode == WAIT_FOR_SURFACE
-    if found.detected and not waits and weighs_statistics(stat.test, cfg.authority):
-        statistical.fill_unmodelled(stat.block, stat.gust, unknown)
-    elif found.detected and not waits:
-        filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)
-    open_yet = all_types and found.detected and found.isolated_estimator == NOT_ISOLATED
-    long = types.surface[layout.main[PITCH]].evidence.n_anomalous >= types.config.half_frames
-    out.pitch_undecided = open_yet and long
+    if found.detected and not (found.target >= 0 and found.accommodation_mode == WAIT_FOR_SURFACE):
+        if weighs_statistics(stat.test, cfg.authority):
+            statistical.fill_unmodelled(stat.block, stat.gust, unknown)
+        else:
+            filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)
+    waited = types.surface[layout.main[PITCH]].evidence.n_anomalous >= types.config.half_frames
+    not_isolated = found.detected and found.isolated_estimator == NOT_ISOLATED
+    out.pitch_undecided = cfg.diagnoses_all_types and not_isolated and waited

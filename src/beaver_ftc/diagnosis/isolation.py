@@ -42,7 +42,7 @@ Symbols of the kernels:
     phi                           effect of a fault, base + theta Z within +- e (EFFECT_RECORD)
     lo, hi; between               interval of theta, or of a position, rad
     Om, Om_pos, Om_neg            Omega, and the same of the positive and the negative part of Z
-    e, e_eta, e_n rad/s           bound on the filtered uncertainty, and its parts by eta_bar and by gyros
+    e, e_lag rad/s                bound on the filtered uncertainty, and its part with a memory
     th, P                         estimate of theta and its variance
     s, i, j                       surface, axis, estimator
     iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
@@ -59,7 +59,6 @@ from beaver_ftc.diagnosis.bounds import level_of_share, share_used
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_bound,
-    advance_gyro,
     advance_reach,
     is_reachable,
     published_interval,
@@ -109,19 +108,16 @@ def consistent_on(nu, nu_max, fie, phi, i):
     """
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
-    rest = nu[i] - phi.base[i]
     e = nu_max[i] + phi.e[i]
-    return consistent_theta(rest, e, phi.regressor[i], fie.theta_min, fie.theta_max)
+    return consistent_theta(nu[i] - phi.base[i], e, phi.regressor[i], fie.theta_min, fie.theta_max)
 
 
 @kernel
-def largest_axis(Z):
-    """The axis on which Z (3,) is largest."""
-    axis = 0
-    for i in range(1, 3):
-        if abs(Z[i]) > abs(Z[axis]):
-            axis = i
-    return axis
+def own_error(bound, s, i, u, level):
+    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s at u rad exceeds that at its
+    command.
+    """
+    return max(bound.eG[i, s] * u - bound.eGu[i, s], 0.0) + bound.extra[level, i]
 
 
 @kernel
@@ -131,38 +127,33 @@ def widen_error(fie, bound, nu, n_substeps):
         e <- e + max(eG (u + first) - eGu, 0) + extra
 
     eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
-    far the surface can have been follows from the frame itself, in a few rounds from its travel inwards;
-    every round gives a valid bound. If a frame has several substeps, the surface may still be where it was a
-    frame before at the first of them. The same holds for a map of the model's error, which is for healthy
-    surfaces.
+    far the surface can have been follows from the frame itself, on the axis of the largest Z, in a few rounds
+    from its travel inwards; every round gives a valid bound. If a frame has several substeps, the surface may
+    still be where it was a frame before at the first of them. The same holds for a map of the model's error,
+    which is for healthy surfaces.
     """
-    s, phi = fie.surface, fie.effect
-    i = largest_axis(phi.regressor)
-    u_old = fie.u_far
-    u = max(abs(fie.theta_min), abs(fie.theta_max))
-    e = phi.e[i]
-    emap = bound.error_map
+    s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
+    for j in range(1, 3):
+        if abs(phi.regressor[j]) > abs(phi.regressor[i]):
+            i = j
+    first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
+    u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.e[i]
     between = (fie.theta_min, fie.theta_max)
     level = level_near(emap, fie, between, n_substeps)
-    rest = nu[i] - phi.base[i]
-    first = 2.0 * u_old / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_ROUNDS):
-        more = max(bound.eG[i, s] * (u + first) - bound.eGu[i, s], 0.0)
-        more += bound.extra[level, i]
+        more = own_error(bound, s, i, u + first, level)
         lo, hi = consistent_theta(
-            rest, bound.nu_max[i] + e + more, phi.regressor[i], fie.theta_min, fie.theta_max
+            nu[i] - phi.base[i], e + more, phi.regressor[i], fie.theta_min, fie.theta_max
         )
         if lo > hi:
             break
-        u = min(u, max(abs(lo), abs(hi)))
-        between = (lo, hi)
+        u, between = min(u, max(abs(lo), abs(hi))), (lo, hi)
         level = level_near(emap, fie, between, n_substeps)
     fie.u_far = u
     if emap.one_free:
         fie.share_far = share_used(emap, s, between, fie.share_far, n_substeps)
     for j in range(3):
-        phi.e[j] += max(bound.eG[j, s] * (u + first) - bound.eGu[j, s], 0.0)
-        phi.e[j] += bound.extra[level, j]
+        phi.e[j] += own_error(bound, s, j, u + first, level)
 
 
 @kernel
@@ -186,14 +177,6 @@ def theta_explains(fie, nu, nu_max):
 
 
 @kernel
-def reset_sets(fie, free):
-    """Start with the known set of theta on every axis, or, if `free`, without limits."""
-    fie.set_lo[:], fie.set_hi[:] = fie.theta_min, fie.theta_max
-    if free:
-        fie.set_lo[:], fie.set_hi[:] = -np.inf, np.inf
-
-
-@kernel
 def intersect_sets(fie, i, between, shared):
     """Intersect the set of theta on axis i, or on every axis if `shared`, with `between`."""
     lo, hi = between
@@ -209,24 +192,15 @@ def narrow_sets(fie, nu, nu_max, shared):
 
     |eps + Omega thetahat - Omega theta| <= e       for any course of the estimate
     """
-    for i in range(3):
-        between = consistent_on(nu, nu_max, fie, fie.effect, i)
-        intersect_sets(fie, i, between, shared)
-        rest = fie.residual[i] + fie.Om[i] * fie.theta[i]
-        intersect_sets(
-            fie, i, consistent_theta(rest, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max), shared
-        )
     some = True
+    for i in range(3):
+        intersect_sets(fie, i, consistent_on(nu, nu_max, fie, fie.effect, i), shared)
+        eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
+        between = consistent_theta(eps, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max)
+        intersect_sets(fie, i, between, shared)
     for i in range(3):
         some = some and fie.set_lo[i] <= fie.set_hi[i]
     return some
-
-
-@kernel
-def set_effect_error(phi, e_Gu, s):
-    """e = e_Gu[:, s]."""
-    for i in range(3):
-        phi.e[i] = e_Gu[i, s]
 
 
 @kernel
@@ -253,7 +227,7 @@ ESTIMATOR_RECORD = record(
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
     confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
     # Omega, and the same of the positive and the negative part of Z
-    Om=3, Om_pos=3, Om_neg=3, e=3, e_eta=3, e_n=3, theta=3, P=3, effect=EFFECT_RECORD,
+    Om=3, Om_pos=3, Om_neg=3, e=3, e_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
     u_far=float, share_far=float,
@@ -309,12 +283,12 @@ def configure_isolation(
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
-    sharpen = config.sharpen
-    iso["config"]["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
-    iso["config"]["forget"] = exp(-dt / config.forgetting_time_s)
-    iso["config"]["a"] = exp(-config.isolation_pole_per_s * dt)
-    iso["config"]["reach"], iso["config"]["shared"] = (sharpen.memory, sharpen.shared_effectiveness)
-    iso["config"]["narrows"], iso["config"]["n_estimators"] = (sharpen.set_membership, len(rows))
+    sharpen, cfg = config.sharpen, iso["config"]
+    cfg["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
+    cfg["forget"] = exp(-dt / config.forgetting_time_s)
+    cfg["a"] = exp(-config.isolation_pole_per_s * dt)
+    cfg["reach"], cfg["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    cfg["narrows"], cfg["n_estimators"] = sharpen.set_membership, len(rows)
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
@@ -323,30 +297,24 @@ def configure_isolation(
             fie["skip"] = (1, 0, 1) if aircraft.dominant_axis[s] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
-    weak = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
-    iso["estimator"]["weak"] = weak
-    iso["config"]["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
+    iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
+    cfg["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
     losable = {name for damage in aircraft.damage.values() for name in damage.takes}
-    iso["config"]["losable"] = [name in losable for name in aircraft.surfaces]
-
-
-@kernel
-def fill_effect(kind, s, G, Gu, base, Z):
-    """Fill base and Z (3,) of one fault: 0 and Gu of a loss, -Gu and G of a position."""
-    for i in range(3):
-        if kind == POSITION_HYPOTHESIS:
-            base[i], Z[i] = (-Gu[i, s], G[i, s])
-        else:
-            base[i], Z[i] = 0.0, Gu[i, s]
+    cfg["losable"] = [name in losable for name in aircraft.surfaces]
 
 
 @kernel
 def update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu):
-    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank."""
-    phi = fie.effect
-    fill_effect(fie.hypothesis_kind, fie.surface, G, Gu, phi.base, phi.regressor)
-    set_effect_error(phi, e_Gu, fie.surface)
-    if (bound.has_eG or bound.error_map.one_free) and fie.hypothesis_kind == POSITION_HYPOTHESIS:
+    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
+
+    loss  base = 0, Z = Gu_s        position  base = -Gu_s, Z = G_s        e = e_Gu_s
+    """
+    phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
+    for i in range(3):
+        phi.base[i] = -Gu[i, s] if stuck else 0.0
+        phi.regressor[i] = G[i, s] if stuck else Gu[i, s]
+        phi.e[i] = e_Gu[i, s]
+    if stuck and (bound.has_eG or bound.error_map.one_free):
         widen_error(fie, bound, bank.output.innovation, config.n_substeps)
     if iso.config.reach:
         advance_reach(bank, fie, config.dt)
@@ -362,13 +330,15 @@ def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
 
 @kernel
 def start_estimators(iso, n, x):
-    """Start every estimator at the measured x, without residual and with the prior of theta; n (3,): of
-    `n_gyro`.
+    """Start every estimator at the measured x, with the prior of theta; n (3,): of `n_gyro`.
+
+    The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
     """
     for fie in iso.estimator[: iso.config.n_estimators]:
-        fie.xhat[:], fie.e_n[:] = x, n
+        fie.xhat[:], fie.e_lag[:] = x, n
         fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
-        reset_sets(fie, iso.config.free)
+        fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
+        fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max
 
 
 @kernel
@@ -377,11 +347,7 @@ def update_residual(fie, kind, x):
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        lo = fie.theta_min
-        hi = fie.theta_max
-        Om = fie.Om[i]
-        th = fie.theta[i]
-        e = fie.e[i]
+        lo, hi, Om, th, e = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.e[i]
         if kind == INTERVAL_THRESHOLD:
             mu = residual_interval(lo, hi, fie.Om_pos[i], fie.Om_neg[i], Om, th, e)
         elif kind == CONSTANT_THRESHOLD:
@@ -407,13 +373,6 @@ def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
     if iso.config.narrows and abrupt and started and fie.hypothesis_kind == LOSS:
         possible = possible and narrow_sets(fie, bank.output.innovation, nu_max, iso.config.shared)
     return possible
-
-
-@kernel
-def hold_isolation(iso, mu):
-    """Replace the adaptive thresholds by a constant one, rad/s."""
-    for fie in iso.estimator[: iso.config.n_estimators]:
-        fie.e[:] = mu
 
 
 @kernel
@@ -446,39 +405,20 @@ def decide_isolation(iso, t):
 
 
 @kernel
-def set_theta(iso, j, th):
-    """Replace theta of estimator j, the isolated one where there is one, by the estimate of a plug-in."""
-    if j >= 0:
-        iso.estimator[j].theta[:] = th
-
-
-@kernel
-def least_squares_step(fie, i, eps, forget, lo, hi):
-    """One least-squares step of theta_i on a residual eps, rad/s, projected onto [lo, hi]; returns the step.
+def least_squares_step(fie, i, eps, forget):
+    """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
 
         K = P Om / S,  S = R + Om P Om,  R = e^2      th <- th + K eps      P <- min(P R / S / forget, prior)
 
     R is the square of the bound on the filtered uncertainty, so the estimate changes no faster than its
     information allows.
     """
-    R = fie.e[i] ** 2
-    POm = fie.P[i] * fie.Om[i]
+    th, R, POm = fie.theta[i], fie.e[i] ** 2, fie.P[i] * fie.Om[i]
     S = R + fie.Om[i] * POm
     if S <= 0.0:
         return 0.0
-    th = fie.theta[i]
-    fie.theta[i] = min(max(th + POm / S * eps, lo), hi)
-    P0 = (fie.theta_max - fie.theta_min) ** 2 / 12.0
-    fie.P[i] = min(fie.P[i] * R / S / forget, P0)
-    return fie.theta[i] - th
-
-
-@kernel
-def gradient_step(fie, i, gain, dt):
-    """thetahat' = P{gain Omega eps}, by a step of dt s [Zhang2005, sec. IV]; returns the step."""
-    th = fie.theta[i]
-    moved = th + dt * gain * fie.Om[i] * fie.residual[i]
-    fie.theta[i] = min(max(moved, fie.set_lo[i]), fie.set_hi[i])
+    fie.theta[i] = min(max(th + POm / S * eps, fie.set_lo[i]), fie.set_hi[i])
+    fie.P[i] = min(fie.P[i] * R / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
     return fie.theta[i] - th
 
 
@@ -491,8 +431,7 @@ def joint_least_squares(fie, forget):
         if i > 0:
             fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
         if fie.effect.regressor[i] != 0.0:
-            eps = fie.residual[i] - fie.Om[i] * total
-            total += least_squares_step(fie, i, eps, forget, fie.set_lo[i], fie.set_hi[i])
+            total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
             forget = 1.0  # once a frame
     fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
     return total
@@ -502,44 +441,31 @@ def joint_least_squares(fie, forget):
 def advance_estimator(iso, fie, bound, x, F, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
-        xhat <- x + dt (F + base + Z th) + a (xhat - x)
-        Om_pos <- a Om_pos + dt max(Z, 0)      Om_neg <- a Om_neg + dt min(Z, 0)
+        xhat <- x + dt (F + base + Z th) + a (xhat - x) + Om[k+1] (step of th)
+        Om <- a Om + dt Z      Om_pos <- a Om_pos + dt max(Z, 0)      Om_neg <- a Om_neg + dt min(Z, 0)
+        th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
 
-    x: at the start of the frame; fie.effect must be that of this frame.
+    x: at the start of the frame, as the residual eps; fie.effect must be that of this frame.
     """
+    cfg, phi, th = iso.config, fie.effect, fie.theta
     for i in range(3):
-        base = fie.effect.base[i]
-        Z = fie.effect.regressor[i]
-        th = fie.theta[i]
-        a = iso.config.a[i]
-        fie.xhat[i] = x[i] + dt * (F[i] + base + Z * th) + a * (fie.xhat[i] - x[i])
-    update_theta(iso, fie, dt)
+        effect = F[i] + phi.base[i] + phi.regressor[i] * th[i]
+        fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])
+    step = joint_least_squares(fie, cfg.forget) if cfg.shared else 0.0
     for i in range(3):
-        Z, a = fie.effect.regressor[i], iso.config.a[i]
+        a, Z = cfg.a[i], phi.regressor[i]
+        if cfg.gradient:
+            old = th[i]
+            th[i] = min(max(old + dt * cfg.gain * fie.Om[i] * fie.residual[i], fie.set_lo[i]), fie.set_hi[i])
+            step = th[i] - old
+        elif not cfg.shared:
+            step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
+        fie.Om[i] = a * fie.Om[i] + dt * Z
         fie.Om_pos[i] = a * fie.Om_pos[i] + dt * max(Z, 0.0)
         fie.Om_neg[i] = a * fie.Om_neg[i] + dt * min(Z, 0.0)
-        fie.e_eta[i] = advance_bound(fie.e_eta[i], bound.eta_bar[i] + fie.effect.e[i], a, dt)
-        fie.e_n[i] = advance_gyro(fie.e_n[i], bound.n_old[i], a)
-        fie.e[i] = fie.e_eta[i] + fie.e_n[i] + bound.n_gyro[i]
-
-
-@kernel
-def update_theta(iso, fie, dt):
-    """Correct th by the residual at the start of the frame; Om <- a Om + dt Z; xhat <- xhat + Om (step of
-    th).
-    """
-    joint = joint_least_squares(fie, iso.config.forget) if iso.config.shared else 0.0
-    for i in range(3):
-        if iso.config.gradient:
-            step = gradient_step(fie, i, iso.config.gain, dt)
-        elif iso.config.shared:
-            step = joint
-        else:
-            step = least_squares_step(
-                fie, i, fie.residual[i], iso.config.forget, fie.set_lo[i], fie.set_hi[i]
-            )
-        fie.Om[i] = iso.config.a[i] * fie.Om[i] + dt * fie.effect.regressor[i]
         fie.xhat[i] += fie.Om[i] * step
+        fie.e_lag[i] = advance_bound(fie.e_lag[i], bound.eta_bar[i] + phi.e[i], a, dt, bound.n_old[i])
+        fie.e[i] = fie.e_lag[i] + bound.n_gyro[i]
 
 
 @kernel

@@ -21,9 +21,9 @@ from beaver_ftc.scenario.declared import Declared
 
 @sized
 def frame_sums_dtype(n: int) -> np.dtype:
-    """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
+    """Means over the instants of a frame so far, n surfaces: F, G, G u, bounds; eG, eGu as in bounds.py."""
     return record(
-        f=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
+        F=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
         Gu_first=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
@@ -63,7 +63,7 @@ def prediction_dtype(n: int) -> np.dtype:
 
 
 def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) -> None:
-    """Fill the design model and the declared act; travel (2, n) rad: the stops."""
+    """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
     pred["w"] = 1.0 / declared.substeps
     pred["design"] = design_of(declared.design_model, declared.aircraft)[0]
     act, h = pred["actuators"], 1.0 / declared.rate_hz / declared.substeps
@@ -84,60 +84,48 @@ def evaluate_design(pred, meas):
 
 @kernel
 def add_to_sums(pred, bound, layout, all_types):
-    """Add this instant to the sums over the frame and, for faults of all types, to the extremes."""
-    sums, G, u = pred.sums, pred.G, pred.u
+    """Add w times this instant to the means over the frame and, for faults of all types, to the extremes."""
+    sums, G, u, w, eG = pred.sums, pred.G, pred.u, pred.w, bound.declared_errors.eG
     for i in range(3):
-        sums.f[i] += pred.f[i]
-        sums.eta_bar[i] += bound.eta_now[i]
+        sums.F[i] += w * pred.f[i]
+        sums.eta_bar[i] += w * bound.eta_now[i]
         for s in range(u.size):
-            sums.G[i, s] += G[i, s]
-            sums.Gu[i, s] += G[i, s] * u[s]
+            sums.G[i, s] += w * G[i, s]
+            sums.Gu[i, s] += w * G[i, s] * u[s]
+            sums.F[i] += w * G[i, s] * u[s]
             if bound.has_eG:
-                sums.eG[i, s] += bound.declared_errors.eG[i, s]
-                sums.eGu[i, s] += bound.declared_errors.eG[i, s] * abs(u[s])
-    if bound.error_map.one_free:
-        for j in range(bound.error_map.n_levels):
-            for i in range(3):
-                bound.extra[j, i] += pred.w * extra_bound(bound.error_map, j, i)
+                sums.eG[i, s] += w * eG[i, s]
+                sums.eGu[i, s] += w * eG[i, s] * abs(u[s])
+        if bound.error_map.one_free:
+            for j in range(bound.error_map.n_levels):
+                bound.extra[j, i] += w * extra_bound(bound.error_map, j, i)
     if all_types:
-        for s, axis in enumerate(layout.dominant_axis):
-            g = G[axis, s]
-            sums.G_min[s] = min(sums.G_min[s], g)
-            sums.G_max[s] = max(sums.G_max[s], g)
+        for s, i in enumerate(layout.dominant_axis):
+            sums.G_min[s], sums.G_max[s] = min(sums.G_min[s], G[i, s]), max(sums.G_max[s], G[i, s])
             sums.u_min[s], sums.u_max[s] = min(sums.u_min[s], u[s]), max(sums.u_max[s], u[s])
 
 
 @kernel
 def fill_means(pred, bound):
     """Fill the means over the elapsed frame: G, G u of each surface, F = f + G u, and the bound."""
-    w = pred.w
-    sums = pred.sums
-    means = pred.means
-    for i in range(3):
-        F = w * sums.f[i]
-        for s in range(pred.u.size):
-            means.G_old[i, s] = means.G[i, s]
-            means.G[i, s] = w * sums.G[i, s]
-            means.Gu[i, s] = w * sums.Gu[i, s]
-            F += means.Gu[i, s]
-        means.F[i] = F
-        bound.eta_bar[i] = w * sums.eta_bar[i]
+    sums, means = pred.sums, pred.means
+    means.G_old[:] = means.G
+    means.G[:], means.Gu[:], means.F[:], bound.eta_bar[:] = sums.G, sums.Gu, sums.F, sums.eta_bar
     means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
     means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
     if bound.has_eG:
-        bound.eG[:] = w * sums.eG
-        bound.eGu[:] = w * sums.eGu
-    if w < 1.0:
+        bound.eG[:], bound.eGu[:] = sums.eG, sums.eGu
+    if pred.w < 1.0:
         fill_change_tolerance(pred)
 
 
 @kernel
 def fill_old_effects(means):
     """Gu_old = (G_old / G) Gu, (3, n) rad/s2: the effect of each surface with G of the frame before."""
+    G_old, G, Gu = means.G_old, means.G, means.Gu
     for i in range(3):
-        for s in range(means.G_min.size):
-            ratio = means.G_old[i, s] / means.G[i, s] if means.G[i, s] != 0.0 else 0.0
-            means.Gu_old[i, s] = ratio * means.Gu[i, s]
+        for s in range(G.shape[1]):
+            means.Gu_old[i, s] = (G_old[i, s] / G[i, s] if G[i, s] != 0.0 else 0.0) * Gu[i, s]
 
 
 @kernel
@@ -148,12 +136,10 @@ def fill_change_tolerance(pred):
     are the effects of a healthy surface in the first and in the other n - 1 steps, w = 1 / n. The mean effect
     of the fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
     """
-    w, sums = pred.w, pred.sums
+    w, Gu, first = pred.w, pred.sums.Gu, pred.sums.Gu_first
     for i in range(3):
         for s in range(pred.u.size):
-            z0 = sums.Gu_first[i, s]
-            z = (sums.Gu[i, s] - z0) * w / (1.0 - w)
-            pred.means.e_Gu[i, s] = w * abs(z0 - z)
+            pred.means.e_Gu[i, s] = abs(first[i, s] - (Gu[i, s] - first[i, s]) * w / (1.0 - w))
 
 
 @kernel
@@ -171,17 +157,13 @@ def evaluate_frame(pred, bound, meas, k, dt):
 
 @kernel
 def begin_sums(pred, bound, layout, all_types, meas):
-    """Start the next frame's sums with this instant, at which the old command is still in effect."""
-    pred.x_before[:] = meas.x
-    bound.n_old[:] = bound.n_gyro
+    """Start the next frame's means with this instant, at which the old command is still in effect."""
     sums = pred.sums
-    sums.f[:], sums.eta_bar[:] = 0.0, 0.0
-    sums.G[:], sums.Gu[:] = 0.0, 0.0
+    pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
+    sums.F[:], sums.eta_bar[:], sums.G[:], sums.Gu[:], bound.extra[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    sums.eG[:], sums.eGu[:] = 0.0, 0.0
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
-    if bound.has_eG:
-        sums.eG[:], sums.eGu[:] = 0.0, 0.0
-    bound.extra[:] = 0.0
     add_to_sums(pred, bound, layout, all_types)
     sums.Gu_first[:] = sums.Gu
 
@@ -207,19 +189,13 @@ def predict_known(pred, with_faults, effectiveness, bias, with_biases):
 
     effectiveness (n,), bias (n,) rad: estimates for each surface, used if `with_faults` and `with_biases`.
     """
-    F = pred.F_known
-    means = pred.means
+    F, means = pred.F_known, pred.means
     F[:] = means.F
-    if not with_faults:
-        return
-    for s in range(effectiveness.size):
-        lost = 1.0 - effectiveness[s]
+    if with_faults:
         for i in range(3):
-            F[i] -= lost * means.Gu[i, s]
-    if with_biases:
-        for s in range(bias.size):
-            for i in range(3):
-                F[i] += means.G[i, s] * bias[s]
+            for s in range(bias.size):
+                F[i] -= (1.0 - effectiveness[s]) * means.Gu[i, s]
+                F[i] += means.G[i, s] * bias[s] if with_biases else 0.0
 
 
 @kernel

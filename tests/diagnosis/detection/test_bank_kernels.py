@@ -26,8 +26,8 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for m, decay in enumerate(np.exp(-POLES * DT)):
         w = weights(decay, frames)
         assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        assert fdi["bank"]["memory"]["mu_eta"][m] == pytest.approx(DT * w @ eta)
-        assert fdi["bank"]["memory"]["mu_n"][m] == pytest.approx((1.0 - decay) * w @ noise[:-1])
+        expected = DT * w @ eta + (1.0 - decay) * w @ noise[:-1]
+        assert fdi["bank"]["memory"]["e"][m] == pytest.approx(expected)
         whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
         assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
 

@@ -69,16 +69,6 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     assert record["memory"]["weights"].min() == -0.05
 
 
-def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
-    fdi = new_fdi()
-    fdi["bound"]["n_gyro"] = 0.1, 0.2, 0.3
-    on(detection_filters.start_fdae, fdi, np.array([1.0, 2.0, 3.0]))
-    assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["fdae"]["memory"]["mu_n"] == pytest.approx([0.1, 0.2, 0.3])
-    on(detection_filters.start_bank, fdi)
-    assert fdi["bank"]["memory"]["mu_n"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
-
-
 @pytest.mark.parametrize(
     ("authority", "filters", "score", "axis"),
     [
@@ -137,8 +127,8 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
     assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
     sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert record["memory"]["mu_eta"] == pytest.approx(sums[0])
-    assert record["memory"]["mu_n"] == pytest.approx(sums[1])
+    assert record["memory"]["e"] == pytest.approx(sums[0] + sums[1])
+    assert record["memory"]["m"] == pytest.approx(sums[1])
     assert record["output"]["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
     assert record["network"]["memory"]["weights"].any() == detected
 
@@ -148,7 +138,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record = fdi["fdae"]
     record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["mu_n"], fdi["bound"]["n_gyro"] = 0.1, 0.2
+    record["memory"]["m"], fdi["bound"]["n_gyro"] = 0.1, 0.2
     on(detection_filters.fdae_unmodelled, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
@@ -175,7 +165,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_eG):
         1,
     )
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
-    record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
+    record["sums"]["F"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
     (
         record["sums"]["eGu"],

@@ -627,16 +627,6 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])
 
 
-def test_a_loss_is_open_until_its_estimator_is_excluded():
-    fdi, _ = detector()
-    estimators, loss_estimator = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
-    estimators["excluded"][:2] = 1, 0
-    assert statistical.loss_remains(estimators, loss_estimator, 1)
-    assert statistical.loss_remains(estimators, loss_estimator, 3)
-    estimators["excluded"][1] = 1
-    assert not statistical.loss_remains(estimators, loss_estimator, 1)
-
-
 def test_what_is_just_as_much_excludes_nothing():
     """Levels are what chance may reach, and a part that is left may be all of it."""
     assert not contested(loss=1.0, step=5.0)

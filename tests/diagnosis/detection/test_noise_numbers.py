@@ -296,7 +296,7 @@ def set_up(alone, given):
     """Configure a detector by what a scenario declares."""
     declared = replace(Declared.of(Scenario.model_validate(given)), aircraft=AIRCRAFT)
     design = alone.frames[0]["prediction"]["design"]
-    statistical.configure_statistics(alone.fdi, declared.fdi, declared, design, MASS, LEVEL_FLIGHT, 50.0)
+    statistical.configure_statistics(alone.fdi, declared, design, MASS, LEVEL_FLIGHT, 50.0)
 
 
 def as_set_up(bounds):
@@ -356,9 +356,7 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    statistical.configure_statistics(
-        alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0
-    )
+    statistical.configure_statistics(alone.fdi, Declared.of(scenario), design, MASS, start, 50.0)
     total = bound_kernels.coefficient_bounds(declared_in(config, AIRCRAFT), design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]

@@ -45,7 +45,7 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.diagnosis.bounds import poles_for_delays
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared
@@ -53,11 +53,13 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 
 @kernel
-def advance_bound(e, eta, a, dt):
-    """e <- a e + dt eta: bound on a residual, rad/s, for an uncertainty within eta, rad/s2 [Zhang2005, sec.
-    IV].
+def advance_bound(e, eta, a, dt, n=0.0):
+    """a e + dt eta + (1 - a) n: bound on a residual, rad/s, a frame later [Zhang2005, sec. IV].
+
+    eta rad/s2: bound on the uncertainty; n rad/s: on the changing part of the gyro's error when the frame
+    began.
     """
-    return a * e + dt * eta
+    return a * e + dt * eta + (1.0 - a) * n
 
 
 @kernel
@@ -94,10 +96,10 @@ def published_interval(lo, hi, Z, th, e):
     return -mu, mu
 
 
-# The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu and its parts
-# rad/s; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
+# The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu rad/s, e its
+# part with a memory; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
 BANK_CONFIG_RECORD = record(n_filters=int, a=MAX_POLES)
-BANK_MEMORY_RECORD = record(mu_eta=(MAX_POLES, 3), mu_n=(MAX_POLES, 3))
+BANK_MEMORY_RECORD = record(e=(MAX_POLES, 3))
 BANK_OUTPUT_RECORD = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES)
 BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
 
@@ -114,18 +116,6 @@ def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: flo
     poles = filter_poles(config, declared)
     bank["config"]["n_filters"] = len(poles)
     bank["config"]["a"][: len(poles)] = [exp(-lam * dt) for lam in poles]
-
-
-@kernel
-def start_bank(bank, n):
-    """Start with the full bound n (3,) on the changing part of the gyros' errors."""
-    bank.memory.mu_n[: bank.config.n_filters] = n
-
-
-@kernel
-def hold_bank(bank, mu):
-    """Replace the threshold of the published filter by a constant, rad/s."""
-    bank.output.threshold[0] = mu
 
 
 @kernel
@@ -148,18 +138,17 @@ def set_directions(isolation, G):
 def update_bank(bank, bound, x, x_old, F, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
-    nu = (x - x_old) / dt - F            nu_max = eta_bar + (n + n_old) / dt
-    eps <- a eps + dt nu                 mu = mu_eta + mu_n + n
-    mu_eta <- a mu_eta + dt eta_bar      mu_n <- a mu_n + (1 - a) n_old
+    nu = (x - x_old) / dt - F     nu_max = eta_bar + (n + n_old) / dt
+    eps <- a eps + dt nu          e <- a e + dt eta_bar + (1 - a) n_old      mu = e + n
     """
+    nu, eps, mu, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
     for i in range(3):
-        bank.output.innovation[i] = (x[i] - x_old[i]) / dt - F[i]
+        nu[i] = (x[i] - x_old[i]) / dt - F[i]
         bound.nu_max[i] = bound.eta_bar[i] + (bound.n_gyro[i] + bound.n_old[i]) / dt
         for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
-            bank.output.residual[m, i] = a * bank.output.residual[m, i] + dt * bank.output.innovation[i]
-            bank.memory.mu_eta[m, i] = advance_bound(bank.memory.mu_eta[m, i], bound.eta_bar[i], a, dt)
-            bank.memory.mu_n[m, i] = advance_gyro(bank.memory.mu_n[m, i], bound.n_old[i], a)
-            bank.output.threshold[m, i] = bank.memory.mu_eta[m, i] + bank.memory.mu_n[m, i] + bound.n_gyro[i]
+            eps[m, i] = a * eps[m, i] + dt * nu[i]
+            e[m, i] = advance_bound(e[m, i], bound.eta_bar[i], a, dt, bound.n_old[i])
+            mu[m, i] = e[m, i] + bound.n_gyro[i]
 
 
 @kernel
@@ -209,36 +198,27 @@ def keep_bank_peak(bank):
 
 
 @kernel
-def fault_range(fie, i):
-    """Least and greatest acceleration of axis i, rad/s2: base + theta Z +- e, theta in its set, or no fault
-    at all.
-    """
-    base = fie.effect.base[i]
-    Z = fie.effect.regressor[i]
-    e = fie.effect.e[i]
-    at_lo = base + fie.theta_min * Z
-    at_hi = base + fie.theta_max * Z
-    lo = min(0.0, at_lo, at_hi) - e
-    hi = max(0.0, at_lo, at_hi) + e
-    return lo, hi
+def along(v, m, i, size):
+    """v_i of a vector v (3,), or, if i = 3, m' v along a direction m (3,); |m|' v if v is a `size`."""
+    if i < 3:
+        return v[i]
+    total = 0.0
+    for j in range(3):
+        total += (abs(m[j]) if size else m[j]) * v[j]
+    return total
 
 
 @kernel
-def parity_range(fie):
-    """As `fault_range`, along the direction m of the estimator."""
-    phi = fie.effect
-    base = 0.0
-    Z = 0.0
-    e = 0.0
-    for i in range(3):
-        e += abs(fie.parity_direction[i]) * phi.e[i]
-        base += fie.parity_direction[i] * phi.base[i]
-        Z += fie.parity_direction[i] * phi.regressor[i]
-    at_lo = base + fie.theta_min * Z
-    at_hi = base + fie.theta_max * Z
-    lo = min(0.0, at_lo, at_hi) - e
-    hi = max(0.0, at_lo, at_hi) + e
-    return lo, hi
+def fault_range(fie, i):
+    """Least and greatest acceleration on axis i, or along m if i = 3, rad/s2:
+
+    base + theta Z +- e,  theta in its set, or no fault at all
+    """
+    phi, m = fie.effect, fie.parity_direction
+    base, Z = along(phi.base, m, i, False), along(phi.regressor, m, i, False)
+    e = along(phi.e, m, i, True)
+    at_lo, at_hi = base + fie.theta_min * Z, base + fie.theta_max * Z
+    return min(0.0, at_lo, at_hi) - e, max(0.0, at_lo, at_hi) + e
 
 
 @kernel
@@ -248,7 +228,7 @@ def advance_reach(bank, fie, dt):
     reach_lo <- a reach_lo + dt lo      reach_hi <- a reach_hi + dt hi
     """
     for i in range(4):
-        lo, hi = fault_range(fie, i) if i < 3 else parity_range(fie)
+        lo, hi = fault_range(fie, i)
         for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
             fie.reach_lo[m, i] = a * fie.reach_lo[m, i] + dt * lo
             fie.reach_hi[m, i] = a * fie.reach_hi[m, i] + dt * hi
@@ -261,15 +241,12 @@ def is_reachable(bank, fie, shared):
     shared: the axes share one parameter; the residual along m is then tested as well.
     """
     for m in range(bank.config.n_filters):
-        eps_m, mu_m = 0.0, 0.0
-        for i in range(3):
-            eps, mu = bank.output.residual[m, i], bank.output.threshold[m, i]
-            if not fie.reach_lo[m, i] - mu <= eps <= fie.reach_hi[m, i] + mu and not fie.skip[i]:
+        for i in range(4):
+            eps = along(row_of(bank.output.residual, m), fie.parity_direction, i, False)
+            mu = along(row_of(bank.output.threshold, m), fie.parity_direction, i, True)
+            counts = not fie.skip[i] if i < 3 else shared
+            if counts and not fie.reach_lo[m, i] - mu <= eps <= fie.reach_hi[m, i] + mu:
                 return False
-            eps_m += fie.parity_direction[i] * eps
-            mu_m += abs(fie.parity_direction[i]) * mu
-        if shared and not fie.reach_lo[m, 3] - mu_m <= eps_m <= fie.reach_hi[m, 3] + mu_m:
-            return False
     return True
 
 
@@ -283,9 +260,9 @@ FDAE_NETWORK_RECORD = record(
     output=3,
 )
 
-# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; mu_eta, mu_n rad/s: its parts.
+# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; e, m: see `advance_fdae`.
 FDAE_CONFIG_RECORD = record(pole_per_s=3, a=3)
-FDAE_MEMORY_RECORD = record(xhat=3, mu_eta=3, mu_n=3)
+FDAE_MEMORY_RECORD = record(xhat=3, e=3, m=3)
 FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
 FDAE_RECORD = record(
     config=FDAE_CONFIG_RECORD,
@@ -304,21 +281,23 @@ _BETA_STEP = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control, net = declared.control, fdae["network"]
-    fdae["config"]["pole_per_s"] = declared.fdi.detection_pole_per_s
-    fdae["config"]["a"] = exp(-declared.fdi.detection_pole_per_s * (1.0 / declared.rate_hz))
-    net["config"]["gain"] = control.network_gain_per_s2
-    net["config"]["leak"] = control.network_leak_per_s
-    net["config"]["w_max"] = control.network_weight_limit_rad_s2
+    control, cfg, net = declared.control, fdae["config"], fdae["network"]["config"]
+    lam = declared.fdi.detection_pole_per_s
+    cfg["pole_per_s"], cfg["a"] = lam, exp(-lam * (1.0 / declared.rate_hz))
+    net["gain"] = control.network_gain_per_s2
+    net["leak"] = control.network_leak_per_s
+    net["w_max"] = control.network_weight_limit_rad_s2
 
 
 @kernel
-def fill_gaussians(z, n, first, out):
-    """Fill out from `first` on with exp(-(z - j)^2 / 2), j = 0, 1, ...; return the sum of their squares.
+def fill_gaussians(v, c0, dc, n, first, out):
+    """Fill out from `first` on with exp(-(z - j)^2 / 2), j < n; return the sum of their squares.
 
+    z = (v - c0) / dc: place of v among n centres from c0 on, dc apart; outside them the nearest edge answers.
     The ratio of a value and the one before is exp(z - j - 1/2). The ratio of two successive ratios is 1 / e.
     So two exponentials are enough for all values.
     """
+    z = min(max((v - c0) / dc, 0.0), n - 1.0)
     g = np.exp(-0.5 * z * z)
     ratio = np.exp(z - 0.5)
     total = 0.0
@@ -334,11 +313,12 @@ def fill_gaussians(z, n, first, out):
 def fill_basis(alpha, beta, out):
     """Fill out (N_BASIS,) with Phi, the normalised radial basis functions at (alpha, beta), rad.
 
-    Each width equals the spacing of its centres; outside the grid the nearest edge answers.
+    Each width equals the spacing of its centres.
     """
-    za = min(max((alpha - _ALPHA_0) / _ALPHA_STEP, 0.0), _N_ALPHA - 1.0)
-    zb = min(max((beta - _BETA_0) / _BETA_STEP, 0.0), _N_BETA - 1.0)
-    norm = np.sqrt(fill_gaussians(za, _N_ALPHA, 0, out) + fill_gaussians(zb, _N_BETA, _N_ALPHA, out))
+    norm = np.sqrt(
+        fill_gaussians(alpha, _ALPHA_0, _ALPHA_STEP, _N_ALPHA, 0, out)
+        + fill_gaussians(beta, _BETA_0, _BETA_STEP, _N_BETA, _N_ALPHA, out)
+    )
     for j in range(N_BASIS):
         out[j] /= norm
 
@@ -365,36 +345,22 @@ def evaluate_network(net, alpha, beta):
 
 
 @kernel
+def train(W, Phi, a, step, W_max):
+    """W <- clip(a W + step Phi, W_max): a row of weights, and of the basis."""
+    for j in range(Phi.size):
+        W[j] = min(max(a * W[j] + step * Phi[j], -W_max), W_max)
+
+
+@kernel
 def train_network(net, eps, mu, leaks, dt):
     """W <- clip(exp(-leak dt) W + dt gain D[eps] Phi, w_max): the weights after a frame.
 
     leaks: the weights decay, because another estimate explains the fault.
     """
-    leak = np.exp(-net.config.leak * dt) if leaks else 1.0
-    W_max = net.config.w_max
+    a = np.exp(-net.config.leak * dt) if leaks else 1.0
     for i in range(3):
         step = dt * net.config.gain * beyond_bound(eps[i], mu[i])
-        for j in range(N_BASIS):
-            w = leak * net.memory.weights[i, j] + step * net.memory.Phi[j]
-            net.memory.weights[i, j] = min(max(w, -W_max), W_max)
-
-
-@kernel
-def start_fdae(fdae, n, x):
-    """Start at the first measurement x (3,): no residual, and all of the gyro's error n (3,) to come."""
-    fdae.memory.xhat[:], fdae.memory.mu_n[:] = x, n
-
-
-@kernel
-def hold_fdae(fdae, mu):
-    """Replace the threshold by a constant, rad/s."""
-    fdae.output.threshold[:] = mu
-
-
-@kernel
-def set_network(net, fhat):
-    """Replace the output of the network by that of another, fhat (3,) rad/s2."""
-    net.output[:] = fhat
+        train(row_of(net.memory.weights, i), net.memory.Phi, a, step, net.config.w_max)
 
 
 @kernel
@@ -421,35 +387,31 @@ def alarm_axis(bank, authority, alarm):
 
 @kernel
 def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
-    """Advance the FDAE and its threshold by a frame; once a fault is detected, the network learns what
-    exceeds mu.
+    """Advance the FDAE and its threshold by a frame; after detection, the network learns what exceeds mu.
 
-        xhat <- x + dt (F + fhat) + a (xhat - x)      mu as in `update_bank`
+        xhat <- x + dt (F + fhat) + a (xhat - x)      mu as in `update_bank`      m <- a m + (1 - a) n_old
 
-    F (3,) rad/s2: with the isolated fault once there is one.
+    F (3,) rad/s2: with the isolated fault once there is one. m: the part of e by the gyros' errors.
     """
+    M, mu = fdae.memory, fdae.output.threshold
     if detected:
-        train_network(fdae.network, fdae.output.residual, fdae.output.threshold, leaks, dt)
+        train_network(fdae.network, fdae.output.residual, mu, leaks, dt)
     for i in range(3):
-        F_hat = F[i] + fdae.network.output[i]
         a = fdae.config.a[i]
-        fdae.memory.xhat[i] = x[i] + dt * F_hat + a * (fdae.memory.xhat[i] - x[i])
-        fdae.memory.mu_eta[i] = advance_bound(fdae.memory.mu_eta[i], bound.eta_bar[i], a, dt)
-        fdae.memory.mu_n[i] = advance_gyro(fdae.memory.mu_n[i], bound.n_old[i], a)
-        fdae.output.threshold[i] = fdae.memory.mu_eta[i] + fdae.memory.mu_n[i] + bound.n_gyro[i]
+        M.xhat[i] = x[i] + dt * (F[i] + fdae.network.output[i]) + a * (M.xhat[i] - x[i])
+        M.e[i] = advance_bound(M.e[i], bound.eta_bar[i], a, dt, bound.n_old[i])
+        M.m[i] = advance_gyro(M.m[i], bound.n_old[i], a)
+        mu[i] = M.e[i] + bound.n_gyro[i]
 
 
 @kernel
 def fdae_unmodelled(fdae, n, out):
-    """out = fhat + Lambda0 D[eps0], (3,) rad/s2: the acceleration that the FDAE estimates in addition to the
-    model.
+    """out = fhat + Lambda0 D[eps0], (3,) rad/s2: estimated acceleration in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. The dead zone is what the gyro's error alone explains: it
-    stays out of the estimate, and off the surfaces.
+    weights, at the bandwidth of the estimator. The dead zone m + n is what the gyro's error alone explains:
+    it stays out of the estimate, and off the surfaces.
     """
     for i in range(3):
-        mu_n = fdae.memory.mu_n[i] + n[i]
-        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * beyond_bound(
-            fdae.output.residual[i], mu_n
-        )
+        eps = beyond_bound(fdae.output.residual[i], fdae.memory.m[i] + n[i])
+        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * eps

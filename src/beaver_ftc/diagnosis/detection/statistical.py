@@ -28,7 +28,6 @@ Symbols of the kernels:
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
-from collections.abc import Iterator
 from math import exp, hypot, sqrt
 from statistics import NormalDist
 from sys import float_info
@@ -99,7 +98,7 @@ from beaver_ftc.diagnosis.gusts import (
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
+from beaver_ftc.scenario.diagnosis import Statistical
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
@@ -130,27 +129,20 @@ def hypotheses_by_block(
     aircraft: Aircraft,
 ) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
-    are held against. Roll and yaw are there twice, see above.
-    """
-    pitch = (*_loss_rows(aircraft, PITCH_AXES), *_step_rows(PITCH_AXES), (ALPHA_CUBED_MOMENT, -1, 1, 0))
-    lateral = (*_loss_rows(aircraft, LATERAL_AXES), *_step_rows(LATERAL_AXES))
-    pitch, lateral = ((*rows, *_growing_rows(rows)) for rows in (pitch, lateral))
-    return ((PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral))
-
-
-def _loss_rows(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
-    for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if name in aircraft.class_of_losses and axis in axes:
-            yield LOSS, s, axis, 1
-
-
-def _growing_rows(rows: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
-    losses = [(s, axis) for kind, s, axis, _ in rows if kind == LOSS]
-    return ((kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END))
-
-
-def _step_rows(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
-    return ((STEP_FAULT, -1, axis, 1) for axis in axes)
+    are held against. Roll and yaw are there twice, see above."""
+    blocks = []
+    for axes in (PITCH_AXES, LATERAL_AXES, LATERAL_AXES):
+        losses = [
+            (s, axis)
+            for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
+            if name in aircraft.class_of_losses and axis in axes
+        ]
+        rows = [(LOSS, s, axis, 1) for s, axis in losses]
+        rows += [(STEP_FAULT, -1, axis, 1) for axis in axes]
+        rows += [(ALPHA_CUBED_MOMENT, -1, 1, 0)] if axes == PITCH_AXES else []
+        rows += [(kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END)]
+        blocks.append((axes, tuple(rows)))
+    return tuple(blocks)
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
@@ -186,7 +178,6 @@ def derive_margin(p: float, rate_hz: float, aircraft: Aircraft) -> float:
 
 def configure_statistics(
     fdi: np.void,
-    fdi_config: FdiConfig,
     declared: Declared,
     model: np.void,
     mass: MassProperties,
@@ -194,7 +185,7 @@ def configure_statistics(
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
-    stat, settings = fdi["statistical"], fdi_config.statistical
+    stat, settings = fdi["statistical"], declared.fdi.statistical
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
@@ -207,18 +198,16 @@ def configure_statistics(
     stat["forces"]["in_use"] = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust(gust, declared, mass)
-    views = fdi_config.compares_across(n_instants)
+    views = declared.fdi.compares_across(n_instants)
     n_tests = count_tests(
         aircraft, *(list_directions(aircraft, declared.uses_accelerometers) if views else ())
     )
-    _configure_levels(cfg, fdi_config, aircraft, n_tests, rate_hz)
+    _configure_levels(cfg, declared, n_tests, rate_hz)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
-    _configure_blocks(stat, errors, aircraft)
-    _configure_growth(stat, fdi_config, declared, rate, dt_s)
+    tol = coefficient_bounds(declared, model, mass, *trim[1:])
+    _configure_blocks(stat, declared, tol, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
     _configure_noise(stat, drift_frequency(settings, aircraft), declared, model, trim, dt_s)
-    tol = coefficient_bounds(declared, model, mass, *trim[1:])
-    _configure_tolerances(stat, aircraft, tol)
     configure_readings(stat, errors, fdi["bound"]["declared_errors"])
     if views:
         configure_tones(
@@ -243,15 +232,13 @@ def configure_statistics(
         add_gust_noise(stat, errors, model, *trim[1:], dt_s)
 
 
-def _configure_levels(
-    cfg: np.void, fdi_config: FdiConfig, aircraft: Aircraft, n_tests: int, rate_hz: float
-) -> None:
+def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: float) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings = fdi_config.statistical
+    settings, aircraft = declared.fdi.statistical, declared.aircraft
     assert settings is not None
     cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
     cfg["margin"] = derive_margin(settings.misnaming, rate_hz, aircraft)
-    cfg["forget"] = exp(-1.0 / (rate_hz * fdi_config.forgetting_time_s))
+    cfg["forget"] = exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s))
     cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
 
 
@@ -270,37 +257,42 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
     """Fill the correlation length of the drift, m, of the block whose drift reverts to its mean and, where no
     vane measures the gust, of the pitch block; fill how much of a gust's drift each of them then has."""
     cfg, out = stat["gust"]["config"], stat["gust"]["output"]
-    reverting, pitch = stat["block"][-1], stat["block"][likelihood.PITCH_BLOCK]
-    roll_m = float(cfg["L_roll"]) if out["gusty"] else 0.0
-    gusts_m = rotation_lengths(cfg["span"]) if cfg["coarse_only"] else [roll_m]
-    reverting["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(min(gusts_m)))
-    if not out["gusty"]:
-        return
-    reverting["Q_scale"] = (roll_m / reverting["drift_correlation_length_m"]) ** 2
-    if out["measured"]:
-        return
-    pitch_m = float(rotation_lengths(cfg["span"])[1])
-    pitch["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, pitch_m)
-    pitch["Q_scale"] = (pitch_m / pitch["drift_correlation_length_m"]) ** 2
+    roll_m, rotations_m = float(cfg["L_roll"]) if out["gusty"] else 0.0, rotation_lengths(cfg["span"])
+    lengths = [(stat["block"][-1], min(rotations_m) if cfg["coarse_only"] else roll_m, roll_m)]
+    if out["gusty"] and not out["measured"]:
+        lengths.append((stat["block"][likelihood.PITCH_BLOCK], rotations_m[1], rotations_m[1]))
+    for b, longest_m, gust_m in lengths:
+        b["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(longest_m))
+        if out["gusty"]:
+            b["Q_scale"] = (gust_m / b["drift_correlation_length_m"]) ** 2
 
 
-def _configure_blocks(stat: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
-    wanted = hypotheses_by_block(aircraft)
+def _configure_blocks(stat: np.void, declared: Declared, tol: np.ndarray, rate: float, dt_s: float) -> None:
+    """Fill axes and hypotheses of each block, its level, and the tolerances tol of its unknown constants.
+
+    rate: largest change of the bounded uncertainty within a frame, over its bound. A loss that is declared
+    constant does not grow.
+    """
+    aircraft, cfg = declared.aircraft, stat["test"]
     losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
-    stat["test"]["n_scores"] = len(losses) + len(AXES)
-    for b, (axes, rows) in zip(stat["block"], wanted, strict=True):
-        b["n"], b["n_h"] = len(axes), len(rows)
-        b["n_Z"] = sum(moment_axis(term) in axes for term in aircraft.moments)
-        b["a"], b["Q_scale"] = 1.0, 1.0
+    left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
+    cfg["n_scores"], cfg["regress"] = len(losses) + len(AXES), bool(np.any(tol))
+    for b, (axes, all_rows) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
+        own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
+        b["n"], b["n_Z"], b["tol"][: len(own)] = len(axes), len(own), tol[own]
+        b["a"], b["Q_scale"], b["eta_rate"] = 1.0, 1.0, rate
+        b["alarm_level"] = cfg["alarm_level"]
+        b["noise_share"] = 0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE
         for i, axis in enumerate(axes):
             b["axes"][i] = axis
-            R = max(errors[AXES[axis]].random, MIN_GYRO_STD_RAD_S) ** 2
+            R = max(declared.sensors[AXES[axis]].random, MIN_GYRO_STD_RAD_S) ** 2
             b["R_y"][i] = b["P_xx"][i, i] = R
             b["P_dd"][i, i] = likelihood.DRIFT_PRIOR_RAD_S2**2
+        rows = [row for row in all_rows if row[0] not in left_out]
+        b["n_h"], b["hypothesis"]["decay"] = len(rows), exp(-KAPPA_PER_S * dt_s)
         likelihood.set_signs(b, [kind for kind, *_ in rows])
         for h, (kind, s, axis, alarms) in zip(b["hypothesis"], rows, strict=False):
-            h["kind"], h["surface"] = kind, s
-            h["axis"], h["alarms"] = axis, alarms
+            h["kind"], h["surface"], h["axis"], h["alarms"] = kind, s, axis, alarms
             h["column"] = losses.index(s) if kind == LOSS else len(losses) + axis
 
 
@@ -329,37 +321,19 @@ def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
     )
 
 
-def _configure_growth(
-    stat: np.void, fdi_config: FdiConfig, declared: Declared, rate: float, dt_s: float
-) -> None:
-    """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
-    not grow."""
-    noise_free = declared.is_noise_free
-    for b in stat["block"]:
-        b["alarm_level"] = stat["test"]["alarm_level"]
-        b["noise_share"] = 0.0 if noise_free else LEVEL_NOISE_SHARE
-        b["eta_rate"] = rate
-        kinds = b["hypothesis"]["kind"][: b["n_h"]]
-        if fdi_config.fault_profile == "abrupt":
-            b["n_h"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
-        b["hypothesis"]["decay"] = exp(-KAPPA_PER_S * dt_s)
-
-
 def _configure_noise(
     stat: np.void, omega: float, declared: Declared, model: np.void, trim: TrimState, dt_s: float
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
     u."""
-    sigma = declared.sensors.each("random")
-    sigma_x = float(sigma[:3].max())
-    eta = max(declared.constant_rad_s2)
-    level = float(stat["test"]["alarm_level"])
-    stat["noise"]["q"] = derive_intensity(eta, omega, sigma_x, level, dt_s)
+    sigma, noise = declared.sensors.each("random"), stat["noise"]
+    eta, level = max(declared.constant_rad_s2), float(stat["test"]["alarm_level"])
+    noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
-    stat["noise"]["Q0"] = F_x**2 @ sigma[:3] ** 2
+    noise["Q0"] = F_x**2 @ sigma[:3] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `add_readings` says
-    stat["noise"]["Q"] = stat["noise"]["Q0"] + Q_y
-    stat["noise"]["eta_u"] = np.abs(G).sum(axis=1) * declared.deflection_rad
+    noise["Q"] = noise["Q0"] + Q_y
+    noise["eta_u"] = np.abs(G).sum(axis=1) * declared.deflection_rad
 
 
 def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
@@ -400,15 +374,6 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
     return min(V * tau, gust_m or np.inf)
 
 
-def _configure_tolerances(stat: np.void, aircraft: Aircraft, tol: np.ndarray) -> None:
-    """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
-    axis = np.array([moment_axis(term) for term in aircraft.moments])
-    for b, axes in zip(stat["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
-        own = tol[np.isin(axis, axes)]
-        b["tol"][: own.size] = own
-    stat["test"]["regress"] = bool(np.any(tol))
-
-
 def configure_readings(stat: np.void, errors: SensorErrors, err: np.void) -> None:
     """Add the readings of the air data to the regressors of the blocks; err: of `errors_dtype`."""
     tol = np.zeros(N_INPUT_READINGS)
@@ -440,27 +405,35 @@ def fill_signal_slopes(tab, err, y, j, ds):
         for k in range(PH, RH + 1):
             ds[k] = -tab.signal[k] / y[AIRSPEED]
     if err.engine and j >= AIRSPEED:
-        by_V, by_q, by_kw = slipstream_slopes(y, err.kw1)
-        other = by_q if j == QDYN else by_kw
-        ds[_DPT] = by_V if j == AIRSPEED else other
+        ds[_DPT] = slipstream_slopes(y, err.kw1)[j - AIRSPEED]  # the readings from airspeed on, in this order
+
+
+@kernel
+def accelerate(model, L, M, N):
+    """(Pl L + Pn N, Qm M, Rl L + Rn N), rad/s2, by moments in N m."""
+    return model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N
+
+
+@kernel
+def add_row(b, k, w, F):
+    """Z_k <- Z_k + w F on the axes of block b; F (3,) rad/s2 per unit."""
+    for i, axis in enumerate(b.axes[: b.n]):
+        b.regressor[k, i] += w * F[axis]
 
 
 @kernel
 def fill_slopes(model, y, u, j, dm, dF):
     """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
 
-    L, M, N = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
-    dF = (Pl L + Pn N, Qm M, Rl L + Rn N)
+    (L, M, N) = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
     """
-    tab, qS = model.moments, y[QDYN] * model.S
+    tab, q = model.moments, y[QDYN]
     for i in range(3):
-        dF[i] = whole_sum(tab, i, dm, u)
+        C = whole_sum(tab, i, dm, u)
         if j == QDYN:
-            dF[i] += whole_sum(tab, i, tab.power, u) / y[QDYN]
-    L = qS * model.b * dF[0]
-    M = qS * model.c * dF[1]
-    N = qS * model.b * dF[2]
-    (dF[0], dF[1], dF[2]) = (model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N)
+            C += whole_sum(tab, i, tab.power, u) / q
+        dF[i] = q * model.S * (model.c if i == 1 else model.b) * C
+    dF[0], dF[1], dF[2] = accelerate(model, dF[0], dF[1], dF[2])
 
 
 @kernel
@@ -471,8 +444,7 @@ def add_readings(w, noise, blocks, err, model, y, u):
 
     sigma (readings,): noise of the readings. The terms of `model.moments` are evaluated at this instant.
     """
-    tab = model.moments
-    dF = noise.dF
+    tab, dF = model.moments, noise.dF
     noise.Q[:] = noise.Q0
     for j in range(N_INPUT_READINGS):
         fill_signal_slopes(tab, err, y, j, noise.ds)
@@ -480,12 +452,8 @@ def add_readings(w, noise, blocks, err, model, y, u):
         fill_slopes(model, y, u, j, noise.dm, dF)
         for i in range(3):
             noise.Q[i] += (dF[i] * noise.sigma[j]) ** 2
-        pitch = blocks[likelihood.PITCH_BLOCK]
-        pitch.regressor[pitch.n_Z - N_INPUT_READINGS + j, 0] += w * dF[1]
-        for b in blocks[LATERAL_BLOCK:]:
-            k = b.n_Z - N_INPUT_READINGS + j
-            b.regressor[k, 0] += w * dF[0]
-            b.regressor[k, 1] += w * dF[2]
+        for b in blocks:
+            add_row(b, b.n_Z - N_INPUT_READINGS + j, w, dF)
 
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
@@ -647,12 +615,6 @@ def write_scores(cfg, blocks, views, forces, gust, row):
 
 
 @kernel
-def loss_remains(fies, of, s):
-    """True if a loss of this surface has not been excluded."""
-    return of[s] < 0 or not fies[of[s]].excluded
-
-
-@kernel
 def best_alternative(b, fies, of, s, revived=False):
     """max_h lo_h over all alternatives h to the loss of surface s in block b.
 
@@ -663,8 +625,8 @@ def best_alternative(b, fies, of, s, revived=False):
     for h in b.hypothesis[: b.n_h]:
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
-        other = h.surface
-        if h.kind != LOSS or (other != s and (revived or loss_remains(fies, of, other))):
+        j = of[h.surface]
+        if h.kind != LOSS or (h.surface != s and (revived or j < 0 or not fies[j].excluded)):
             lo = max(lo, h.llr_lo)
     return lo
 
@@ -801,31 +763,28 @@ def fill_noise(noise, blocks, gust, bound, model, meas, dt):
     eta = published bound + eta_u + mapped error
     Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      Q_x = Q      a = exp(-dt V / length)
     """
-    eta, V = noise.eta, meas.y[AIRSPEED]
+    eta, emap, V, gusty = noise.eta, bound.error_map, meas.y[AIRSPEED], gust.output.gusty
     eta[:] = 0.0
     add_published_bound(
         meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
-    mapped = bound.error_map.n_boxes > 0
     for i in range(3):
         eta[i] += noise.eta_u[i]
-        if mapped:
-            eta[i] += min(bound.error_map.e_now[i], OFF_MAP_RAD_S2)
-        if bound.error_map.one_free:
-            noise.eta_free[i] = extra_bound(bound.error_map, bound.error_map.n_levels - 1, i)
+        if emap.n_boxes > 0:
+            eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
+        if emap.one_free:
+            noise.eta_free[i] = extra_bound(emap, emap.n_levels - 1, i)
     for k, b in enumerate(blocks):
+        reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
-                b.Q_d[i, j] = 0.0
-                if gust.output.gusty:
-                    q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], k == likelihood.REVERTING_BLOCK)
-                    b.Q_d[i, j] = b.Q_scale * q_gust
-            eta_min = max(eta[axis], likelihood.MIN_ETA_RAD_S2)
-            q_eta = noise.q * eta_min * eta_min
+                q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
+                b.Q_d[i, j] = b.Q_scale * q_gust
+            q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta
             b.calm.Q_d[i, i] = q_eta
             b.Q_x[i] = b.calm.Q_x[i] = noise.Q[axis]
-        b.a = np.exp(-dt * V / b.drift_correlation_length_m) if b.drift_correlation_length_m > 0.0 else 1.0
+        b.a = np.exp(-dt * V / length) if length > 0.0 else 1.0
 
 
 @kernel
@@ -836,20 +795,12 @@ def add_coefficients(w, z, blocks, model, y, u):
     """
     tab = model.moments
     regressors(tab, tab.power, u, z)
-    qS = w * y[QDYN] * model.S
-    qSb = qS * model.b
-    qSc = qS * model.c
-    pitch = blocks[likelihood.PITCH_BLOCK]
-    k = tab.free_from[1]
-    for j in range(tab.surface_to[1] - k):
-        pitch.regressor[j, 0] += model.Qm * qSc * z[k + j]
-    for b in blocks[LATERAL_BLOCK:]:
-        n, k = tab.surface_to[0], tab.free_from[2]
-        for j in range(n):
-            L = qSb * z[j]
-            b.regressor[j, 0] += model.Pl * L
-            b.regressor[j, 1] += model.Rl * L
-        for j in range(tab.surface_to[2] - k):
-            N = qSb * z[k + j]
-            b.regressor[n + j, 0] += model.Pn * N
-            b.regressor[n + j, 1] += model.Rn * N
+    for b in blocks:
+        k = 0
+        for axis in b.axes[: b.n]:
+            qSl = y[QDYN] * model.S * (model.c if axis == 1 else model.b)
+            for j in range(tab.free_from[axis], tab.surface_to[axis]):
+                M = qSl * z[j]
+                F = accelerate(model, M * (axis == 0), M * (axis == 1), M * (axis == 2))
+                add_row(b, k, w, F)
+                k += 1

@@ -73,9 +73,10 @@ def skip_substep(fdi, prediction, measured):
 
 @kernel
 def start_filters(fdi, x):
-    """Begin the detection filters at the first measurement x (3,) rad/s."""
-    filters.start_fdae(fdi.fdae, fdi.bound.n_gyro, x)
-    filters.start_bank(fdi.bank, fdi.bound.n_gyro)
+    """Begin the detection filters at the first measurement x (3,), all of the gyros' errors to come."""
+    memory, n = fdi.fdae.memory, fdi.bound.n_gyro
+    memory.xhat[:], memory.e[:], memory.m[:] = x, n, n
+    fdi.bank.memory.e[: fdi.bank.config.n_filters] = n
 
 
 @kernel
@@ -455,7 +456,8 @@ def plugin_update(fdi, prediction, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
     filters.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
-    isolation.set_theta(fdi.isolation, fdi.verdict.isolated_estimator, fdi.plugin_verdict.theta)
+    if fdi.verdict.isolated_estimator >= 0:
+        fdi.isolation.estimator[fdi.verdict.isolated_estimator].theta[:] = fdi.plugin_verdict.theta
     if fdi.verdict.detected:
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 

@@ -18,11 +18,11 @@ part.
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, kernel, record, row_of
 from beaver_ftc.design.model import ALPHA, BETA
-from beaver_ftc.diagnosis import conclusion, isolation
+from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.detection import filters
-from beaver_ftc.diagnosis.detection.filters import fill_gaussians, set_network
+from beaver_ftc.diagnosis.detection.filters import fill_gaussians, train
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin_scheme
@@ -53,13 +53,14 @@ PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_
 
 def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarray) -> None:
     """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
-    net["config"]["gain"], net["config"]["w_max"] = gain, W_max
+    cfg = net["config"]
+    cfg["gain"], cfg["w_max"] = gain, W_max
     for i in range(3):
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
         for j, centres in enumerate(
             (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES_RAD_S, deflections)
         ):
-            (net["config"]["c0"][i, j], net["config"]["dc"][i, j]) = (centres[0], centres[1] - centres[0])
+            cfg["c0"][i, j], cfg["dc"][i, j] = centres[0], centres[1] - centres[0]
 
 
 def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
@@ -68,19 +69,17 @@ def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) 
     """
     config, dt, iso = declared.fdi, 1.0 / declared.rate_hz, fdi["isolation"]
     options, pub = settings(DETECTORS, config.scheme, config.options), fdi["published"]
+    cfg = iso["config"]
     pub["config"]["waits"] = options["dead_zone"]
     W_max = options["network_limit_rad_s2"] if options["projection"] else np.inf
     configure_network(pub["network"], options["network_gain"], W_max, travel[:, fdi["layout"]["main"]])
     fdi["fdae"]["config"]["a"] = fdi["bank"]["config"]["a"][0] = euler_decay(config.detection_pole_per_s, dt)
-    iso["config"]["a"] = euler_decay(config.isolation_pole_per_s, dt)
-    iso["config"]["gradient"], iso["config"]["gain"] = (1, options["adaptation_gain"])
+    cfg["a"] = euler_decay(config.isolation_pole_per_s, dt)
+    cfg["gradient"], cfg["gain"] = 1, options["adaptation_gain"]
     iso["estimator"]["theta"] = options["initial_theta"]
-    iso["config"]["free"] = not options["projection"]
+    cfg["free"] = not options["projection"]
     if not options["adaptive_threshold"]:
-        pub["config"]["mu0"], iso["config"]["mu_kind"] = (
-            options["constant_threshold_rad_s"],
-            CONSTANT_THRESHOLD,
-        )
+        pub["config"]["mu0"], cfg["mu_kind"] = options["constant_threshold_rad_s"], CONSTANT_THRESHOLD
     if options["leave_out"]:
         iso["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
 
@@ -93,10 +92,10 @@ def euler_decay(lam: float, dt_s: float) -> float:
 @kernel
 def fill_input_basis(net, i, j, n, v):
     """part[j, k] = exp(-(z - k)^2 / 2) / |.|, z = (v - c0) / dc: Gaussians of input j of axis i at v."""
-    z = min(max((v - net.config.c0[i, j]) / net.config.dc[i, j], 0.0), n - 1.0)
-    norm = np.sqrt(fill_gaussians(z, n, 0, net.memory.part[j]))
+    part = row_of(net.memory.part, j)
+    norm = np.sqrt(fill_gaussians(v, net.config.c0[i, j], net.config.dc[i, j], n, 0, part))
     for k in range(n):
-        net.memory.part[j, k] /= norm
+        part[k] /= norm
 
 
 @kernel
@@ -124,29 +123,18 @@ def evaluate_state_network(net, main, x, y, u):
 def train_state_network(net, eps, dt):
     """th <- clip(th + dt Gamma Z eps, w_max), Z: the basis as it was evaluated; eps (3,) rad/s."""
     for i in range(3):
-        for n in range(N_NODES):
-            w = net.memory.weights[i, n] + dt * net.config.gain * net.memory.basis[i, n] * eps[i]
-            net.memory.weights[i, n] = min(max(w, -net.config.w_max), net.config.w_max)
+        step = dt * net.config.gain * eps[i]
+        train(row_of(net.memory.weights, i), row_of(net.memory.basis, i), 1.0, step, net.config.w_max)
 
 
 @kernel
 def train_if_due(pub, fdae, detected, dt):
-    """The FDAE's network learns from the residual the frame began with, once a fault is detected.
+    """The FDAE's network learns once a fault is detected, from residuals outside the threshold.
 
     Without the dead zone it learns from the first frame on, with any residual.
     """
-    outside = False
-    for i in range(3):
-        outside = outside or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
-    if not pub.config.waits or (detected and outside):
+    if not pub.config.waits or (detected and fdae_axis(fdae) >= 0):
         train_state_network(pub.network, fdae.output.residual, dt)
-
-
-@kernel
-def update_network(pub, fdae, main, x, y, u):
-    """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
-    evaluate_state_network(pub.network, main, x, y, u)
-    set_network(fdae.network, pub.network.output)
 
 
 @kernel
@@ -161,21 +149,15 @@ def fdae_axis(fdae):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
-    pub, bound, dt = fdi.published, fdi.bound, fdi.config.dt
+    pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    filters.advance_fdae(fdi.fdae, bound, prediction.x_before, prediction.means.F, False, False, dt)
-    if pub.config.mu0 > 0.0:
-        hold_thresholds(fdi, pub.config.mu0)
-
-
-@kernel
-def hold_thresholds(fdi, mu):
-    """Replace all adaptive thresholds by a constant, rad/s."""
-    filters.hold_fdae(fdi.fdae, mu)
-    filters.hold_bank(fdi.bank, mu)
-    isolation.hold_isolation(fdi.isolation, mu)
+    filters.advance_fdae(fdi.fdae, fdi.bound, prediction.x_before, prediction.means.F, False, False, dt)
+    if mu > 0.0:
+        fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
+        for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+            fie.e[:] = mu
 
 
 @apart
@@ -183,10 +165,11 @@ def update_verdict(fdi, prediction, measured, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    before, found = fdi.verdict.detected, fdi.verdict
+    before, found, net = fdi.verdict.detected, fdi.verdict, fdi.published.network
     filters.fdae_residual(fdi.fdae, measured.x)
     axis = fdae_axis(fdi.fdae)
-    update_network(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
+    evaluate_state_network(net, fdi.layout.main, measured.x, measured.y, prediction.u)
+    fdi.fdae.network.output[:] = net.output
     if axis >= 0:
         conclusion.latch_alarm(found, axis, t)
     if found.detected:

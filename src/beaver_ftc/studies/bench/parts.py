@@ -29,7 +29,7 @@ def flying(value, ground_m, slow_mps):
     return 0
 
 
-def unlimited(bound, eta_bar, decay, dt):
+def unlimited(e, eta, a, dt, n=0.0):
     """Stands in for `filters.advance_bound`."""
     return UNLIMITED_RAD_S
 

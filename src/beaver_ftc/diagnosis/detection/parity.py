@@ -58,7 +58,7 @@ tests of tones k is a frequency, t their record, c their configuration.
     b, f        block of a view; record of a force; `rates`: block of the rates that the view combines
     nu          innovation of the rates (3,), rad/s2
     L           acceleration per rad/s of rotation of the air, 1/s
-    N, R        (2, N_TONES), (n_Z, 2, N_TONES): sums as above, real and imaginary part
+    N, R        sums as above, (N_TONES,) and (n_Z, N_TONES) complex
     z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
     cfg         configuration of the statistical tests
 """
@@ -110,8 +110,7 @@ MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
 TONE_RECORD = record(
     V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
     stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
-    # decay of a sum in an update; cos and sin of w dt; of an update, times a, of w and of 2 w
-    a=float, z=(2, N_TONES), rho=(2, N_TONES), rho2=(2, N_TONES),
+    a=float, z=(complex, N_TONES), rho=(complex, N_TONES), rho2=(complex, N_TONES),  # a: decay in an update
     # largest mean of cos(w t) d(t) for |d| <= 1; share of the larger of the variances of N's two parts
     c=N_TONES, v_share=N_TONES,
 )  # fmt: skip
@@ -122,10 +121,10 @@ def tones_dtype(n_Z: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
         n_new=int, sum_g=float, sum_Z=n_Z,  # frames since the last update; sums of g and g_Z over sqrt(S)
-        correlation=(2, N_TONES), R=(n_Z, 2, N_TONES),  # N and R_j: real and imaginary parts
+        N=(complex, N_TONES), R=(complex, n_Z, N_TONES),
         # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
         # filtered bound, and over its component at twice the frequency
-        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(2, N_TONES),
+        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(complex, N_TONES),
         D=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
     )  # fmt: skip
@@ -157,9 +156,9 @@ def update_tones(view, c, level, inside, with_Z, dt):
     t.n_new += 1
     if t.n_new < c.stride:
         return
-    resonate(c, t.correlation, t.sum_g)
+    resonate(t.N, c.rho, t.sum_g)
     for j in range(n_Z):
-        resonate(c, t.R[j], t.sum_Z[j])
+        resonate(t.R[j], c.rho, t.sum_Z[j])
         t.sum_Z[j] = 0.0
     t.D = c.a * c.a * t.D + t.n_new
     update_tone_eta(t, c, b, weight * view.eta[0], dt)
@@ -169,27 +168,21 @@ def update_tones(view, c, level, inside, with_Z, dt):
 
 
 @kernel
-def resonate(c, N, v):
-    """N <- rho N + v at each frequency: an update of N (2, N_TONES), real and imaginary part, by v."""
-    rho = c.rho
-    for j in range(N.shape[1]):
-        re = N[0, j]
-        im = N[1, j]
-        N[0, j] = rho[0, j] * re - rho[1, j] * im + v
-        N[1, j] = rho[1, j] * re + rho[0, j] * im
+def resonate(N, rho, v):
+    """N <- rho N + v at each frequency; N, rho (N_TONES,) complex."""
+    for k in range(N.size):
+        N[k] = rho[k] * N[k] + v
 
 
 @kernel
-def tone_gain(K_x, K_d, a, cos, sin, dt):
+def tone_gain(K_x, K_d, a, z, dt):
     """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
 
-    g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
-    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = cos + i sin = exp(i w dt)
+        g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
+        |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
+
     """
-    q = (cos - a) * (cos - a) + sin * sin
-    re = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - a) / q
-    im = sin * (1.0 - K_x) - (dt * K_d * sin / q)
-    return dt / np.sqrt(re * re + im * im)
+    return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
 
 
 @kernel
@@ -201,19 +194,11 @@ def update_tone_eta(t, c, b, eta, dt):
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
-    rho2 = c.rho2
-    a = c.a
-    v = eta * t.n_new
-    for j in range(t.eta.size):
-        cos = c.z[0, j]
-        sin = c.z[1, j]
-        Wv = v * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, cos, sin, dt)
-        re = t.b_2[0, j]
-        im = t.b_2[1, j]
-        t.b_2[0, j] = rho2[0, j] * re - rho2[1, j] * im + Wv
-        t.b_2[1, j] = rho2[1, j] * re + rho2[0, j] * im
-        t.b_0[j] = a * t.b_0[j] + Wv
-        t.eta[j] = c.c[j] * (t.b_0[j] + np.hypot(t.b_2[0, j], t.b_2[1, j]))
+    for k in range(t.eta.size):
+        v = eta * t.n_new * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
+        t.b_0[k] = c.a * t.b_0[k] + v
+        t.b_2[k] = c.rho2[k] * t.b_2[k] + v
+        t.eta[k] = c.c[k] * (t.b_0[k] + abs(t.b_2[k]))
 
 
 @kernel
@@ -224,12 +209,9 @@ def bound_coefficients(t, tol, n_Z):
     """
     t.e_R[:] = 0.0
     for j in range(n_Z):
-        R = t.R[j]
-        tol_j = tol[j]
         for k in range(t.e_R.size):
-            re = abs(R[0, k])
-            im = abs(R[1, k])
-            t.e_R[k] += tol_j * (max(re, im) + 0.41421356237309515 * min(re, im))
+            x, y = abs(t.R[j, k].real), abs(t.R[j, k].imag)
+            t.e_R[k] += tol[j] * (max(x, y) + 0.41421356237309515 * min(x, y))
 
 
 @kernel
@@ -237,9 +219,9 @@ def score_tones(t, c, level):
     """Fill `score`, the largest over the frequencies: |N| - e_R over noise and eta, scaled to the level."""
     score = 0.0
     for k in range(t.e_R.size):
-        evidence = np.hypot(t.correlation[0, k], t.correlation[1, k]) - t.e_R[k]
-        v = c.v_share[k] * t.D
-        score = max(score, evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, evidence, t.eta[k], v))
+        N = abs(t.N[k]) - t.e_R[k]
+        ratio = evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, N, t.eta[k], c.v_share[k] * t.D)
+        score = max(score, ratio)
     t.score = score * level / c.alarm_level
 
 
@@ -259,21 +241,14 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
     rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
     """
-    c["c"] = max_tone_mean(TONES_RAD_S, rate)
-    c["V_min"] = V / MAX_V_FACTOR
-    c["V_max"] = V * MAX_V_FACTOR
     stride = max(round(TONE_INTERVAL_S / dt), 1)
-    phase = TONES_RAD_S * dt
-    a = exp(-stride * dt / TONE_MEMORY_S)
-    c["stride"] = stride
-    c["a"] = a
-    c["alarm_level"] = sqrt(-2.0 * np.log(false_alarm))
-    c["z"] = np.cos(phase), np.sin(phase)
-    c["rho"] = (a * np.cos(stride * phase), a * np.sin(stride * phase))
-    c["rho2"] = (a * np.cos(2.0 * stride * phase), a * np.sin(2.0 * stride * phase))
+    z, a = np.exp(1j * TONES_RAD_S * dt), exp(-stride * dt / TONE_MEMORY_S)
+    c["V_min"], c["V_max"] = V / MAX_V_FACTOR, V * MAX_V_FACTOR
+    c["stride"], c["a"], c["alarm_level"] = stride, a, sqrt(-2.0 * np.log(false_alarm))
+    c["z"], c["rho"], c["rho2"] = z, a * z**stride, a * z ** (2 * stride)
+    c["c"] = max_tone_mean(TONES_RAD_S, rate)
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    difference = (1.0 - a**2) / np.abs(1.0 - a**2 * np.exp(2j * stride * phase))
-    c["v_share"] = 0.5 * (1.0 + difference)
+    c["v_share"] = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - (a * z**stride) ** 2)
 
 
 VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim

@@ -667,6 +667,7 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
     """Of the rate's block, then of the force, then how far the followed angle has drifted, or the column."""
     statistical, rng = viewed["statistical"], np.random.default_rng(9)
     pitch, force = statistical["block"][0], statistical["forces"]["component"][NORMAL_INDEX]
+    pitch["n"], pitch["axes"][0] = 1, PITCH
     pitch["n_Z"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n_Z"])
     view["direction"], view["col"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)

@@ -178,8 +178,8 @@ def resonate(N, rho, v):
 def tone_gain(K_x, K_d, a, z, dt):
     """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
 
-        g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
-        |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
+    g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
+    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
 
     """
     return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
@@ -304,10 +304,8 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
 def view_innovation(view, forces, gust, inertial, nu, i):
     """Component i of the innovation that a view projects, rad/s2: of the rates, nu (3,), or of a force."""
     if i < SIDE_FORCE:
-        acc = 0.0
-        if subtracts_gust(view, gust):
-            acc = gust_of_view(view, gust, inertial).output.acc_mean[i]
-        return nu[i] - acc
+        own = inertial if view.vane_free else gust
+        return nu[i] - (own.output.acc_mean[i] if subtracts_gust(view, gust) else 0.0)
     f = forces.component[i - SIDE_FORCE]
     return f.e_inertial if view.by_inertia else f.innovation
 
@@ -317,14 +315,12 @@ def column_entry(view, forces, bound, G, place):
     """Entry 0 or 1 (place) of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane_pair[place], view.nulled
     if s == VANE_VIEW:
-        entry = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
-        return entry, VANE_TOLERANCE * abs(entry)
+        g = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
+        return g, VANE_TOLERANCE * abs(g)
     if i >= SIDE_FORCE:
         f = forces.component[i - SIDE_FORCE]
-        entry = f.G_prev[s]
-        return entry, f.e_G[s]
-    e = bound.eG[i, s] if bound.has_eG else 0.0
-    return G[i, s], e
+        return f.G_prev[s], f.e_G[s]
+    return G[i, s], bound.eG[i, s] if bound.has_eG else 0.0
 
 
 @kernel
@@ -344,13 +340,11 @@ def turn_view(view, forces, gust, bound, G):
     norm = np.sqrt(g_i * g_i + g_j * g_j)
     if norm == 0.0:
         return 0.0
-    view.direction[i] = -g_j / norm
-    view.direction[j] = g_i / norm
-    view.col[i] = g_i / norm
-    view.col[j] = g_j / norm
-    e_m = abs(view.direction[i]) * e_i + abs(view.direction[j]) * e_j
-    e_norm = abs(view.direction[j]) * e_i + abs(view.direction[i]) * e_j
-    return e_m / max(norm - e_norm, MIN_NORM_SHARE * norm)
+    c, s = g_i / norm, g_j / norm
+    view.direction[i], view.direction[j] = -s, c
+    view.col[i], view.col[j] = c, s
+    c, s = abs(c), abs(s)
+    return (s * e_i + c * e_j) / max(norm - (c * e_i + s * e_j), MIN_NORM_SHARE * norm)
 
 
 @kernel
@@ -361,25 +355,20 @@ def turn_vane_view(view, forces, gust):
 
     b: column of an error of the side vane, rad/s2 per rad; q: effect of the rolling gust on the rates, 1/s.
     """
-    f = forces.component[0]
-    b_p = f.vane_roll
-    b_r = f.vane[0]
-    b_Y = f.vane[1]
-    q_p = project_gust(gust.output.rate_damping[ROLL], gust.output.C, 0)
-    q_r = project_gust(gust.output.rate_damping[YAW], gust.output.C, 0)
-    m_p = -b_Y * q_r
-    m_r = b_Y * q_p
-    m_Y = b_p * q_r - b_r * q_p
+    f, C, L = forces.component[0], gust.output.C, gust.output.rate_damping
+    b_p, b_r, b_Y = f.vane_roll, f.vane[0], f.vane[1]
+    q_p, q_r = project_gust(L[ROLL], C, 0), project_gust(L[YAW], C, 0)
+    m_p, m_r, m_Y = -b_Y * q_r, b_Y * q_p, b_p * q_r - b_r * q_p
     norm_m = np.sqrt(m_p * m_p + m_r * m_r + m_Y * m_Y)
     if norm_m == 0.0:
         return 0.0
     norm_b = np.sqrt(b_p * b_p + b_r * b_r + b_Y * b_Y)
-    e_m = 0.0
+    e = 0.0
     for i, b_i, m_i in ((ROLL, b_p, m_p), (YAW, b_r, m_r), (SIDE_FORCE, b_Y, m_Y)):
         view.direction[i] = m_i / norm_m
         view.col[i] = b_i / norm_b
-        e_m += VANE_TOLERANCE * abs(view.direction[i] * b_i)
-    return e_m / ((1.0 - VANE_TOLERANCE) * norm_b)
+        e += VANE_TOLERANCE * abs(view.direction[i] * b_i)
+    return e / ((1.0 - VANE_TOLERANCE) * norm_b)
 
 
 @kernel
@@ -395,61 +384,40 @@ def uses_force(view):
 
 
 @kernel
-def gust_of_view(view, gust, inertial):
-    """The gust estimate that a view uses: from the vanes, or from inertial motion if it must not use them."""
-    return inertial if view.vane_free else gust
-
-
-@kernel
-def fill_sensitivity(view, forces, L):
-    """Fill `L_rate` and `L_force` (3,), 1/s: projected acceleration per rad/s of rotation of the air.
-
-    L_rate = m' L      L_force = sum over the forces of m L_f      L (3, 3) 1/s: rate damping
-    """
-    m = view.direction
-    for k in range(3):
-        p = m[ROLL] * L[ROLL, k]
-        q = m[PITCH] * L[PITCH, k]
-        r = m[YAW] * L[YAW, k]
-        view.L_rate[k] = p + q + r
-        view.L_force[k] = 0.0
-        for i in range(2):
-            view.L_force[k] += m[SIDE_FORCE + i] * forces.component[i].L[k] * forces.q_ratio
-
-
-@kernel
 def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
     """Fill R_y, Q_x, Q_d and eta of a view from the declared ones, projected on m; V m/s.
 
     R_y = m^2 R_y      sqrt(Q_x) = |m| sqrt(noise)      eta = |m| eta
+    L_rate = m' L      L_force = sum over the forces of m L_f      Q_d: of the gust, by L_rate and L_force
+
     """
-    b, m = view.block, view.direction
+    b, m, L = view.block, view.direction, gust.output.rate_damping
     R_y, std, eta, Q_d = 0.0, 0.0, 0.0, 0.0
+    view.L_rate[:] = view.L_force[:] = 0.0
     for i in range(3):
         R_y += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].R_y[i // 2]
-        std += abs(m[i]) * np.sqrt(noise.Q[i])
-        if view.vane_free:
-            std += abs(m[i]) * forces.gust_noise[i]
+        std += abs(m[i]) * (np.sqrt(noise.Q[i]) + view.vane_free * forces.gust_noise[i])
         eta += abs(m[i]) * (noise.eta[i] + noise.eta_free[i])
-    for k, f in enumerate(forces.component):
-        std += abs(m[SIDE_FORCE + k]) * np.sqrt(f.var[view.by_inertia])
-        if view.by_inertia:
-            Q_d += (m[SIDE_FORCE + k] * forces.q_ratio) ** 2 * f.Q_e
-        eta += abs(m[SIDE_FORCE + k]) * (f.eta_u * forces.q_ratio + f.e_lag)
+        for j in range(3):
+            view.L_rate[j] += m[i] * L[i, j]
+    for i, f in enumerate(forces.component):
+        m_i = m[SIDE_FORCE + i]
+        std += abs(m_i) * np.sqrt(f.var[view.by_inertia])
+        eta += abs(m_i) * (f.eta_u * forces.q_ratio + f.e_lag)
+        Q_d += view.by_inertia * (m_i * forces.q_ratio) ** 2 * f.Q_e
+        for j in range(3):
+            view.L_force[j] += m_i * f.L[j] * forces.q_ratio
     if gust.output.gusty:
-        fill_sensitivity(view, forces, gust.output.rate_damping)
         if subtracts_gust(view, gust):
-            Q_d += remaining_drift(gust_of_view(view, gust, inertial), V, view.L_rate, view.L_force)
+            own = inertial if view.vane_free else gust
+            Q_d += remaining_drift(own, V, view.L_rate, view.L_force)
         else:
             Q_d += full_drift(gust, V, view.L_rate, view.L_force)
         for i in range(3):
             for j in range(3):
                 b.P_dd[0, 0] += m[i] * m[j] * gust.output.var_turn[i, j]
-    limited = max(eta, likelihood.MIN_ETA_RAD_S2)
-    b.R_y[0] = R_y
-    b.Q_x[0] = std * std
-    view.eta[0] = eta
-    b.Q_d[0, 0] = Q_d + noise.q * limited * limited
+    b.R_y[0], b.Q_x[0], view.eta[0] = R_y, std * std, eta
+    b.Q_d[0, 0] = Q_d + noise.q * max(eta, likelihood.MIN_ETA_RAD_S2) ** 2
 
 
 @kernel
@@ -458,23 +426,21 @@ def fill_view_regressors(view, blocks, forces, gust, inertial, nu):
 
     nu (3,) rad/s2.
     """
-    b, m = view.block, view.direction
-    i_1, i_2 = view.plane_pair[0], view.plane_pair[1]
-    rates = blocks[PITCH_BLOCK if i_1 == PITCH else LATERAL_BLOCK]
-    for j in range(rates.n_Z):
-        if i_1 == PITCH:
-            b.regressor[j, 0] = m[PITCH] * rates.regressor[j, 0]
-        else:
-            b.regressor[j, 0] = m[ROLL] * rates.regressor[j, 0] + m[YAW] * rates.regressor[j, 1]
+    b, m, force = view.block, view.direction, view.plane_pair[1]
+    rates = blocks[PITCH_BLOCK if view.plane_pair[0] == PITCH else LATERAL_BLOCK]
     n = rates.n_Z
-    if i_2 >= SIDE_FORCE and m[i_2] != 0.0:
-        f = forces.component[i_2 - SIDE_FORCE]
+    for j in range(n):
+        b.regressor[j, 0] = 0.0
+        for i in range(rates.n):
+            b.regressor[j, 0] += m[rates.axes[i]] * rates.regressor[j, i]
+    if force >= SIDE_FORCE and m[force] != 0.0:
+        f = forces.component[force - SIDE_FORCE]
         for j in range(f.n_Z):
-            b.regressor[n + j, 0] = m[i_2] * f.regressor[j]
+            b.regressor[n + j, 0] = m[force] * f.regressor[j]
         n += f.n_Z
         if view.by_inertia:
-            b.regressor[n, 0] = m[i_2] * f.e_drift
-            n = n + 1
+            b.regressor[n, 0] = m[force] * f.e_drift
+            n += 1
     if view.nulled != AXIS_VIEW:
         b.regressor[n, 0] = 0.0
         for i in range(m.size):
@@ -774,7 +740,6 @@ def fill_view_signatures(view, forces, Gu):
         s = h.surface
         h.signature[0] = 1.0
         if h.kind != STEP_FAULT:
-            acc = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            h.signature[0] = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for i in range(2):
-                acc += m[SIDE_FORCE + i] * forces.component[i].Gu[s]
-            h.signature[0] = acc
+                h.signature[0] += m[SIDE_FORCE + i] * forces.component[i].Gu[s]

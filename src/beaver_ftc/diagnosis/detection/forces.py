@@ -32,7 +32,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
-from beaver_ftc.diagnosis.gusts import drop_accelerometers, stop_gust
+from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -125,7 +125,7 @@ def fill_vaneless_y(forces, w, y):
 def drop_forces(forces, gust, inertial):
     """Stop using forces, and estimate the gust without accelerometers."""
     drop_accelerometers(gust)
-    stop_gust(inertial)
+    inertial.output.gusty = 0
     forces.in_use = 0
 
 

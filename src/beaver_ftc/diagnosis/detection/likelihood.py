@@ -134,8 +134,7 @@ TESTS_RECORD = record(
     s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS),  # signature since the onset, rad/s2; state of its filter
     w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
     e_R=N_GROUP_TESTS,
-    # exp(-kappa t) of a growing loss, or 1 until a loss has ended; signature at the end of a loss, rad/s2
-    left=N_GROUP_TESTS, s_end=(2, N_GROUP_TESTS),
+    left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
     e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
     N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,  # N_p; N_c
     score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
@@ -289,22 +288,8 @@ def whiten_regressors(b, dt):
 
     In a block of one axis all values of a second axis are zero.
     """
-    K_x, K_d, a = b.K_x, b.K_d, b.a
-    x00, x01 = K_x[0, 0], K_x[0, 1]
-    x10, x11 = K_x[1, 0], K_x[1, 1]
-    d00, d01 = K_d[0, 0], K_d[0, 1]
-    d10, d11 = K_d[1, 0], K_d[1, 1]
-    Z = b.regressor
-    x = b.x_Z
-    g = b.g_Z
     for j in range(b.n_Z):
-        g0 = x[j, 0] + dt * (Z[j, 0] - x[j, 2])
-        g1 = x[j, 1] + dt * (Z[j, 1] - x[j, 3])
-        g[j, 0], g[j, 1] = g0, g1
-        x[j, 0] = g0 - x00 * g0 - x01 * g1
-        x[j, 1] = g1 - x10 * g0 - x11 * g1
-        x[j, 2] = a * x[j, 2] + (d00 * g0 + d01 * g1)
-        x[j, 3] = a * x[j, 3] + (d10 * g0 + d11 * g1)
+        whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
 
 
 @kernel
@@ -322,21 +307,17 @@ def update_calm_part(b, dt):
 
     The sums, pg and pp, are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before.
     """
-    calm = b.calm
-    p = b.p
-    g = b.g
-    decay = np.exp(-dt / CALM_MEMORY_S)
+    p, g, decay = b.p, b.g, np.exp(-dt / CALM_MEMORY_S)
     b.pg *= decay
     b.pp *= decay
     for i in range(b.n):
-        p[i] = g[i] - calm.g[i]
+        p[i] = g[i] - b.calm.g[i]
     for i in range(b.n):
         for j in range(b.n):
             b.pg += p[i] * b.S_inv[i, j] * g[j]
             b.pp += p[i] * b.S_inv[i, j] * p[j]
-    den = b.pp + CALM_PRIOR
-    num = b.pg + CALM_PRIOR + CALM_STDS * sqrt(den)
-    lam = min(max(num / den, 0.0), 1.0)
+    D = b.pp + CALM_PRIOR
+    lam = min(max((b.pg + CALM_PRIOR + CALM_STDS * sqrt(D)) / D, 0.0), 1.0)
     for i in range(b.n):
         p[i] *= lam
 
@@ -369,16 +350,10 @@ def reset_slot(b, slot):
     for group in range(n_test_groups(b)):
         t = b.tests[group]
         for k in range(slot, tests_in_group(b, group), N_SLOTS):
-            t.correlation[k] = t.information[k] = 0.0
-            t.w[0, k] = t.w[1, k] = 0.0
-            t.e_0[k] = t.e_tv[k] = 0.0
-            t.e_w[k] = 0.0
-            t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
+            t.correlation[k] = t.information[k] = t.w[0, k] = t.w[1, k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
             t.left[k] = 1.0
-            for i in range(4):
-                t.x_s[i, k] = 0.0
-            for j in range(b.n_Z):
-                b.R[group, j, k] = 0.0
+            t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
@@ -404,25 +379,19 @@ def update_signatures(h, t, first):
     """Fill s (2,) rad/s2 of hypothesis h for each of its onsets, tests first, first + 1, ...
 
     It is the signature of the frame; for a growing loss times 1 - left, left = exp(-kappa t); for the end of
-    a loss that of the onset, s_end.
+    a loss that of the onset.
     """
-    s0, s1 = h.signature[0], h.signature[1]
     for k in range(first, first + N_SLOTS):
-        if h.kind == LOSS_END:
-            if t.left[k] > 0.0:
-                t.left[k] = 0.0
-                t.s_end[0, k] = s0
-                t.s_end[1, k] = s1
-            t.s[0, k] = t.s_end[0, k]
-            t.s[1, k] = t.s_end[1, k]
-        elif h.kind == GROWING_LOSS:
+        grown = 1.0
+        if h.kind == GROWING_LOSS:
             t.left[k] *= h.decay
-            grown = 1.0 - t.left[k]
-            t.s[0, k] = grown * s0
-            t.s[1, k] = grown * s1
-        else:
-            t.s[0, k] = s0
-            t.s[1, k] = s1
+            grown -= t.left[k]
+        elif h.kind == LOSS_END:
+            if t.left[k] == 0.0:
+                continue
+            t.left[k] = 0.0
+        for i in range(2):
+            t.s[i, k] = grown * h.signature[i]
 
 
 @kernel
@@ -592,24 +561,18 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
     always include it, because the model's error is mapped: it is then large and lasting.
     """
-    sign = t.supporting_correlation_sign
-    r0 = b.eta_r[0]
-    r1 = b.eta_r[1]
-    level = b.alarm_level
-    share = b.noise_share
-    weight = 0.0 if without_eta else 1.0
+    sign, level, share = t.supporting_correlation_sign, b.alarm_level, b.noise_share
+    r0, r1 = b.eta_r[0], b.eta_r[1]
     for k in range(n):
         N, D = t.correlation[k], t.information[k]
-        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
-        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
         signed, known = sign[k] != 0.0, D > 0.0
         N_s = sign[k] * N if signed else abs(N)
+        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
+        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
         eta = uncertain_share(t, k, r0, r1)
-        e_all = e + (eta if mapped and not signed else weight * eta)
         score = evidence_ratio(level, share, N_s - e, eta, D)
-        llr = max_llr(signed, N_s, D)
-        lo = max_llr(signed, N_s - e_all, D)
-        hi = max_llr(signed, N_s + e_all, D)
+        e += 0.0 if without_eta and (signed or not mapped) else eta
+        llr, lo, hi = max_llr(signed, N_s, D), max_llr(signed, N_s - e, D), max_llr(signed, N_s + e, D)
         t.score[k] = score if known else 0.0
         t.llr_lo[k] = lo if known else 0.0
         t.llr_hi[k] = hi if known else 0.0
@@ -626,22 +589,17 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
     for i in range(n_test_groups(b)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
     for h, hyp in enumerate(b.hypothesis[: b.n_h]):
-        t = b.tests[h // GROUP_SIZE]
-        first = (h % GROUP_SIZE) * N_SLOTS
-        score, best, k_best = 0.0, -1.0, -1
-        lo, hi = (0.0, decay * hyp.llr_hi)
+        t, first = b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS
+        k_best = first
+        hyp.score, hyp.llr_lo, hyp.llr_hi = 0.0, 0.0, decay * hyp.llr_hi
         for k in range(first, first + N_SLOTS):
-            score = max(score, t.score[k])
-            lo = max(lo, t.llr_lo[k])
-            hi = max(hi, t.llr_hi[k])
-            if t.llr[k] > best:
-                best, k_best = t.llr[k], k
-        hyp.score = score
-        hyp.llr_lo, hyp.llr_hi = lo, hi
-        if k_best >= 0:
-            N = t.correlation[k_best]
-            D = t.information[k_best]
-            hyp.th, hyp.D = (estimate_theta(hyp.kind, N, D), D)
+            hyp.score = max(hyp.score, t.score[k])
+            hyp.llr_lo, hyp.llr_hi = max(hyp.llr_lo, t.llr_lo[k]), max(hyp.llr_hi, t.llr_hi[k])
+            if t.llr[k] > t.llr[k_best]:
+                k_best = k
+        if t.llr[k_best] > -1.0:
+            N, hyp.D = t.correlation[k_best], t.information[k_best]
+            hyp.th = estimate_theta(hyp.kind, N, hyp.D)
 
 
 @kernel

@@ -157,14 +157,10 @@ def set_signs(b: np.void, kinds: Sequence[int]) -> None:
         b["tests"]["supporting_correlation_sign"][h // GROUP_SIZE, k : k + N_SLOTS] = SIGN_OF_KIND[kind]
 
 
-def max_test_groups(size: BlockCapacity) -> int:
-    """The number of groups of onset tests that the hypotheses of a block need."""
-    return (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
-
-
 @sized
 def block_dtype(size: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
+    n_groups = (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
@@ -178,8 +174,8 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         n_Z=int, tol=size.max_regressors, regressor=(size.max_regressors, 2),
         x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
-        tests=(TESTS_RECORD, max_test_groups(size)),
-        R=(max_test_groups(size), size.max_regressors, N_GROUP_TESTS),
+        tests=(TESTS_RECORD, n_groups),
+        R=(n_groups, size.max_regressors, N_GROUP_TESTS),
     )  # fmt: skip
 
 
@@ -339,15 +335,15 @@ def tests_in_group(b, i):
 
 
 @kernel
-def n_test_groups(b):
-    """The number of groups of onset tests in use."""
-    return (b.n_h + GROUP_SIZE - 1) // GROUP_SIZE
+def n_test_groups(n_h):
+    """The number of groups of onset tests that n_h hypotheses need."""
+    return (n_h + GROUP_SIZE - 1) // GROUP_SIZE
 
 
 @kernel
 def reset_slot(b, slot):
     """Restart a slot: its onset is the next frame, without evidence."""
-    for group in range(n_test_groups(b)):
+    for group in range(n_test_groups(b.n_h)):
         t = b.tests[group]
         for k in range(slot, tests_in_group(b, group), N_SLOTS):
             t.correlation[k] = t.information[k] = t.w[0, k] = t.w[1, k] = 0.0
@@ -398,7 +394,8 @@ def update_signatures(h, t, first):
 def accumulate_tests(b, t, n, dt, decay):
     """Whiten s of the first n tests of a group t, and add the frame to their sums:
 
-        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s      N_p <- decay N_p + w' p
+        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s
+        N_p <- decay N_p + w' p    N_c <- decay N_c + w' g_c
         e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
         e_w <- decay e_w + eta_rate eta_r' |w|
 
@@ -406,24 +403,12 @@ def accumulate_tests(b, t, n, dt, decay):
     of one axis all values of a second axis are zero.
     """
     K_x, K_d, S_inv = b.K_x, b.K_d, b.S_inv
-    x00, x01 = K_x[0, 0], K_x[0, 1]
-    x10, x11 = K_x[1, 0], K_x[1, 1]
-    d00, d01 = K_d[0, 0], K_d[0, 1]
-    d10, d11 = K_d[1, 0], K_d[1, 1]
+    x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
+    d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     S00, S01, S10, S11 = S_inv[0, 0], S_inv[0, 1], S_inv[1, 0], S_inv[1, 1]
-    a = b.a
-    g0 = b.g[0]
-    g1 = b.g[1]
-    p0 = b.p[0]
-    p1 = b.p[1]
-    r0 = b.eta_r[0]
-    r1 = b.eta_r[1]
-    c0 = b.eta_0[0]
-    c1 = b.eta_0[1]
-    x = t.x_s
-    s = t.s
-    w = t.w
-    eta_rate = b.eta_rate
+    g0, g1, p0, p1, gc0, gc1 = b.g[0], b.g[1], b.p[0], b.p[1], b.g_c[0], b.g_c[1]
+    r0, r1, c0, c1 = b.eta_r[0], b.eta_r[1], b.eta_0[0], b.eta_0[1]
+    a, eta_rate, x, s, w, N_c = b.a, b.eta_rate, t.x_s, t.s, t.w, t.correlation_from_coarse_gust
     for k in range(n):
         gs0 = x[0, k] + dt * (s[0, k] - x[2, k])
         gs1 = x[1, k] + dt * (s[1, k] - x[3, k])
@@ -435,11 +420,10 @@ def accumulate_tests(b, t, n, dt, decay):
         w1 = S10 * gs0 + S11 * gs1
         t.correlation[k] = decay * t.correlation[k] + (w0 * g0 + w1 * g1)
         t.information[k] = decay * t.information[k] + w0 * gs0 + w1 * gs1
-        t.N_p[k] = (decay * t.N_p[k]) + (w0 * p0 + w1 * p1)
-        tv = r0 * abs(w0 - w[0, k]) + r1 * abs(w1 - w[1, k])
-        const = c0 * abs(w0) + c1 * abs(w1)
-        t.e_0[k] = decay * t.e_0[k] + const
-        t.e_tv[k] = decay * t.e_tv[k] + tv
+        t.N_p[k] = decay * t.N_p[k] + (w0 * p0 + w1 * p1)
+        N_c[k] = decay * N_c[k] + (w0 * gc0 + w1 * gc1)
+        t.e_0[k] = decay * t.e_0[k] + (c0 * abs(w0) + c1 * abs(w1))
+        t.e_tv[k] = decay * t.e_tv[k] + (r0 * abs(w0 - w[0, k]) + r1 * abs(w1 - w[1, k]))
         t.e_w[k] = decay * t.e_w[k] + eta_rate * (r0 * abs(w0) + r1 * abs(w1))
         w[0, k], w[1, k] = w0, w1
 
@@ -454,18 +438,11 @@ def accumulate_regressors(b, t, R, n, decay):
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
-    w = t.w
-    e_R = t.e_R
-    g, tol = b.g_Z, b.tol
-    n_Z = b.n_Z
+    w, e_R, g, tol, n_Z = t.w, t.e_R, b.g_Z, b.tol, b.n_Z
     e_R[:n] = 0.0
     for j in range(0, n_Z - 1, 2):
-        ga0 = g[j, 0]
-        ga1 = g[j, 1]
-        gb0 = g[j + 1, 0]
-        gb1 = g[j + 1, 1]
-        Ra, Rb = R[j], R[j + 1]
-        tol_a, tol_b = tol[j], tol[j + 1]
+        ga0, ga1, gb0, gb1 = g[j, 0], g[j, 1], g[j + 1, 0], g[j + 1, 1]
+        Ra, Rb, tol_a, tol_b = R[j], R[j + 1], tol[j], tol[j + 1]
         for k in range(n):
             w0, w1 = w[0, k], w[1, k]
             R_a = decay * Ra[k] + (w0 * ga0 + w1 * ga1)
@@ -480,19 +457,6 @@ def accumulate_regressors(b, t, R, n, decay):
 
 
 @kernel
-def accumulate_gust(b, t, n, decay):
-    """Add the frame to the share of N that a coarse gust contributes: N_c <- decay N_c + w' g_c.
-
-    `accumulate_tests` must have filled w.
-    """
-    g0, g1 = (b.g_c[0], b.g_c[1])
-    for k in range(n):
-        t.correlation_from_coarse_gust[k] = decay * t.correlation_from_coarse_gust[k] + (
-            t.w[0, k] * g0 + t.w[1, k] * g1
-        )
-
-
-@kernel
 def accumulate_evidence(b, with_Z, dt, decay):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `decay`.
 
@@ -500,11 +464,9 @@ def accumulate_evidence(b, with_Z, dt, decay):
     """
     for h in range(b.n_h):
         update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
-    for i in range(n_test_groups(b)):
+    for i in range(n_test_groups(b.n_h)):
         t, n = b.tests[i], tests_in_group(b, i)
         accumulate_tests(b, t, n, dt, decay)
-        if b.has_coarse:
-            accumulate_gust(b, t, n, decay)
         if with_Z:
             accumulate_regressors(b, t, b.R[i], n, decay)
 
@@ -586,7 +548,7 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
     They are the largest over its onsets. decay: if a loss may end, the factor by which earlier upper bounds
     decay; else 0. mapped: see `evaluate_tests`.
     """
-    for i in range(n_test_groups(b)):
+    for i in range(n_test_groups(b.n_h)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
     for h, hyp in enumerate(b.hypothesis[: b.n_h]):
         t, first = b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS

@@ -452,14 +452,6 @@ def viewed():
     return fdi
 
 
-@pytest.mark.parametrize(("before", "begun", "expected"), [(1.0, 1, 0.3), (2.2, 1, 0.3), (1.0, 0, 0.0)])
-def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
-    force = new_fdi()["statistical"]["forces"]["component"][0]
-    force["f_hat"] = 1.6
-    forces.bound_lag(force, before, begun, 0.004)
-    assert force["e_lag"] == pytest.approx(expected)
-
-
 def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     statistical, view = viewed["statistical"], viewed["statistical"]["views"][ELEVATOR_VIEW]
     view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8

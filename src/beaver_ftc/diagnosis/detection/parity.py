@@ -74,9 +74,10 @@ from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import moment_axis
-from beaver_ftc.diagnosis.detection import forces, likelihood
+from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
+    MAX_FORCE_REGRESSORS,
     MIN_UPDATES,
     NORMAL_INDEX,
     SIDE_INDEX,
@@ -421,10 +422,10 @@ def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
 
 
 @kernel
-def fill_view_regressors(view, blocks, forces, gust, inertial, nu):
+def fill_view_regressors(view, blocks, forces, nu_col):
     """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
 
-    nu (3,) rad/s2.
+    nu_col rad/s2: innovation along the column.
     """
     b, m, force = view.block, view.direction, view.plane_pair[1]
     rates = blocks[PITCH_BLOCK if view.plane_pair[0] == PITCH else LATERAL_BLOCK]
@@ -442,11 +443,7 @@ def fill_view_regressors(view, blocks, forces, gust, inertial, nu):
             b.regressor[n, 0] = m[force] * f.e_drift
             n += 1
     if view.nulled != AXIS_VIEW:
-        b.regressor[n, 0] = 0.0
-        for i in range(m.size):
-            if view.col[i] != 0.0:
-                nu_i = view_innovation(view, forces, gust, inertial, nu, i)
-                b.regressor[n, 0] += view.leak * view.col[i] * nu_i
+        b.regressor[n, 0] = view.leak * nu_col
 
 
 @kernel
@@ -472,13 +469,15 @@ def project_innovation(views, with_Z, noise, blocks, forces, gust, inertial, nu,
         if not view.used:
             continue
         fill_view_noise(view, noise, blocks, forces, gust, inertial, V)
-        m, nu_m = view.direction, view.block.nu
-        nu_m[0] = 0.0
+        m, col, nu_m, nu_col = view.direction, view.col, 0.0, 0.0
         for i in range(m.size):
-            if m[i] != 0.0:
-                nu_m[0] += m[i] * view_innovation(view, forces, gust, inertial, nu, i)
+            if m[i] != 0.0 or col[i] != 0.0:
+                nu_i = view_innovation(view, forces, gust, inertial, nu, i)
+                nu_m += m[i] * nu_i
+                nu_col += col[i] * nu_i
+        view.block.nu[0] = nu_m
         if with_Z or view.always_Z:
-            fill_view_regressors(view, blocks, forces, gust, inertial, nu)
+            fill_view_regressors(view, blocks, forces, nu_col)
 
 
 @kernel
@@ -615,36 +614,33 @@ def _unit_sum(ones: tuple[int, ...]) -> tuple[float, ...]:
 
 def required_size(aircraft: Aircraft) -> StatisticalSize:
     """The capacities that the records of an aircraft need."""
-    axes = [moment_axis(term) for term in aircraft.moments]
     directions = list(list_directions(aircraft, aircraft.forces_separate_surfaces))
-    n_rate = N_INPUT_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
+    n_rate = N_INPUT_READINGS + _largest_block([moment_axis(term) for term in aircraft.moments])
     n_force = (
-        max(len(terms_of_force(aircraft, i)) for i in (SIDE_INDEX, NORMAL_INDEX))
-        + forces.MAX_FORCE_REGRESSORS
-        - MAX_TERMS_OF_ONE
+        max(len(terms_of_force(aircraft, i)) for i in range(2)) + MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE
     )
     lost = [aircraft.dominant_axis[aircraft.surfaces.index(name)] for name in aircraft.class_of_losses]
-    n_lost = max(lost.count(PITCH), lost.count(ROLL) + lost.count(YAW))
     n_tested = max(len(d.tested_losses) for d in directions)
     error_map = aircraft.file.model_error_map
     n_boxes = len(error_map.boxes) if error_map else 0
     return StatisticalSize(
-        BlockCapacity(n_rate, 3 * n_lost + 2),
+        BlockCapacity(n_rate, 3 * _largest_block(lost) + 2),
         BlockCapacity(n_rate + n_force + 2, n_tested + 1),
         len(directions),
         n_boxes,
     )
 
 
+def _largest_block(axes: list[int]) -> int:
+    """How many of these axes the block of pitch or that of roll and yaw has, whichever has more."""
+    return max(axes.count(PITCH), len(axes) - axes.count(PITCH))
+
+
 def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
-    subtracts = (
-        forces["in_use"]
-        and gusty
-        and all(aircraft.separated_by_force(FORCE_NAMES[i]) for i in (SIDE_INDEX, NORMAL_INDEX))
-    )
+    subtracts = forces["in_use"] and gusty and all(aircraft.separated_by_force(name) for name in FORCE_NAMES)
     directions = list(list_directions(aircraft, bool(forces["in_use"])))
     stat["n_views"] = min(len(directions), len(stat["views"]))
     for view, d in zip(stat["views"], directions, strict=False):

@@ -131,7 +131,8 @@ GROUP_SIZE = 4
 N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
 TESTS_RECORD = record(
     supporting_correlation_sign=N_GROUP_TESTS,  # sign of N that supports the hypothesis, or 0
-    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS),  # signature since the onset, rad/s2; state of its filter
+    # signature since the onset, rad/s2; state of its filter; g_s of the frame
+    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS),
     w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
     e_R=N_GROUP_TESTS,
     left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
@@ -392,40 +393,47 @@ def update_signatures(h, t, first):
 
 @kernel
 def accumulate_tests(b, t, n, dt, decay):
-    """Whiten s of the first n tests of a group t, and add the frame to their sums:
+    """Whiten s of the first n tests of a group t, and add the frame to their sums, axis by axis:
 
         w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s
-        N_p <- decay N_p + w' p    N_c <- decay N_c + w' g_c
+        N_p <- decay N_p + w' p                    N_c <- decay N_c + w' g_c
         e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
         e_w <- decay e_w + eta_rate eta_r' |w|
 
-    gs0, gs1: g_s; x00 ... d11: entries of K_x and K_d; r0, r1, c0, c1: entries of eta_r and eta_0. In a block
-    of one axis all values of a second axis are zero.
+    In a block of one axis all values of a second axis are zero.
     """
-    K_x, K_d, S_inv = b.K_x, b.K_d, b.S_inv
-    x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
-    d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
-    S00, S01, S10, S11 = S_inv[0, 0], S_inv[0, 1], S_inv[1, 0], S_inv[1, 1]
-    g0, g1, p0, p1, gc0, gc1 = b.g[0], b.g[1], b.p[0], b.p[1], b.g_c[0], b.g_c[1]
-    r0, r1, c0, c1 = b.eta_r[0], b.eta_r[1], b.eta_0[0], b.eta_0[1]
-    a, eta_rate, x, s, w, N_c = b.a, b.eta_rate, t.x_s, t.s, t.w, t.correlation_from_coarse_gust
-    for k in range(n):
-        gs0 = x[0, k] + dt * (s[0, k] - x[2, k])
-        gs1 = x[1, k] + dt * (s[1, k] - x[3, k])
-        x[0, k] = gs0 - x00 * gs0 - x01 * gs1
-        x[1, k] = gs1 - x10 * gs0 - x11 * gs1
-        x[2, k] = a * x[2, k] + (d00 * gs0 + d01 * gs1)
-        x[3, k] = a * x[3, k] + (d10 * gs0 + d11 * gs1)
-        w0 = S00 * gs0 + S01 * gs1
-        w1 = S10 * gs0 + S11 * gs1
-        t.correlation[k] = decay * t.correlation[k] + (w0 * g0 + w1 * g1)
-        t.information[k] = decay * t.information[k] + w0 * gs0 + w1 * gs1
-        t.N_p[k] = decay * t.N_p[k] + (w0 * p0 + w1 * p1)
-        N_c[k] = decay * N_c[k] + (w0 * gc0 + w1 * gc1)
-        t.e_0[k] = decay * t.e_0[k] + (c0 * abs(w0) + c1 * abs(w1))
-        t.e_tv[k] = decay * t.e_tv[k] + (r0 * abs(w0 - w[0, k]) + r1 * abs(w1 - w[1, k]))
-        t.e_w[k] = decay * t.e_w[k] + eta_rate * (r0 * abs(w0) + r1 * abs(w1))
-        w[0, k], w[1, k] = w0, w1
+    x, g_s, w, a, N_c = t.x_s, t.g_s, t.w, b.a, t.correlation_from_coarse_gust
+    for i in range(b.n):
+        for k in range(n):
+            g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[2 + i, k])
+            x[i, k] = g_s[i, k]
+            x[2 + i, k] *= a
+    for i in range(b.n):
+        for j in range(b.n):
+            K_x, K_d = b.K_x[i, j], b.K_d[i, j]
+            for k in range(n):
+                x[i, k] -= K_x * g_s[j, k]
+                x[2 + i, k] += K_d * g_s[j, k]
+        S_0, S_1, g, p, g_c, r, c = (
+            b.S_inv[i, 0],
+            b.S_inv[i, 1],
+            b.g[i],
+            b.p[i],
+            b.g_c[i],
+            b.eta_r[i],
+            b.eta_0[i],
+        )
+        keep, rate = 1.0 if i else decay, b.eta_rate * r
+        for k in range(n):
+            w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
+            t.correlation[k] = keep * t.correlation[k] + w_i * g
+            t.information[k] = keep * t.information[k] + w_i * g_s[i, k]
+            t.N_p[k] = keep * t.N_p[k] + w_i * p
+            N_c[k] = keep * N_c[k] + w_i * g_c
+            t.e_0[k] = keep * t.e_0[k] + c * abs(w_i)
+            t.e_tv[k] = keep * t.e_tv[k] + r * abs(w_i - w[i, k])
+            t.e_w[k] = keep * t.e_w[k] + rate * abs(w_i)
+            w[i, k] = w_i
 
 
 @kernel

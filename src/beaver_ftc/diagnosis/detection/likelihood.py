@@ -414,16 +414,8 @@ def accumulate_tests(b, t, n, dt, decay):
             for k in range(n):
                 x[i, k] -= K_x * g_s[j, k]
                 x[2 + i, k] += K_d * g_s[j, k]
-        S_0, S_1, g, p, g_c, r, c = (
-            b.S_inv[i, 0],
-            b.S_inv[i, 1],
-            b.g[i],
-            b.p[i],
-            b.g_c[i],
-            b.eta_r[i],
-            b.eta_0[i],
-        )
-        keep, rate = 1.0 if i else decay, b.eta_rate * r
+        S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
+        keep, c, r, r_w = 1.0 if i else decay, b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
         for k in range(n):
             w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
             t.correlation[k] = keep * t.correlation[k] + w_i * g
@@ -432,7 +424,7 @@ def accumulate_tests(b, t, n, dt, decay):
             N_c[k] = keep * N_c[k] + w_i * g_c
             t.e_0[k] = keep * t.e_0[k] + c * abs(w_i)
             t.e_tv[k] = keep * t.e_tv[k] + r * abs(w_i - w[i, k])
-            t.e_w[k] = keep * t.e_w[k] + rate * abs(w_i)
+            t.e_w[k] = keep * t.e_w[k] + r_w * abs(w_i)
             w[i, k] = w_i
 
 

@@ -276,12 +276,7 @@ class DiagnosisReadout:
         errors = bound["declared_errors"]
         declared = bool(errors["given"])
         at_rest, constant, per_rate = (
-            errors[name][:3].copy() if declared else np.zeros(3)
-            for name in (
-                "e0",
-                "steady",
-                "e1",
-            )
+            errors[name][:3].copy() if declared else np.zeros(3) for name in ("e0", "steady", "e1")
         )
         return DeclaredBounds(
             eta_bar_rad_s2=bound["eta_bar"].copy(),
@@ -298,20 +293,13 @@ class DiagnosisReadout:
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
         gust = self._fdi["statistical"]["gust"]["output"]
-        return GustReadout(
-            bool(gust["gusty"]),
-            bool(gust["measured"]),
-            gust["acc"].copy(),
-        )
+        return GustReadout(bool(gust["gusty"]), bool(gust["measured"]), gust["acc"].copy())
 
     @cached_property
     def mapped_error(self) -> ModelErrorMapReadout:
         """The design model's error here, where the aircraft maps it."""
         emap = self._fdi["bound"]["error_map"]
-        return ModelErrorMapReadout(
-            not emap["outside"],
-            emap["e_now"].copy(),
-        )
+        return ModelErrorMapReadout(not emap["outside"], emap["e_now"].copy())
 
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
@@ -370,14 +358,8 @@ def frame_arrays(fdi: np.void, n_estimators: int, diagnoses_all_types: bool) -> 
     }  # fmt: skip
     if diagnoses_all_types:
         cmd = srf["commands"]
-        arrays |= {
-            "command_low": cmd["cmd_min"],
-            "command_high": cmd["cmd_max"],
-        }
-        arrays |= {
-            "least": cmd["u_min"],
-            "greatest": cmd["u_max"],
-        }
+        arrays |= {"command_low": cmd["cmd_min"], "command_high": cmd["cmd_max"]}
+        arrays |= {"least": cmd["u_min"], "greatest": cmd["u_max"]}
     return arrays
 
 
@@ -398,22 +380,13 @@ def alarm_arrays(fdi: np.void, n_estimators: int, has_statistical_detector: bool
     besides, and the gust as the vanes see it.
     """
     est = fdi["isolation"]["estimator"][:n_estimators]
-    arrays = {
-        "reach_low": est["reach_lo"],
-        "reach_high": est["reach_hi"],
-    }
+    arrays = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
     if has_statistical_detector:
         stat = fdi["statistical"]
         blk, gust = stat["block"], stat["gust"]["output"]
         arrays |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
-        arrays |= {
-            "signature": blk["hypothesis"]["signature"],
-            "bounded": stat["noise"]["eta"],
-        }
-        arrays |= {
-            "air": gust["acc_mean"],
-            "leap": gust["var_turn"],
-        }
+        arrays |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["noise"]["eta"]}
+        arrays |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
     return arrays
 
 
@@ -426,22 +399,12 @@ def _read_estimator(fie: np.void) -> IsolationEstimator:
     axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
     span = float(fie["theta_min"]), float(fie["theta_max"])
     return IsolationEstimator(
-        int(fie["hypothesis_kind"]),
-        *span,
-        bool(fie["excluded"]),
-        axes,
-        fie["parity_direction"].copy(),
+        int(fie["hypothesis_kind"]), *span, bool(fie["excluded"]), axes, fie["parity_direction"].copy()
     )
 
 
 def _read_surface(srf: np.void) -> SurfaceFaultTypes:
-    names = (
-        "stop_lo",
-        "stop_hi",
-        "runaway",
-        "slow_step",
-        "approach_share",
-    )
+    names = ("stop_lo", "stop_hi", "runaway", "slow_step", "approach_share")
     actuator = Actuator(*(float(srf["actuator"][name]) for name in names))
     return SurfaceFaultTypes(actuator, srf["sets"]["excluded"].astype(bool))
 
@@ -451,12 +414,7 @@ def _read_block(blk: np.void) -> StatisticalBlock:
     n = len(hypotheses)
     tests = (
         blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy()
-        for name in (
-            "score",
-            "supporting_correlation_sign",
-            "N_p",
-            "correlation_from_coarse_gust",
-        )
+        for name in ("score", "supporting_correlation_sign", "N_p", "correlation_from_coarse_gust")
     )
     return StatisticalBlock(
         tuple(blk["axes"][: blk["n"]].tolist()),
@@ -467,11 +425,7 @@ def _read_block(blk: np.void) -> StatisticalBlock:
 
 
 def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
-    place = (
-        int(hyp["kind"]),
-        int(hyp["surface"]),
-        int(hyp["axis"]),
-    )
+    place = (int(hyp["kind"]), int(hyp["surface"]), int(hyp["axis"]))
     return StatisticalHypothesis(*place, bool(hyp["alarms"]), float(hyp["score"]))
 
 

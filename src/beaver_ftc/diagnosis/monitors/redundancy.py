@@ -341,7 +341,7 @@ def advance_quaternion(q_past, w, h, out):
 
 @kernel
 def small_turn(q_a, q_b, n):
-    """Component n (1, 2, 3), body axes, of the small rotation from attitude q_a to q_b, rad: 2 (q_a* q_b)_n."""
+    """Component n (1, 2, 3), body axes, of the small rotation from q_a to q_b, rad: 2 (q_a* q_b)_n."""
     a = q_a
     b = q_b
     i = n

@@ -47,9 +47,9 @@ error e t; an error of a flow sensor is a step, which its own reading contains. 
 
 The direction of the spurious velocity dv, which the residuals add up to, says which accelerometer is broken.
 
-Symbols are those of redundancy.py and initial_errors.py; i sensor or axis, j test, m pole, d duplicate sensor,
-h hypothesis of initial_errors.py. mon: record of the monitor; M its memory, o its output, red the tests, ini
-the hypotheses, found the conclusion about surfaces, bank the detection filters, pred the model's prediction.
+Symbols: redundancy.py and initial_errors.py; i sensor or axis, j test, m pole, d duplicate, h hypothesis of
+initial_errors.py. mon: record of the monitor; M its memory, o its output, red the tests, ini the hypotheses,
+found the conclusion about surfaces, bank the detection filters, pred the prediction of the model.
 """
 
 import numpy as np

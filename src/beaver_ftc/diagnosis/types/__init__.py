@@ -32,9 +32,14 @@ A file under table/ describes fault types; its `TYPES` are the rows. This file s
 registry.py reads the rows into arrays and records; in each frame it finds where each surface was and tests
 every type. verdict.py and pairs.py conclude; they name no type.
 
-type_index: the number of a type, the same in every array over types. config: TYPES_CONFIG of registry.py;
-surface: a record of its `surface_types_dtype`. k: number of the judged frame, which is the frame before the
-elapsed one.
+    s, srf          surface, and its record (`registry.surface_types_dtype`)
+    h               type: its number, the same in every array over types
+    k               judged frame, the one before the elapsed
+    u, p            command and deflection of the surface, rad; u is where a healthy one is
+    lo, hi          interval, rad
+    nu, nu_max (3,) innovation and its bound without a fault, rad/s2
+    c, M            TYPES_CONFIG of registry.py, memory of a type
+    est, fie, eff   estimators of the isolation, one of them, what it supposes of the frame (EFFECT_RECORD)
 """
 
 from collections.abc import Callable
@@ -207,7 +212,7 @@ class FaultType:
 
 @kernel
 def clip_travel(srf, p):
-    """A deflection (rad), cut off by the stops."""
+    """p, cut off by the stops, rad."""
     return min(max(p, srf.actuator.stop_lo), srf.actuator.stop_hi)
 
 
@@ -244,9 +249,10 @@ def put_set(srf, h, interval):
 
 @kernel
 def intersect_set(srf, h, other):
-    """Keep of the set of a type what is also in other; exclude the type when nothing is left. The
-    set then holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type
-    that it excludes keeps its set."""
+    """Keep of the set of a type what is also in `other`; exclude the type when nothing is left. The set then
+    holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type that it excludes
+    keeps its set.
+    """
     lo, hi = other
     if lo == np.inf:
         srf.sets.excluded[h] = 1
@@ -266,35 +272,21 @@ def exclude_type(srf, h):
 @kernel
 def restore_first(srf):
     """Restore the sets that were stored when the surface was isolated (pairs.py)."""
-    srf.sets.low[:], srf.sets.high[:] = (
-        srf.first_sets.low,
-        srf.first_sets.high,
-    )
+    srf.sets.low[:], srf.sets.high[:] = (srf.first_sets.low, srf.first_sets.high)
     srf.sets.excluded[:] = srf.first_sets.excluded
 
 
-# u: where a healthy surface was; lo, hi: where this one can have been;
-# anomalous: whether more than the declared uncertainty was at work;
-# kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
-# positions a mean weighted by G may be off; hides: whether
-# the lower and the upper stop can cut a deflection off unseen.
-OBSERVATION_RECORD = record(
-    u=float,
-    lo=float,
-    hi=float,
-    anomalous=int,
-    kappa=float,
-    hides=(int, 2),
-)
+# u: where a healthy surface was; lo, hi: where this one can have been; anomalous: whether more than the
+# declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
+# positions a mean weighted by G may be off; hides: whether the lower and the upper stop can cut a deflection
+# off unseen.
+OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
 
 
 @kernel
 def allow_reach(srf):
     """The surface may have been anywhere within reach."""
-    srf.last.lo, srf.last.hi = (
-        srf.actuator.reach_lo,
-        srf.actuator.reach_hi,
-    )
+    srf.last.lo, srf.last.hi = (srf.actuator.reach_lo, srf.actuator.reach_hi)
 
 
 @kernel
@@ -307,37 +299,15 @@ def shift_observations(srf):
 @kernel
 def copy_observation(to, of):
     """Copy one observation to another."""
-    (
-        to.u,
-        to.lo,
-        to.hi,
-        to.anomalous,
-        to.kappa,
-    ) = (
-        of.u,
-        of.lo,
-        of.hi,
-        of.anomalous,
-        of.kappa,
-    )
+    (to.u, to.lo, to.hi, to.anomalous, to.kappa) = (of.u, of.lo, of.hi, of.anomalous, of.kappa)
     to.hides[:] = of.hides
 
 
 @kernel
-def observe_surface(
-    c,
-    srf,
-    fie,
-    m,
-    nu,
-    nu_max,
-    eff,
-):
-    """Find where a surface can have been: what agrees with nu (3,) within
-    nu_max (3,), rad/s2.
+def observe_surface(c, srf, fie, m, nu, nu_max, eff):
+    """Find where a surface can have been: the p that agree with |nu - G (p - u)| <= nu_max on every axis.
 
-    fie: its estimator of a position; m: on which it has most effect;
-    eff: what that supposes of the same frame or block, dtype EFFECT_RECORD.
+    m: the axis on which it has most effect.
     """
     last, cmd = srf.last, srf.commands
     last.u = -eff.base[m] / eff.regressor[m]
@@ -347,37 +317,25 @@ def observe_surface(
         if c.frames_per_block > 1 and i != m and eff.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
         lo, hi = isolation.consistent_on(nu, nu_max, fie, eff, i)
-        last.lo, last.hi = (
-            max(last.lo, lo),
-            min(last.hi, hi),
-        )
-    mark_stops(
-        srf,
-        2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]),
-    )
+        last.lo, last.hi = (max(last.lo, lo), min(last.hi, hi))
+    mark_stops(srf, 2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]))
 
 
 @kernel
 def mark_stops(srf, width):
-    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than
-    `width` (rad), that of the interval which holds the true deflection."""
+    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad) of
+    the interval which holds the true deflection.
+    """
     srf.last.hides[0] = srf.commands.u_min[0] - srf.actuator.stop_lo < width
     srf.last.hides[1] = srf.actuator.stop_hi - srf.commands.u_max[0] < width
 
 
 @kernel
 def observe_error(srf, e, tol):
-    """A surface was off its command by e +- tol (rad). False:
-    nowhere within its reach."""
+    """A surface was off its command by e +- tol (rad). False: nowhere within its reach."""
     last, act = srf.last, srf.actuator
-    last.lo = max(
-        act.reach_lo,
-        last.u + e - tol,
-    )
-    last.hi = min(
-        act.reach_hi,
-        last.u + e + tol,
-    )
+    last.lo = max(act.reach_lo, last.u + e - tol)
+    last.hi = min(act.reach_hi, last.u + e + tol)
     last.anomalous = abs(e) > tol
     mark_stops(srf, 2.0 * tol)
     return last.lo <= last.hi
@@ -385,13 +343,10 @@ def observe_error(srf, e, tol):
 
 @kernel
 def set_known(srf, lo, hi):
-    """Set the interval (lo, hi) rad in which a surface with a known fault was;
-    the frame is no longer anomalous for it."""
-    (
-        srf.last.lo,
-        srf.last.hi,
-        srf.last.anomalous,
-    ) = lo, hi, 0
+    """Set the interval (lo, hi) in which a surface with a known fault was; the frame is no longer anomalous
+    for it.
+    """
+    (srf.last.lo, srf.last.hi, srf.last.anomalous) = lo, hi, 0
 
 
 @kernel
@@ -408,8 +363,7 @@ def clear_anomalies(srf):
 
 @kernel
 def last_error(srf):
-    """Return the deflection error of the surface in the elapsed frame, rad: the middle of where it can have
-    been."""
+    """p - u in the elapsed frame, rad, p in the middle of where it can have been."""
     return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u
 
 

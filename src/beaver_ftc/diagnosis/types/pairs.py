@@ -12,7 +12,8 @@ whose deflection follows from what is known of the first, taken to last. If noth
 explains that either, the name of the first is withdrawn. Anything else stays open.
 
 A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
-previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+past: of `conclusion_dtype`, of the frame before; bank: the detection filters. Other symbols:
+types/__init__.py.
 """
 
 import numpy as np
@@ -33,17 +34,8 @@ from beaver_ftc.diagnosis.types import (
     set_known,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import (
-    MODE,
-    N_CONSTANT,
-    possible_deflection_range,
-)
-from beaver_ftc.diagnosis.types.verdict import (
-    NO_SURFACE,
-    can_be_faulty,
-    constant_remains,
-    type_remains,
-)
+from beaver_ftc.diagnosis.types.registry import MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
 @kernel
@@ -58,8 +50,12 @@ def latch_groups(pair, bank):
 
 @kernel
 def locate_lateral(types, layout, est, nu, nu_max):
-    """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
-    nu (3,), |eta| <= nu_max (3,) rad/s2."""
+    """Find where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p.
+
+        (da, dr) = (nu_L Nr - nu_N Lr, nu_N La - nu_L Na) / (La Nr - Na Lr),    |eta| <= (e_L, e_N)
+
+    L, N: roll and yaw acceleration, rad/s2; La, Lr, Na, Nr: per rad of ailerons and of rudder.
+    """
     a, r = layout.main[ROLL], layout.main[YAW]
     ail = est[layout.position[a]].effect
     rud = est[layout.position[r]].effect
@@ -83,8 +79,7 @@ def locate_lateral(types, layout, est, nu, nu_max):
 
 @kernel
 def constant_range(c, srf, k):
-    """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
-    of a constant that are left."""
+    """Least and greatest deflection of a surface by frame k over the types of a constant left, rad."""
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
@@ -92,10 +87,7 @@ def constant_range(c, srf, k):
             lo = min(lo, h_lo)
             hi = max(hi, h_hi)
     reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi
-    return (
-        min(max(lo, reach_lo), reach_hi),
-        min(max(hi, reach_lo), reach_hi),
-    )
+    return (min(max(lo, reach_lo), reach_hi), min(max(hi, reach_lo), reach_hi))
 
 
 @kernel
@@ -113,7 +105,11 @@ def observe_pitch(types, layout, est, nu, nu_max):
 
 @kernel
 def locate_second(types, layout, est, nu, nu_max):
-    """Find the position of the second surface, given the sets of the first."""
+    """Find the position of the second surface, given the sets of the first: p - u = (nu - M1 (p1 - u1)) /
+    M2.
+
+    M1, M2: pitch acceleration by the first and by the second surface, rad/s2 per rad.
+    """
     s1 = types.pair.first_pitch
     s2 = layout.partner[s1]
     eff1 = est[layout.position[s1]].effect
@@ -126,18 +122,13 @@ def locate_second(types, layout, est, nu, nu_max):
     acc1 = M1 * last_error(srf1)
     tol = abs(M1) * 0.5 * (hi - lo)
     tol += nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
-    if not observe_error(
-        types.surface[s2],
-        (nu[PITCH] - acc1) / M2,
-        tol / abs(M2),
-    ):
+    if not observe_error(types.surface[s2], (nu[PITCH] - acc1) / M2, tol / abs(M2)):
         types.surface[s2].status.basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
 def observe_pairs(types, layout, est, bank, nu_max):
-    """Observe the elapsed frame, plane by plane, and judge the one before; nu_max (3,):
-    bound on the innovation."""
+    """Observe the elapsed frame, plane by plane, and judge the one before."""
     latch_groups(types.pair, bank)
     registry.observe_surfaces(types, layout, est, bank.output.innovation, nu_max)
     locate_lateral(types, layout, est, bank.output.innovation, nu_max)
@@ -159,8 +150,9 @@ def update_status(srf, is_isolated, kind, t):
 
 @kernel
 def isolate_lateral(types, layout, t):
-    """Set the isolation of the surfaces of roll and yaw. Returns whether the fault of this plane is outside
-    the class."""
+    """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
+    class.
+    """
     c, pair = types.config, types.pair
     roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     roll_alone = can_be_faulty(roll)
@@ -172,18 +164,8 @@ def isolate_lateral(types, layout, t):
     outside = both and refuted
     open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
     isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
-    update_status(
-        roll,
-        isolates and not yaw_alone,
-        verdict.type_on_surface(c, roll),
-        t,
-    )
-    update_status(
-        yaw,
-        isolates and not roll_alone,
-        verdict.type_on_surface(c, yaw),
-        t,
-    )
+    update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
+    update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
     return outside
 
 
@@ -256,24 +238,14 @@ def isolate_pitch(types, layout, t):
         srf2 = types.surface[s2]
         anomalous = srf2.evidence.n_anomalous > 0
         possible = can_be_faulty(srf2) and verdict.any_type_remains(srf2)
-        update_status(
-            srf1,
-            possible or not anomalous,
-            srf1.status.fault_type,
-            t,
-        )
+        update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
         shows = anomalous and possible and verdict.explains_flight(srf2)
         update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
         return
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            update_status(
-                srf,
-                s == sole,
-                pitch_type(types.config, srf) if s == sole else -1,
-                t,
-            )
+            update_status(srf, s == sole, pitch_type(types.config, srf) if s == sole else -1, t)
 
 
 @kernel
@@ -289,9 +261,9 @@ def sole_pitch(types, layout):
 
 @kernel
 def decide_pairs(types, past, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_decision`: its isolated estimator is of the one named first, the law
-    acts on all. past: that of the frame before."""
+    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_decision`: its
+    isolated estimator is of the one named first, the law acts on all.
+    """
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
     first = NO_SURFACE
@@ -302,14 +274,7 @@ def decide_pairs(types, past, layout, t):
             first = s
     estimator, isolated_at_s, kind, typed_at_s = first_finding(types, past, layout, first, outside, t)
     lead, mode = accommodate_pairs(types, layout)
-    return (
-        estimator,
-        isolated_at_s,
-        kind,
-        typed_at_s,
-        lead,
-        mode,
-    )
+    return (estimator, isolated_at_s, kind, typed_at_s, lead, mode)
 
 
 @kernel
@@ -319,12 +284,7 @@ def first_finding(types, past, layout, s, outside, t):
     if s >= 0:
         status = types.surface[s].status
         estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
-        return (
-            estimator,
-            status.isolated_at_s,
-            status.fault_type,
-            status.typed_at_s,
-        )
+        return (estimator, status.isolated_at_s, status.fault_type, status.typed_at_s)
     estimator = state.UNANTICIPATED if outside else state.NOT_ISOLATED
     isolated_at_s = t if estimator != past.isolated_estimator else past.isolated_at_s
     return estimator, isolated_at_s, -1, past.typed_at_s
@@ -366,10 +326,7 @@ def accommodate_pairs(types, layout):
             own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
             if verdict.fault_shows(types.config, srf, own, possible):
                 verdict.set_mode(srf, own)
-                leads = s == layout.main[PITCH] and own in (
-                    SCALE_COMMAND,
-                    GIVE_UP,
-                )
+                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or leads:
                     lead, mode = s, own
     return lead, mode

@@ -111,8 +111,7 @@ SERVES = np.array(
 # Types that give the deflection error of a surface, in the order in which they are used.
 ERROR_TYPES = np.array(
     sorted(
-        _parts_of("deflection_error"),
-        key=lambda type_index: TYPES[type_index].deflection_error_precedence,
+        _parts_of("deflection_error"), key=lambda type_index: TYPES[type_index].deflection_error_precedence
     ),
     dtype=int,
 )
@@ -143,11 +142,7 @@ def _call_expression(h: int, arguments: str) -> str:
 
 def _kernel_namespace(parts: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
     """The names that a kernel which calls these parts needs."""
-    return {
-        "__name__": __name__,
-        **{f"part_{h}": part for h, part in parts.items()},
-        **other_names,
-    }
+    return {"__name__": __name__, **{f"part_{h}": part for h, part in parts.items()}, **other_names}
 
 
 def _call_each(name: str, arguments: str, result: Kernel | None = None) -> Kernel:
@@ -158,10 +153,7 @@ def _call_each(name: str, arguments: str, result: Kernel | None = None) -> Kerne
     calls = {h: _call_expression(h, arguments) for h in parts}
     lines = [f"result_kernel(surface, {h}, {call})" if result else call for h, call in calls.items()]
     return _compile_kernel(
-        f"{name}_each",
-        parameters,
-        [*lines, "return"],
-        _kernel_namespace(parts, result_kernel=result),
+        f"{name}_each", parameters, [*lines, "return"], _kernel_namespace(parts, result_kernel=result)
     )
 
 
@@ -172,10 +164,7 @@ def _call_one(name: str, arguments: str, default: Any) -> Kernel:
     lines = [f"if type_index == {h}: return {_call_expression(h, arguments)}" for h in parts]
     parameters = arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
     return _compile_kernel(
-        f"{name}_of",
-        parameters,
-        [*lines, "return default"],
-        _kernel_namespace(parts, default=default),
+        f"{name}_of", parameters, [*lines, "return default"], _kernel_namespace(parts, default=default)
     )
 
 
@@ -219,24 +208,14 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 # rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
 # was in it, rad.
 EVIDENCE_RECORD = record(
-    n_anomalous=int,
-    n_rest=int,
-    n_unhidden=int,
-    k_first=int,
-    first_lo=float,
-    first_hi=float,
+    n_anomalous=int, n_rest=int, n_unhidden=int, k_first=int, first_lo=float, first_hi=float
 )
 
 # Whether the surface may be the only one at fault; what decides whether it can be at fault:
 # BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
 STATUS_RECORD = record(
-    may_be_sole=int,
-    basis=int,
-    is_isolated=int,
-    isolated_at_s=float,
-    fault_type=int,
-    typed_at_s=float,
+    may_be_sole=int, basis=int, is_isolated=int, isolated_at_s=float, fault_type=int, typed_at_s=float
 )
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
@@ -255,22 +234,14 @@ FIRST_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
 TYPES_CONFIG_RECORD = record(
-    single_instant=int, n_substeps=int, returns_lagged=int,
-    half_frames=int,
-    abrupt=int,
-    has_eG=int, frames_per_block=int, block_duration_s=float,
-    dt=float,
+    single_instant=int, n_substeps=int, returns_lagged=int, half_frames=int, abrupt=int, has_eG=int,
+    frames_per_block=int, block_duration_s=float, dt=float,
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-# n_unstored: frames since a type was excluded on its surface that is not yet excluded
-# in the stored sets.
+# n_unstored: frames since a type was excluded on its surface that is not yet excluded in the stored sets.
 FAULT_PAIR_RECORD = record(
-    enabled=int,
-    group_alarm=(int, 2),
-    lateral_outside=int,
-    first_pitch=int,
-    n_unstored=int,
+    enabled=int, group_alarm=(int, 2), lateral_outside=int, first_pitch=int, n_unstored=int
 )
 
 # Blocks of frames.
@@ -306,14 +277,9 @@ def fault_types_dtype(n: int) -> np.dtype:
 
 
 def configure_types(
-    types: np.void,
-    layout: np.void,
-    servos: np.void,
-    declared: Declared,
-    travel: np.ndarray,
+    types: np.void, layout: np.void, servos: np.void, declared: Declared, travel: np.ndarray
 ) -> None:
-    """Fill the configuration of the types and the actuator of each surface; travel (2, n): the
-    stops, rad."""
+    """Fill the configuration of the types and the actuator of each surface; travel (2, n): the stops, rad."""
     fdi, c, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
     c["frames_per_block"] = n_block = (
         ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
@@ -322,11 +288,7 @@ def configure_types(
     c["block_duration_s"] = n_block * dt
     half = pi / fdi.slowest_oscillation_rad_s / (n_block * dt)
     c["half_frames"] = ceil(min(half, 1e9))  # longer than any flight
-    c["n_substeps"], c["returns_lagged"], c["dt"] = (
-        declared.substeps,
-        servos["real"],
-        dt,
-    )
+    c["n_substeps"], c["returns_lagged"], c["dt"] = (declared.substeps, servos["real"], dt)
     c["abrupt"] = fdi.fault_profile == "abrupt"
     types["pair"]["first_pitch"], types["pair"]["enabled"] = -1, fdi.pairs
     names, h = declared.aircraft.surfaces, dt / declared.substeps
@@ -334,14 +296,8 @@ def configure_types(
         rate_deg_s = getattr(declared.servos, name).rate_limit_deg_s
         act = srf["actuator"]
         act["stop_lo"], act["stop_hi"] = lo, hi
-        act["reach_lo"], act["reach_hi"] = (
-            min(lo, 0.0),
-            max(hi, 0.0),
-        )
-        act["approach_share"], act["step"] = (
-            servos["approach"][s],
-            servos["step"][s],
-        )
+        act["reach_lo"], act["reach_hi"] = (min(lo, 0.0), max(hi, 0.0))
+        act["approach_share"], act["step"] = (servos["approach"][s], servos["step"][s])
         act["runaway"] = 0.5 * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
         act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["step"])
         srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
@@ -368,9 +324,8 @@ def restart_surface(srf):
 
 @kernel
 def record_commands(types, u, ext):
-    """Add a frame to the commands of the surfaces: u (n,); positions of healthy surfaces and
-    their least and greatest effectiveness within it: ext, of a
-    `model_prediction.frame_means_dtype`.
+    """Add a frame to the commands u (n,) of the surfaces; ext: extremes, within it, of where healthy
+    surfaces were and of G, of a `model_prediction.frame_means_dtype`.
     """
     n = types.config.frames_per_block
     for s, srf in enumerate(types.surface):
@@ -378,23 +333,14 @@ def record_commands(types, u, ext):
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
                 cmd.history[b, :n] = cmd.history[b - 1, :n]
-                cmd.cmd_min[b], cmd.cmd_max[b] = (
-                    cmd.cmd_min[b - 1],
-                    cmd.cmd_max[b - 1],
-                )
+                cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
             cmd.cmd_min[0], cmd.cmd_max[0] = np.inf, -np.inf
-            cmd.u_min[1], cmd.u_max[1] = (
-                cmd.u_min[0],
-                cmd.u_max[0],
-            )
+            cmd.u_min[1], cmd.u_max[1] = (cmd.u_min[0], cmd.u_max[0])
             cmd.u_min[0], cmd.u_max[0] = np.inf, -np.inf
             cmd.G_min, cmd.G_max = np.inf, -np.inf
         p = min(max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi)
         cmd.history[0, types.block.n_so_far] = p
-        cmd.cmd_min[0], cmd.cmd_max[0] = (
-            min(cmd.cmd_min[0], p),
-            max(cmd.cmd_max[0], p),
-        )
+        cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
         cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
         cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
         cmd.G_min = min(cmd.G_min, ext.G_min[s])
@@ -403,10 +349,7 @@ def record_commands(types, u, ext):
 
 @kernel
 def observe_surfaces(types, layout, est, nu, nu_max):
-    """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
-
-    nu_max (3,): on nu (3,) without a fault, rad/s2.
-    """
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
     anomalous = not isolation.eta_explains(nu, nu_max)
     for s, srf in enumerate(types.surface):
         shift_observations(srf)
@@ -418,8 +361,7 @@ def observe_surfaces(types, layout, est, nu, nu_max):
 
 @kernel
 def count_anomaly(srf):
-    """Count a frame as evidence, and as evidence since a stop could last hide a swing
-    (`judge_frame`)."""
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
     srf.evidence.n_anomalous += 1
     srf.evidence.n_unhidden += 1
 
@@ -431,15 +373,7 @@ def judge_types(c, srf, k):
     if now.lo > now.hi:
         return
     if ev.k_first < 0:
-        (
-            ev.k_first,
-            ev.first_lo,
-            ev.first_hi,
-        ) = (
-            k,
-            now.lo,
-            now.hi,
-        )
+        (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
     consistent_each(c, srf, k)
 
 
@@ -478,7 +412,7 @@ def observe_frame(types, layout, est, nu, bound):
 
 @kernel
 def begin_block(types, layout, est, n_bar_old):
-    """Begin a block with the elapsed frame; n_old (3,) rad/s: as it began."""
+    """Begin a block with the elapsed frame; n_bar_old (3,) rad/s: bound on the gyros' noise as it began."""
     block = types.block
     block.nu[:], block.nu_bound[:] = 0.0, 0.0
     block.n_start[:] = n_bar_old
@@ -494,16 +428,15 @@ def add_to_block(types, layout, est, nu, eta):
         block.nu[i] += share * nu[i]
         block.nu_bound[i] += share * eta[i]
     for j in layout.position:
-        isolation.add_to_mean(
-            est[j].mean_effect,
-            est[j].effect,
-            share,
-        )
+        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share)
 
 
 @kernel
 def extend_block(types, layout, est, nu, bound):
-    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
+    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before:
+
+    nu_bound = mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+    """
     c, block = types.config, types.block
     if block.n_so_far == 0:
         begin_block(types, layout, est, bound.n_old)

@@ -2,7 +2,9 @@
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
 of one surface assume that it is at fault; `can_be_faulty` says whether it can be.
-types: of `fault_types_dtype`; previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+
+types: of `fault_types_dtype`; past: of `conclusion_dtype`, of the frame before; kind: a type, TYPE_UNDECIDED
+or NO_TYPE; mode: of accommodation. Other symbols: types/__init__.py.
 
 `fault_finding_dict` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and
 in which unit, the type's row says (`FaultType.estimate_parameter`).
@@ -94,10 +96,7 @@ def any_type_remains(srf):
 def name_remains(srf, named):
     """Whether a type of this name is left; with TYPE_UNDECIDED, one of any name."""
     for h in range(N_TYPES):
-        if type_remains(srf, h) and named in (
-            SAME_NAME[h],
-            TYPE_UNDECIDED,
-        ):
+        if type_remains(srf, h) and named in (SAME_NAME[h], TYPE_UNDECIDED):
             return True
     return False
 
@@ -290,14 +289,7 @@ def decide_single(types, past, layout, est, t):
     typed_at_s = t if kind != past.fault_type else past.typed_at_s
     estimator = estimator_of_fault(layout, s, kind) if s >= 0 else s
     lead, mode = decide_mode(types, estimator, layout, est)
-    return (
-        estimator,
-        isolated_at_s,
-        kind,
-        typed_at_s,
-        lead,
-        mode,
-    )
+    return (estimator, isolated_at_s, kind, typed_at_s, lead, mode)
 
 
 @kernel
@@ -453,8 +445,7 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
     status = fdi["types"]["surface"]["status"]
     isolated = sorted(
-        np.flatnonzero(status["is_isolated"]).tolist(),
-        key=lambda s: status["isolated_at_s"][s],
+        np.flatnonzero(status["is_isolated"]).tolist(), key=lambda s: status["isolated_at_s"][s]
     )
     faults = [_finding_on_surface(fdi, s, int(status["fault_type"][s]), names) for s in isolated]
     alarms = fdi["types"]["pair"]["group_alarm"]
@@ -462,20 +453,14 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     if not alarms.any() and not faults and int(fdi["verdict"]["isolated_estimator"]) == NOT_ISOLATED:
         alarms = np.ones_like(alarms)  # a statistical alarm by itself says of no plane that it is there
     undecided = [
-        {
-            **_NO_FINDINGS,
-            "candidates": tuple(_candidate_texts(fdi, members, names)),
-        }
+        {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}
         for alarm, members in zip(alarms, groups, strict=True)
         if alarm and not set(members) & set(isolated)
     ]
     if faults:
         return {**faults[0], "faults": (*faults, *undecided)}
     if int(fdi["verdict"]["isolated_estimator"]) == UNANTICIPATED:
-        return {
-            **_find_one(fdi, names),
-            "faults": tuple(undecided),
-        }
+        return {**_find_one(fdi, names), "faults": tuple(undecided)}
     texts = tuple(text for finding in undecided for text in finding["candidates"])
     return {**_NO_FINDINGS, "candidates": texts, "faults": tuple(undecided)}
 
@@ -484,18 +469,10 @@ def _find_one(fdi: np.void, names: Sequence[str]) -> FindingDict:
     estimator = int(fdi["verdict"]["isolated_estimator"])
     isolated_at_s = float(fdi["verdict"]["isolated_at_s"])
     if estimator == NOT_ISOLATED:
-        return {
-            **_NO_FINDINGS,
-            "candidates": tuple(_candidate_texts(fdi, range(len(names)), names)),
-        }
+        return {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, range(len(names)), names))}
     if estimator == UNANTICIPATED:
         label = "unanticipated"
-        return {
-            **_NO_FINDINGS,
-            "isolated": label,
-            "isolation_type": label,
-            "isolation_time_s": isolated_at_s,
-        }
+        return {**_NO_FINDINGS, "isolated": label, "isolation_type": label, "isolation_time_s": isolated_at_s}
     s = int(fdi["isolation"]["estimator"][estimator]["surface"])
     kind = int(fdi["verdict"]["fault_type"])
     return {
@@ -557,10 +534,7 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
     pitch_pair = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
     if pitch_pair and any(registry.MODE[h] == GIVE_UP for h in constant):
         # if the other surface is off as well, each constant may be one of another type
-        kinds += sorted(
-            range(registry.N_CONSTANT),
-            key=lambda h: registry.MODE[h] == SCALE_COMMAND,
-        )
+        kinds += sorted(range(registry.N_CONSTANT), key=lambda h: registry.MODE[h] == SCALE_COMMAND)
     return list(dict.fromkeys(registry.TYPE_NAMES[h] for h in kinds))
 
 

@@ -40,16 +40,10 @@ from beaver_ftc.diagnosis.types import (
 
 @kernel
 def loss_of_frame(srf):
-    """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
+    """The interval of 1 + theta in [0, 1] with p = (1 + theta) u in the judged frame; lo > hi if none."""
     lo = srf.judged.lo
     hi = srf.judged.hi
-    return isolation.consistent_theta(
-        0.5 * (lo + hi),
-        0.5 * (hi - lo),
-        srf.judged.u,
-        0.0,
-        1.0,
-    )
+    return isolation.consistent_theta(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
 
 
 @kernel
@@ -66,7 +60,7 @@ def loss_interval(c, srf, h, k):
 
 @kernel
 def loss_range(c, srf, h, k):
-    """The command times what can be left."""
+    """(1 + theta) u, least and greatest."""
     lo = srf.sets.low[h]
     hi = srf.sets.high[h]
     u = srf.last.u
@@ -124,10 +118,10 @@ MAX_GROWTH_RATIO = 1.8
 
 @kernel
 def offset_of_frame(srf):
-    """Return the deflection error of the surface in the judged frame, (low, high) rad: unlimited at a stop.
+    """b = p - u of the surface in the judged frame, (lo, hi) rad: unlimited at a stop.
 
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
-    Nothing but a loss takes it beyond.
+    Nothing but a loss takes it beyond. p_min, p_max: of the positions within the frame.
     """
     lo = srf.judged.lo
     hi = srf.judged.hi
@@ -138,10 +132,7 @@ def offset_of_frame(srf):
     p_min = lo - max(u - cmd.u_min[1], 0.0)
     p_max = hi + max(cmd.u_max[1] - u, 0.0)
     b_lo = lo - u if p_min > srf.actuator.stop_lo else -np.inf
-    return (
-        b_lo,
-        hi - u if p_max < srf.actuator.stop_hi else np.inf,
-    )
+    return (b_lo, hi - u if p_max < srf.actuator.stop_hi else np.inf)
 
 
 @kernel
@@ -152,22 +143,21 @@ def bias_of_frame(c, srf, h, k):
 
 @kernel
 def bias_middle(srf, h):
-    """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
+    """b in the middle of its set, rad; unlimited while an end of that is open."""
     lo, hi = srf.sets.low[h], srf.sets.high[h]
     return set_middle(srf, h) if hi - lo < np.inf else np.inf
 
 
 @kernel
 def bias_range(c, srf, h, k):
-    """The command and the offset, cut off by the stops."""
+    """u + b, cut off by the stops."""
     lo = mean_with_offset(srf, srf.sets.low[h], srf.commands.u_min[0])
     return lo, mean_with_offset(srf, srf.sets.high[h], srf.commands.u_max[0])
 
 
 @kernel
 def mean_with_offset(srf, b, u_end):
-    """Return the mean deflection with an offset (rad); if a stop is met at an instant, that at
-    `u_end`."""
+    """Mean of u + b (rad) over the frame; if a stop is met at an instant, that of u_end + b."""
     cmd = srf.commands
     act = srf.actuator
     mean = srf.last.u + b
@@ -218,19 +208,17 @@ def forget_growing(c, srf, h, k):
 
 @kernel
 def narrow_offset(c, srf, lo, hi):
-    """Hold an offset between lo and hi (rad) against what a slower one can be.
+    """Hold an offset b in (lo, hi) rad against what a slower one than a runaway can be.
 
-    A mean over several instants may be that of the last of them."""
+    A mean over several instants may be that of the last of them.
+    """
     M = srf.growing_bias
     if hi < M.b_lo:
         M.has_run[0] = 1
     if lo > M.b_hi:
         M.has_run[1] = 1
     tol = 0.0 if c.single_instant else max_growth(c, srf)
-    M.b_lo, M.b_hi = (
-        max(M.b_lo, lo - tol),
-        min(M.b_hi, hi + tol),
-    )
+    M.b_lo, M.b_hi = (max(M.b_lo, lo - tol), min(M.b_hi, hi + tol))
 
 
 @kernel
@@ -242,10 +230,7 @@ def update_growing(c, srf, h, k):
     if np.isinf(lo) or np.isinf(hi):
         return UNLIMITED_SET
     M = srf.growing_bias
-    M.up, M.down = (
-        max(M.up, lo),
-        min(M.down, hi),
-    )
+    M.up, M.down = (max(M.up, lo), min(M.down, hi))
     was_up = M.up > 0.0
     was_down = M.down < 0.0
     shrinks = (was_up and hi < M.up) or (was_down and lo > M.down)
@@ -308,7 +293,7 @@ def reset_swing(srf, h):
 
 @kernel
 def add_square(c, srf, h):
-    """Sum the squares of the deflection error."""
+    """Sum (p - u)^2."""
     e = 0.5 * (srf.judged.lo + srf.judged.hi) - srf.judged.u
     srf.oscillatory.square += e**2
 
@@ -359,7 +344,7 @@ def swing_has_shown(srf):
 
 
 def swing_amplitude(fdi: np.void, s: int, h: int) -> float | None:
-    """Amplitude, rad."""
+    """Amplitude sqrt(2 mean (p - u)^2), rad."""
     M = fdi["types"]["surface"][s]["oscillatory"]
     return float(sqrt(2.0 * M["square_past"] / (M["last_end"] - M["first_end"])))
 
@@ -413,10 +398,7 @@ def update_creep(c, srf, h, k):
     else:
         away = lo > M.hi if side == 1 else hi < M.lo
         narrow_creep(c, srf, M, side)
-    M.lo, M.hi = (
-        max(M.lo, lo),
-        min(M.hi, hi),
-    )
+    M.lo, M.hi = (max(M.lo, lo), min(M.hi, hi))
     M.side, M.k_last = side, k
     return EMPTY_SET if away else UNLIMITED_SET
 
@@ -426,20 +408,15 @@ def narrow_creep(c, srf, M, side):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
 
-    side: 1 if the surface is above its command, -1 if it is below."""
+    side: 1 if the surface is above its command, -1 if it is below.
+    """
     motion = c.n_substeps * c.frames_per_block * srf.actuator.slow_step
     near = srf.actuator.slow_step / srf.actuator.approach_share
     lo, hi = orders_of_frame(c, srf)
     if side == 1:
-        M.hi = min(
-            M.hi,
-            max(M.hi - motion, hi + near),
-        )
+        M.hi = min(M.hi, max(M.hi - motion, hi + near))
     else:
-        M.lo = max(
-            M.lo,
-            min(M.lo + motion, lo - near),
-        )
+        M.lo = max(M.lo, min(M.lo + motion, lo - near))
 
 
 @kernel

@@ -21,6 +21,8 @@ differs from the plain mean by the covariance of G and a, over the mean of G, so
 the set before the earliest return still possible is kept, and is restored when the surface looks healthy.
 
 *Hardover*: by each frame the surface has come at least as far as its least rate takes it, and it stays.
+
+b: slot of releases, EARLIER_SLOT or LATER_SLOT; rel: record of the releases. Symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -51,10 +53,7 @@ HEALTHY_RAD = 1e-14
 @kernel
 def clear_releases(srf, b, h):
     """No release of this type is possible: the empty interval."""
-    (
-        srf.release.back_lo[b, h],
-        srf.release.back_hi[b, h],
-    ) = np.inf, -np.inf
+    (srf.release.back_lo[b, h], srf.release.back_hi[b, h]) = np.inf, -np.inf
 
 
 @kernel
@@ -75,19 +74,16 @@ def allow_before(srf, h):
 @kernel
 def empty_held(srf, h):
     """This type does not hold the surface in the judged frame: the empty interval."""
-    srf.release.held_lo[h], srf.release.held_hi[h] = (
-        np.inf,
-        -np.inf,
-    )
+    srf.release.held_lo[h], srf.release.held_hi[h] = (np.inf, -np.inf)
 
 
 @kernel
 def simulate_return(c, srf, p0, sign=0):
-    """Mean position over the judged frame of a surface released at `p0` (rad), its position at
-    the end of the frame, and the possible error of the mean where the effectiveness changes meanwhile.
+    """Mean of p over the judged frame of a surface released at p0 (rad), p at the end of the frame, and
+    kappa times the range of p, by which the mean may be off.
 
-    The release is at the beginning of the frame; with a sign, at any instant of it: the least
-    mean if it is -1, the greatest if it is 1.
+    p <- f(p), f a step of the actuator towards u. The release is at the beginning of the frame; with a sign,
+    at any instant of it: the least mean if it is -1, the greatest if it is 1.
     """
     total = 0.0
     n = 0
@@ -100,19 +96,10 @@ def simulate_return(c, srf, p0, sign=0):
             total += p
             n += 1
             p_min, p_max = min(p_min, p), max(p_max, p)
-            p = nearer(
-                p,
-                u,
-                srf.actuator.approach_share,
-                srf.actuator.step,
-            )
+            p = nearer(p, u, srf.actuator.approach_share, srf.actuator.step)
             if sign != 0:
                 p = min(p, p0) if sign == -1 else max(p, p0)
-    return (
-        total / n,
-        p,
-        srf.judged.kappa * (p_max - p_min),
-    )
+    return (total / n, p, srf.judged.kappa * (p_max - p_min))
 
 
 @kernel
@@ -146,20 +133,15 @@ def keep_returns(c, srf, h):
 def narrow_return(c, srf, b, h):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
-    The mean over the frame rises with where the return began, and by no more than that.
+    The mean over the frame rises with where the return began, and by no more than that. low, high: means of
+    the returns from the ends of the interval.
     """
     rel = srf.release
     low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h])
     high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h])
     tol = max(tol_low, tol_high)
     u = srf.judged.u
-    if (
-        max(
-            abs(low - tol - u),
-            abs(high + tol - u),
-        )
-        <= HEALTHY_RAD
-    ):
+    if max(abs(low - tol - u), abs(high + tol - u)) <= HEALTHY_RAD:
         return False
     if low - tol > srf.judged.hi or high + tol < srf.judged.lo:
         return False
@@ -173,10 +155,7 @@ def narrow_return(c, srf, b, h):
 def replace_earlier(srf, h):
     """Take the later releases for the earlier ones, when no earlier one is possible any more."""
     rel = srf.release
-    (
-        rel.back_lo[EARLIER_SLOT, h],
-        rel.back_hi[EARLIER_SLOT, h],
-    ) = (
+    (rel.back_lo[EARLIER_SLOT, h], rel.back_hi[EARLIER_SLOT, h]) = (
         rel.back_lo[LATER_SLOT, h],
         rel.back_hi[LATER_SLOT, h],
     )
@@ -186,20 +165,14 @@ def replace_earlier(srf, h):
 @kernel
 def set_return(rel, b, h, lo, hi):
     """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
-    (
-        rel.back_lo[b, h],
-        rel.back_hi[b, h],
-    ) = (
-        min(lo, hi),
-        max(lo, hi),
-    )
+    (rel.back_lo[b, h], rel.back_hi[b, h]) = (min(lo, hi), max(lo, hi))
 
 
 @kernel
 def judge_held(c, srf, h, lo, hi):
-    """Whether a type holds the surface between these positions (rad) in the judged frame: IS_HELD; or has
-    released it, and the actuator may be bringing it back: IS_RETURNING; or neither explains it:
-    IS_REFUTED."""
+    """Whether a type holds the surface between lo and hi in the judged frame: IS_HELD; or has released it,
+    and the actuator may be bringing it back: IS_RETURNING; or neither explains it: IS_REFUTED.
+    """
     returns = c.returns_lagged and keep_returns(c, srf, h)
     released = srf.release.released
     if lo <= srf.judged.hi and hi >= srf.judged.lo and not released[h]:
@@ -219,8 +192,7 @@ def held_interval(c, srf, h, lo, hi):
 
 @kernel
 def frame_start(c, srf, k):
-    """Return the possible position at the start of the judged frame, (low, high) rad, and the frame that
-    shows it.
+    """The possible position at the start of the judged frame, (lo, hi) rad, and the frame that shows it.
 
     With several JSBSim frames in one of ours the release may have been within it: the frame before is used.
     """
@@ -231,15 +203,11 @@ def frame_start(c, srf, k):
 
 @kernel
 def add_release(srf, h, lo, hi):
-    """Add a release from between held_lo and held_hi (rad), where a type may hold the
-    surface, if the interval is not empty."""
+    """Add a release from between lo and hi, where a type may hold the surface, unless lo > hi."""
     rel = srf.release
     empty_held(srf, h)
     if lo <= hi and not rel.released[h]:
-        rel.held_lo[h], rel.held_hi[h] = (
-            lo,
-            hi,
-        )
+        rel.held_lo[h], rel.held_hi[h] = (lo, hi)
         rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
         rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
 
@@ -254,13 +222,7 @@ def propagate_returns(c, srf, h):
         if may_return(srf, b, h):
             _, lo, _ = simulate_return(c, srf, rel.back_lo[b, h])
             _, hi, _ = simulate_return(c, srf, rel.back_hi[b, h])
-            set_return(
-                rel,
-                b,
-                h,
-                lo,
-                hi,
-            )
+            set_return(rel, b, h, lo, hi)
     if c.frames_per_block > 1 and rel.held_lo[h] <= rel.held_hi[h]:
         _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1)
         _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1)
@@ -284,13 +246,7 @@ def reset_stuck(srf, h):
 @kernel
 def update_stuck(c, srf, h, k):
     """It stays where it is."""
-    status = judge_held(
-        c,
-        srf,
-        h,
-        srf.sets.low[h],
-        srf.sets.high[h],
-    )
+    status = judge_held(c, srf, h, srf.sets.low[h], srf.sets.high[h])
     if status == IS_HELD:
         return srf.judged.lo, srf.judged.hi
     return EMPTY_SET if status == IS_REFUTED else UNLIMITED_SET
@@ -301,12 +257,7 @@ def add_stuck_release(c, srf, h, k):
     """Add a release from the interval of the jammed position."""
     store_stuck(srf, h)
     lo, hi, _ = frame_start(c, srf, k)
-    add_release(
-        srf,
-        h,
-        max(lo, srf.sets.low[h]),
-        min(hi, srf.sets.high[h]),
-    )
+    add_release(srf, h, max(lo, srf.sets.low[h]), min(hi, srf.sets.high[h]))
 
 
 @kernel
@@ -314,20 +265,11 @@ def store_stuck(srf, h):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
     M = srf.stuck
     if not may_return(srf, EARLIER_SLOT, h):
-        (
-            M.lo_before[EARLIER_SLOT],
-            M.hi_before[EARLIER_SLOT],
-        ) = (
+        (M.lo_before[EARLIER_SLOT], M.hi_before[EARLIER_SLOT]) = (
             M.lo_before[LATER_SLOT],
             M.hi_before[LATER_SLOT],
         )
-        (
-            M.lo_before[LATER_SLOT],
-            M.hi_before[LATER_SLOT],
-        ) = (
-            srf.sets.low[h],
-            srf.sets.high[h],
-        )
+        (M.lo_before[LATER_SLOT], M.hi_before[LATER_SLOT]) = (srf.sets.low[h], srf.sets.high[h])
         replace_earlier(srf, h)
 
 
@@ -360,12 +302,7 @@ def add_float_release(c, srf, h, k):
     """Add a release from the neutral position."""
     lo, hi, _ = frame_start(c, srf, k)
     p = clip_travel(srf, 0.0)
-    add_release(
-        srf,
-        h,
-        max(lo, p),
-        min(hi, p),
-    )
+    add_release(srf, h, max(lo, p), min(hi, p))
 
 
 @kernel
@@ -434,7 +371,9 @@ FLOAT = FaultType(
 
 @kernel
 def runaway_distance(c, srf, k):
-    """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
+    """The least way (rad) that a runaway has gone by a frame, runaway block_duration_s n; over a block the
+    mean was reached within it.
+    """
     n = k - srf.evidence.k_first
     if c.frames_per_block > 1:
         n = max(n - 1, 0)
@@ -446,10 +385,7 @@ def runaway_low(c, srf, k):
     """Return the least upward deflection of a runaway by a frame, rad; the stop at most."""
     if srf.evidence.k_first < 0:
         return srf.actuator.stop_lo
-    return min(
-        srf.actuator.stop_hi,
-        srf.evidence.first_lo + runaway_distance(c, srf, k),
-    )
+    return min(srf.actuator.stop_hi, srf.evidence.first_lo + runaway_distance(c, srf, k))
 
 
 @kernel
@@ -457,34 +393,19 @@ def runaway_high(c, srf, k):
     """Return the least downward deflection of a runaway by a frame, rad; the stop at most."""
     if srf.evidence.k_first < 0:
         return srf.actuator.stop_hi
-    return max(
-        srf.actuator.stop_lo,
-        srf.evidence.first_hi - runaway_distance(c, srf, k),
-    )
+    return max(srf.actuator.stop_lo, srf.evidence.first_hi - runaway_distance(c, srf, k))
 
 
 @kernel
 def update_up(c, srf, h, k):
     """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
-    return held_interval(
-        c,
-        srf,
-        h,
-        runaway_low(c, srf, k),
-        srf.actuator.stop_hi,
-    )
+    return held_interval(c, srf, h, runaway_low(c, srf, k), srf.actuator.stop_hi)
 
 
 @kernel
 def update_down(c, srf, h, k):
     """The same downwards."""
-    return held_interval(
-        c,
-        srf,
-        h,
-        srf.actuator.stop_lo,
-        runaway_high(c, srf, k),
-    )
+    return held_interval(c, srf, h, srf.actuator.stop_lo, runaway_high(c, srf, k))
 
 
 @kernel

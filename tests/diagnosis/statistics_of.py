@@ -111,8 +111,8 @@ class Across:
     @staticmethod
     def regress(fdi, view, innovation, share):
         view["leak"] = share
-        parts = (fdi["statistical"][name] for name in ("block", "forces", "gust", "vaneless"))
-        parity.fill_view_regressors(view, *parts, innovation)
+        along = sum(g * Across.part(fdi, view, innovation, i) for i, g in enumerate(view["col"]) if g)
+        parity.fill_view_regressors(view, fdi["statistical"]["block"], fdi["statistical"]["forces"], along)
 
     @staticmethod
     def sign(fdi, view, Gu):

@@ -47,7 +47,11 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
+<<<<<<< HEAD
     gusts.update_gust_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
+=======
+    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, dt)
+>>>>>>> symbols-A
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
     assert record["memory"]["v_g"] == pytest.approx(blown)
@@ -58,14 +62,14 @@ def test_the_speed_is_that_through_the_air_without_the_gust():
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
     record["config"]["v_max"] = 2.0
-    gusts.update_gust_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
+    gusts.update_gust_speed(record, (46.0, -71.5, 0.3), 44.1, 0.01)
     assert record["memory"]["v_g"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
     record = in_moving_air()
     record["output"]["measured"] = 0
-    gusts.update_gust_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
+    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, 0.5)
     assert record["output"]["V"] == 44.1
     assert gusts.unmeasured_share(record, 1) == 0.0
 

@@ -156,14 +156,12 @@ def fill_velocity(gust, y, attitude):
 
     y (5,) and attitude (3,) rad as measured.
     """
-    alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    fill_rotation(attitude[0], attitude[1], gust.memory.T)
-    gust.memory.heading = attitude[2]
-    v_x = V * np.cos(alpha) * np.cos(beta)
-    v_y = V * np.sin(beta)
-    v_z = V * np.sin(alpha) * np.cos(beta)
+    mem, V, alpha, beta = gust.memory, y[AIRSPEED], y[ALPHA], y[BETA]
+    fill_rotation(attitude[0], attitude[1], mem.T)
+    mem.heading = attitude[2]
+    v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
-        gust.memory.v[i] = gust.memory.T[0, i] * v_x + gust.memory.T[1, i] * v_y + gust.memory.T[2, i] * v_z
+        mem.v[i] = level_component(mem.T, v, i)
 
 
 @kernel
@@ -172,33 +170,27 @@ def start_gust(gust, y, attitude):
 
     If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
     """
+    mem, out = gust.memory, gust.output
     fill_velocity(gust, y, attitude)
-    update_axes(gust, 0.0, 1.0)
-    gust.memory.w[:] = 0.0
-    gust.memory.has_prev, gust.memory.turn_now = 0, 0.0
-    gust.memory.turn_past = gust.memory.start_share = gust.memory.start_left = float(
-        gust.config.starts_in_flight
-    )
-    gust.memory.v_g[:], gust.output.V = 0.0, y[AIRSPEED]
-    gust.memory.var_now[:] = 0.0
-    gust.memory.var_prev[:] = 0.0
-    gust.output.var_turn[:] = 0.0
-    gust.memory.n_turn = 0
+    update_axes(gust, 1.0 + 0.0j)
+    mem.w[:] = mem.v_g[:] = 0.0
+    mem.has_prev, mem.turn_now, mem.n_turn = 0, 0.0, 0
+    mem.turn_past = mem.start_share = mem.start_left = float(gust.config.starts_in_flight)
+    out.V = y[AIRSPEED]
+    mem.var_now[:] = mem.var_prev[:] = out.var_turn[:] = 0.0
 
 
 @kernel
-def update_axes(gust, sin, cos):
+def update_axes(gust, z):
     """Fill `C` for this instant, and keep that of the instant before in `C_dot`.
 
-    sin, cos: of the change of heading. JSBSim's gusts have the heading of the step before.
+    z = exp(-i change of heading). JSBSim's gusts have the heading of the step before.
     """
-    gust.memory.C_dot[:] = gust.output.C
+    T, C = gust.memory.T, gust.output.C
+    gust.memory.C_dot[:] = C
     for i in range(3):
-        ahead = gust.memory.T[i, 0]
-        right = gust.memory.T[i, 1]
-        gust.output.C[i, 0] = ahead * cos - right * sin
-        gust.output.C[i, 1] = ahead * sin + right * cos
-        gust.output.C[i, 2] = gust.memory.T[i, 2]
+        c = complex(T[i, 0], T[i, 1]) * z.conjugate()
+        C[i, 0], C[i, 1], C[i, 2] = c.real, c.imag, T[i, 2]
 
 
 @kernel
@@ -208,12 +200,12 @@ def fill_axes_rate(gust, dt, V):
     A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
     sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity.
     """
-    fastest = 0.0
+    C, C_dot, fastest = gust.output.C, gust.memory.C_dot, 0.0
     for i in range(3):
         for j in range(3):
-            gust.memory.C_dot[i, j] = (gust.output.C[i, j] - gust.memory.C_dot[i, j]) / dt
-            fastest = max(fastest, abs(gust.memory.C_dot[i, j]))
-    gust.memory.turns_fast = 0.5 * (fastest * gust.config.L_roll / V) ** 2 > FAST_TURN_SHARE
+            C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
+            fastest = max(fastest, abs(C_dot[i, j]))
+    gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, 0, V)) ** 2 > FAST_TURN_SHARE
 
 
 @kernel
@@ -240,86 +232,77 @@ def advance_gust(gust, y, attitude, dt):
     only decays, and the sum of changes v_g starts again. It does so one instant longer: JSBSim's gusts turn a
     step after the heading.
     """
-    a = gust.memory.scratch
+    mem, a = gust.memory, gust.memory.scratch
     for i in range(3):
-        a[i] = level_component(gust.memory.T, gust.memory.f, i)
+        a[i] = level_component(mem.T, mem.f, i)
     a[2] += gust.config.gravity
-    if not gust.memory.has_prev:
-        gust.memory.a_prev[:] = a[:3]
-        gust.memory.has_prev = 1
+    if not mem.has_prev:
+        mem.a_prev[:] = a[:3]
+        mem.has_prev = 1
     for i in range(3):
-        gust.memory.v[i] += dt * (1.5 * a[i] - 0.5 * gust.memory.a_prev[i])
-    turn = wrapped(attitude[2] - gust.memory.heading)
-    sin, cos = np.sin(turn), np.cos(turn)
-    v_x = gust.memory.v[0] * cos + gust.memory.v[1] * sin
-    v_y = gust.memory.v[1] * cos - gust.memory.v[0] * sin
-    v_z = gust.memory.v[2]
-    gust.memory.a_prev[0] = a[0] * cos + a[1] * sin
-    gust.memory.a_prev[1] = a[1] * cos - a[0] * sin
-    gust.memory.a_prev[2] = a[2]
+        mem.v[i] += dt * (1.5 * a[i] - 0.5 * mem.a_prev[i])
+    turn = wrapped(attitude[2] - mem.heading)
+    z = complex(np.cos(turn), -np.sin(turn))
+    v_h, a_h, v_z = complex(mem.v[0], mem.v[1]) * z, complex(a[0], a[1]) * z, mem.v[2]
+    mem.a_prev[0], mem.a_prev[1], mem.a_prev[2] = a_h.real, a_h.imag, a[2]
     fill_velocity(gust, y, attitude)
-    update_gust_speed(gust, v_x, v_y, v_z, y[AIRSPEED], dt)
-    V = gust.output.V
-    update_axes(gust, sin, cos)
-    fill_axes_rate(gust, dt, V)
-    update_rotation(gust, v_y, v_z, turn / dt, dt)
+    dv = v_h.real - mem.v[0], v_h.imag - mem.v[1], v_z - mem.v[2]
+    update_gust_speed(gust, dv, y[AIRSPEED], dt)
+    update_axes(gust, z)
+    fill_axes_rate(gust, dt, gust.output.V)
+    update_rotation(gust, dv, turn / dt, dt)
 
 
 @kernel
-def update_rotation(gust, v_y, v_z, psi_dot, dt):
+def update_rotation(gust, dv, psi_dot, dt):
     """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
 
-        w_q <- exp(-dt / tau_q) w_q + (v_z - v[2]) / V tau_q
-        w_r <- exp(-dt / tau_r) w_r + (v_y - v[1]) / V tau_r
+        w_q <- exp(-dt / tau_q) w_q + dv_z / V tau_q      w_r <- exp(-dt / tau_r) w_r + dv_y / V tau_r
 
-    v_y, v_z, m/s: velocity relative to the air if the gust had not changed. psi_dot rad/s; dt s.
+    dv (3,) m/s: change of the gust in level axes; psi_dot rad/s: rate of the heading; dt s.
     """
-    V = gust.output.V
+    mem, V = gust.memory, gust.output.V
     tau_q, tau_r = gust_lag(gust, 1, V), gust_lag(gust, 2, V)
-    previous = gust.memory.turn_now
-    gust.memory.turn_now = yaw_turn_share(gust, V, psi_dot)
-    larger = max(previous, gust.memory.turn_now)
-    gust.memory.turn_past = min(max(np.exp(-dt / tau_r) * gust.memory.turn_past, larger), 1.0)
-    gust.memory.start_share *= np.exp(-dt / tau_q)
-    gust.memory.w[1] = np.exp(-dt / tau_q) * gust.memory.w[1] + (v_z - gust.memory.v[2]) / (V * tau_q)
-    gust.memory.w[2] = np.exp(-dt / tau_r) * gust.memory.w[2]
+    a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
+    previous, mem.turn_now = mem.turn_now, yaw_turn_share(gust, V, psi_dot)
+    larger = max(previous, mem.turn_now)
+    mem.turn_past = min(max(a_r * mem.turn_past, larger), 1.0)
+    mem.start_share *= a_q
+    mem.w[1] = a_q * mem.w[1] + dv[2] / (V * tau_q)
+    mem.w[2] *= a_r
     if larger < 1.0:
-        gust.memory.w[2] += (v_y - gust.memory.v[1]) / (V * tau_r)
+        mem.w[2] += dv[1] / (V * tau_r)
     else:
-        gust.memory.v_g[:], gust.memory.start_left = (0.0, 1.0)
+        mem.v_g[:], mem.start_left = 0.0, 1.0
 
 
 @kernel
-def update_gust_speed(gust, v_x, v_y, v_z, V, dt):
+def update_gust_speed(gust, dv, V, dt):
     """Update v_g and V for the elapsed dt s.
 
-        v_g <- a v_g + (v_x, v_y, v_z) - v      V = |v + v_g|
+        v_g <- a v_g + dv      V = |v + v_g|
 
-    v_x, v_y, v_z, m/s: velocity relative to the air if the gust had not changed. V m/s: airspeed; it is the
-    speed if no gust is measured.
+    dv (3,) m/s: change of the gust in level axes. V m/s: airspeed; it is the speed if no gust is measured.
     """
+    mem, cfg = gust.memory, gust.config
     gust.output.V = V
     if not gust.output.measured:
         return
-    a = np.exp(-gust.config.a_v * dt)
-    gust.memory.start_left *= a * a
-    gust.memory.v_g[0] = a * gust.memory.v_g[0] + v_x - gust.memory.v[0]
-    gust.memory.v_g[1] = a * gust.memory.v_g[1] + v_y - gust.memory.v[1]
-    gust.memory.v_g[2] = a * gust.memory.v_g[2] + v_z - gust.memory.v[2]
-    V2 = 0.0
+    a, V2 = np.exp(-cfg.a_v * dt), 0.0
+    mem.start_left *= a * a
     for i in range(3):
-        gust.memory.v_g[i] = min(max(gust.memory.v_g[i], -gust.config.v_max), gust.config.v_max)
-        V2 += (gust.memory.v[i] + gust.memory.v_g[i]) ** 2
+        mem.v_g[i] = min(max(a * mem.v_g[i] + dv[i], -cfg.v_max), cfg.v_max)
+        V2 += (mem.v[i] + mem.v_g[i]) ** 2
     gust.output.V = max(np.sqrt(V2), 0.5 * V)
 
 
 @kernel
 def set_intensity(gust, altitude):
     """Fill Q at this altitude, m."""
-    h = least_height(altitude, gust.config.h0, gust.config.h1)
-    gust.memory.Q[0] = max(gust.config.Q_aloft[0], gust.config.Q_1m[0] / h**1.5)
-    for j in range(1, 3):
-        gust.memory.Q[j] = max(gust.config.Q_aloft[j], gust.config.Q_1m[j] / h)
+    cfg = gust.config
+    h = least_height(altitude, cfg.h0, cfg.h1)
+    for j in range(3):
+        gust.memory.Q[j] = max(cfg.Q_aloft[j], cfg.Q_1m[j] / (h**1.5 if j == 0 else h))
 
 
 @kernel
@@ -337,22 +320,23 @@ def fill_gust_effect(gust, design, x, y, u):
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
-    if gust.output.uses_accelerometers:
-        gust.memory.f[:] = gust.memory.f_read
-    elif gust.config.coarse_only:  # lift balances the weight, and turns with the bank
-        gust.memory.f[0] = gust.memory.f[1] = 0.0
-        gust.memory.f[2] = -gust.config.gravity / max(gust.memory.T[2, 2], MIN_BANK_COSINE)
+    cfg, mem, out = gust.config, gust.memory, gust.output
+    if out.uses_accelerometers:
+        mem.f[:] = mem.f_read
+    elif cfg.coarse_only:  # lift balances the weight, and turns with the bank
+        mem.f[0] = mem.f[1] = 0.0
+        mem.f[2] = -cfg.gravity / max(mem.T[2, 2], MIN_BANK_COSINE)
     else:
-        fill_force(gust, x, y, u, gust.memory.f)
-    rate_damping(design, x, y, u, gust.memory.scratch, gust.output.rate_damping)
+        fill_force(gust, x, y, u, mem.f)
+    rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
     for i in range(3):
-        w_i = gust.output.C[i, 1] * gust.memory.w[1] + gust.output.C[i, 2] * gust.memory.w[2]
-        gust.memory.w_body[i] = w_i if gust.output.measured or gust.config.coarse_only else 0.0
+        w_i = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
+        mem.w_body[i] = w_i if out.measured or cfg.coarse_only else 0.0
     for i in range(3):
         acc = 0.0
         for j in range(3):
-            acc -= gust.output.rate_damping[i, j] * gust.memory.w_body[j]
-        gust.output.acc[i], gust.output.acc_coarse[i] = (acc, 0.0) if gust.output.measured else (0.0, acc)
+            acc -= out.rate_damping[i, j] * mem.w_body[j]
+        out.acc[i], out.acc_coarse[i] = (acc, 0.0) if out.measured else (0.0, acc)
 
 
 @kernel
@@ -382,12 +366,6 @@ def store_accelerometer_reading(gust, f):
 
 
 @kernel
-def stop_gust(gust):
-    """Stop estimating the gust."""
-    gust.output.gusty = 0
-
-
-@kernel
 def drop_accelerometers(gust):
     """Stop using the accelerometers.
 
@@ -396,34 +374,19 @@ def drop_accelerometers(gust):
     gust.output.uses_accelerometers = 0
     if gust.output.measured and not gust.config.has_forces:
         gust.output.measured, gust.memory.share[:] = 0, 1.0
-        half_q = 0.5 * gust_length(gust, 1)
-        half_r = 0.5 * gust_length(gust, 2)
-        for i in range(3):
-            for j in range(3):
-                gust.memory.var_now[i, j] += (
-                    half_q * gust.memory.Q[1] * effect_product(gust, gust.output.C, i, j, 1)
-                )
-                gust.memory.var_now[i, j] += (
-                    half_r * gust.memory.Q[2] * effect_product(gust, gust.output.C, i, j, 2)
-                )
-        gust.memory.n_turn = 3
+        for j in range(1, 3):
+            add_variance(gust, gust.output.C, j, 0.5 * gust_lag(gust, j, 1.0) * gust.memory.Q[j])
 
 
 @kernel
 def unmeasured_share(gust, j):
     """Share of the intensity of the gust about axis j that is unmeasured in this frame."""
+    cfg, mem, V = gust.config, gust.memory, max(gust.output.V, 1.0)
     if j == 0:
-        return min(gust.memory.share[j], 1.0)
-    by_speed = (
-        gust.config.speed_error_share
-        * (gust.config.var_V + gust.memory.start_left * gust.config.var_v)
-        / max(gust.output.V, 1.0) ** 2
-        if gust.output.measured
-        else 0.0
-    )
-    return min(
-        gust.memory.share[j] + by_speed + (gust.memory.start_share if j == 1 else gust.memory.turn_past), 1.0
-    )
+        return min(mem.share[j], 1.0)
+    var = cfg.var_V + mem.start_left * cfg.var_v if gust.output.measured else 0.0
+    by_time = mem.start_share if j == 1 else mem.turn_past
+    return min(mem.share[j] + cfg.speed_error_share * var / V**2 + by_time, 1.0)
 
 
 @kernel
@@ -433,7 +396,7 @@ def rolling_scale(gust, j):
     A gust of the rolling gust's length and with this share of the intensity has the same power at low
     frequency. It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
     """
-    return (gust_length(gust, j) / gust.config.L_roll) ** 2 if gust.config.coarse_only else 1.0
+    return (gust_lag(gust, j, 1.0) / gust.config.L_roll) ** 2 if gust.config.coarse_only else 1.0
 
 
 @kernel
@@ -445,12 +408,6 @@ def gust_lag(gust, j, V):
 
 
 @kernel
-def gust_length(gust, j):
-    """Correlation length of the gust about axis j, m, as in `design.rotation_lengths`: lag at 1 m/s."""
-    return gust_lag(gust, j, 1.0)
-
-
-@kernel
 def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
     """Intensity, (rad/s2)2/s, of the drift of accelerations i_1 and i_2 by the unmeasured rotation; V m/s.
 
@@ -459,15 +416,11 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
     as_rolling: that of a gust with the correlation length of the rolling gust and equal power at low
     frequency.
     """
-    Q_V = 0.0
+    C, Q_V = gust.output.C, 0.0
     for j in range(3):
+        Q = unmeasured_share(gust, j) * gust.memory.Q[j]
         scale = rolling_scale(gust, j) if as_rolling else 1.0
-        Q_V += (
-            effect_product(gust, gust.output.C, i_1, i_2, j)
-            * unmeasured_share(gust, j)
-            * gust.memory.Q[j]
-            * scale
-        )
+        Q_V += effect_product(gust, C, i_1, i_2, j) * Q * scale
     return Q_V * max(V, gust.output.V)
 
 
@@ -477,15 +430,20 @@ def add_turn_variance(gust, V, dt):
 
     dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
     """
-    if not gust.memory.turns_fast:
+    mem = gust.memory
+    if not mem.turns_fast:
         return
-    Q_p = 0.5 * gust_lag(gust, 0, V) ** 2 * gust.memory.Q[0]
-    Q_r = 0.5 * gust_lag(gust, 2, V) ** 2 * gust.memory.Q[2] * gust.memory.turn_past
+    add_variance(gust, mem.C_dot, 0, 0.5 * dt * V * gust_lag(gust, 0, V) ** 2 * mem.Q[0])
+    add_variance(gust, mem.C_dot, 2, 0.5 * dt * V * gust_lag(gust, 2, V) ** 2 * mem.Q[2] * mem.turn_past)
+
+
+@kernel
+def add_variance(gust, C, j, q):
+    """Add to var_now the variance of the accelerations by a variance q of the gust about axis j; C as of
+    `effect_product`. It lasts for three frames."""
     for i in range(3):
-        for j in range(3):
-            by_p = effect_product(gust, gust.memory.C_dot, i, j, 0)
-            by_r = effect_product(gust, gust.memory.C_dot, i, j, 2)
-            gust.memory.var_now[i, j] += dt * V * (Q_p * by_p + Q_r * by_r)
+        for k in range(3):
+            gust.memory.var_now[i, k] += q * effect_product(gust, C, i, k, j)
     gust.memory.n_turn = 3
 
 
@@ -496,15 +454,15 @@ def finish_gust(gust, share):
     share: one over the number of instants. Axes may turn in the middle of a frame. A part of the effect is
     then in this frame and the rest in the next, so the variance counts in both frames.
     """
+    mem, out = gust.memory, gust.output
     for i in range(3):
-        gust.output.acc_mean[i] = share * gust.memory.acc_sum[i]
-    if gust.memory.n_turn > 0:
-        gust.memory.n_turn -= 1
+        out.acc_mean[i] = share * mem.acc_sum[i]
+    if mem.n_turn > 0:
+        mem.n_turn -= 1
         for i in range(3):
             for j in range(3):
-                gust.output.var_turn[i, j] = gust.memory.var_prev[i, j] + gust.memory.var_now[i, j]
-                gust.memory.var_prev[i, j] = gust.memory.var_now[i, j]
-                gust.memory.var_now[i, j] = 0.0
+                out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
+                mem.var_prev[i, j], mem.var_now[i, j] = mem.var_now[i, j], 0.0
 
 
 @kernel
@@ -515,12 +473,11 @@ def full_drift(gust, V, L_rate, L_force):
 
     L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
-    Q_V, tau_p = 0.0, gust_lag(gust, 0, V)
+    C, C_dot, Q, Q_V = gust.output.C, gust.memory.C_dot, gust.memory.Q, 0.0
+    tau = gust_lag(gust, 0, V) if gust.memory.turns_fast else 0.0
     for j in range(3):
-        L_all = abs(project_gust(L_rate, gust.output.C, j)) + abs(project_gust(L_force, gust.output.C, j))
-        Q_V += L_all**2 * gust.memory.Q[j]
-        if gust.memory.turns_fast:
-            Q_V += 0.5 * tau_p * tau_p * gust.memory.Q[j] * project_gust(L_rate, gust.memory.C_dot, j) ** 2
+        L_all = abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
+        Q_V += (L_all**2 + 0.5 * (tau * project_gust(L_rate, C_dot, j)) ** 2) * Q[j]
     return Q_V * max(V, gust.output.V)
 
 
@@ -532,10 +489,10 @@ def remaining_drift(gust, V, L_rate, L_force):
 
     On the forces the whole rotation acts. L_rate, L_force: see `full_drift`.
     """
-    Q_V = 0.0
+    C, Q_V = gust.output.C, 0.0
     for j in range(3):
-        L_left = np.sqrt(unmeasured_share(gust, j)) * abs(project_gust(L_rate, gust.output.C, j))
-        Q_V += (L_left + abs(project_gust(L_force, gust.output.C, j))) ** 2 * gust.memory.Q[j]
+        L_left = np.sqrt(unmeasured_share(gust, j)) * abs(project_gust(L_rate, C, j))
+        Q_V += (L_left + abs(project_gust(L_force, C, j))) ** 2 * gust.memory.Q[j]
     return Q_V * max(V, gust.output.V)
 
 
@@ -551,11 +508,8 @@ def effect_product(gust, C, i_1, i_2, j):
 
     C (3, 3): axes of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
-    q_1, q_2 = 0.0, 0.0
-    for k in range(3):
-        q_1 += gust.output.rate_damping[i_1, k] * C[k, j]
-        q_2 += gust.output.rate_damping[i_2, k] * C[k, j]
-    return q_1 * q_2
+    L = gust.output.rate_damping
+    return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)
 
 
 def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> None:

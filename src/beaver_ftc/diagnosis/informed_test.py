@@ -60,14 +60,10 @@ class WhiteningFilter:
         Q = np.diag(np.concatenate((Q_x, (1.0 - a**2) * sigma**2)))
         P = np.diag(np.concatenate((np.diagonal(self.R), sigma**2)))
         for _ in range(_SETTLING_FRAMES):
-            P = self._measured_covariance(P)
-            P = self.F @ P @ self.F.T + Q
+            K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
+            P = self.F @ (P - K @ P[:3]) @ self.F.T + Q
         self.S = P[:3, :3] + self.R
         self.K = np.linalg.solve(self.S, P[:3]).T
-
-    def _measured_covariance(self, P: np.ndarray) -> np.ndarray:
-        K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
-        return P - K @ P[:3]
 
     def whitened_response(self, phi: np.ndarray) -> np.ndarray:
         """The effect g (n, 3, ...) of phi (n, 3, ...) rad/s2 on the innovations, scaled to variance one.

@@ -170,6 +170,7 @@ def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
 
 def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     pitch, lateral = fdi["statistical"]["block"][:2]
+    (pitch["n"], lateral["n"]), (pitch["axes"][0], lateral["axes"]) = (1, 2), (1, (0, 2))
     views = fdi["statistical"]["views"]
     before = views[PAST_AILERON]["block"]["regressor"][5:].copy()
     for v, expected in (

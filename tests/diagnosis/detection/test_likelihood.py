@@ -245,7 +245,7 @@ def _largest_share(block, innovations, moments, shown=None):
     gust, by the vanes."""
     block["alarm_level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
-        block["g_c"][0] = 0.0 if shown is None else shown[k]
+        block["g_c"][0] = shown[k] if block["has_coarse"] else 0.0
         likelihood.reset_slot(block, likelihood.restarting_slot(k))
         block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:

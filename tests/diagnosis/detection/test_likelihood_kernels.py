@@ -49,15 +49,16 @@ def test_a_coarse_gust_is_whitened_as_the_innovation_is_and_summed_with_the_same
     before[: 2 * N_SLOTS] = rng.normal(size=2 * N_SLOTS)
     block["tests"]["correlation_from_coarse_gust"] = before.reshape(-1, N_GROUP_TESTS)
     block["hypothesis"]["signature"][:2, :2] = rng.normal(size=(2, 2))
-    likelihood.set_coarse_gust(block, gust)
+    likelihood.set_coarse_gust(block, is_estimated * gust)
     settled = block.copy()
     likelihood.advance_covariance(settled, DT)
     white = through(settled, [gust[[2, 0]]])[0]
     likelihood.update_block(block, np.zeros(3), False, DT, keep)
     weights = onset_tests_of(block, "w")
-    expected = np.where(np.arange(before.size) < 2 * N_SLOTS, keep * before + white @ weights, before)
+    share = keep * before + is_estimated * white @ weights
+    expected = np.where(np.arange(before.size) < 2 * N_SLOTS, share, before)
     found = onset_tests_of(block, "correlation_from_coarse_gust")
-    assert found == pytest.approx(expected if is_estimated else before)
+    assert found == pytest.approx(expected)
     assert np.abs(white @ weights).max() > 0.0
 
 

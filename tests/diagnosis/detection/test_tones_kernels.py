@@ -69,17 +69,13 @@ def resonance(samples):
     return np.exp(np.multiply.outer(1j * TONES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
 
 
-def as_complex(pair):
-    return pair[0] + 1j * pair[1]
-
-
 def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_test_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
     listen(view, tone_test_config, samples, regressors, uses_regressors=True)
     found = view["tones"]
-    assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
+    assert found["N"] == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
-        assert as_complex(found["R"][j]) == pytest.approx(resonance(2.0 * regressors[:, j]))
+        assert found["R"][j] == pytest.approx(resonance(2.0 * regressors[:, j]))
     faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
     assert found["D"] == pytest.approx(EVERY * faded)
     assert not found["R"][3:].any()
@@ -99,9 +95,9 @@ def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_test_config):
 def test_what_is_not_heard_lets_the_rest_fade(view, tone_test_config, rng):
     samples = rng.normal(size=20)
     listen(view, tone_test_config, samples)
-    then = np.abs(as_complex(view["tones"]["correlation"]))
+    then = np.abs(view["tones"]["N"])
     listen(view, tone_test_config, np.full(10, 1e6), heard=False)
-    assert np.abs(as_complex(view["tones"]["correlation"])) == pytest.approx(
+    assert np.abs(view["tones"]["N"]) == pytest.approx(
         then * exp(-10 * DT / TONE_MEMORY_S)
     )
 
@@ -123,7 +119,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = parity.tone_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = parity.tone_gain(K_x, K_d, keep, np.exp(1j * angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
@@ -133,7 +129,7 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
         view["eta"] = bound
         listen(view, tone_test_config, np.zeros(EVERY))
     angle = TONES_RAD_S * DT
-    passed = np.array([parity.tone_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    passed = parity.tone_gain(0.3, 0.8, 1.0, np.exp(1j * angle), DT)
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONES_RAD_S, age_s)) @ faded)
@@ -185,7 +181,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
     record = new_fdi()["statistical"]["views"][0]["tones"]
-    record["R"][0, :, 4], size = parts, np.hypot(*parts)
+    record["R"][0, 4], size = complex(*parts), np.hypot(*parts)
     parity.bound_coefficients(record, np.array([0.3]), 1)
     assert 0.3 * size * (1.0 - 1e-12) <= record["e_R"][4] <= 0.3 * 1.0825 * size + 1e-300
     assert record["e_R"][5] == 0.0
@@ -193,16 +189,8 @@ def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_mor
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
     record = view["tones"]
-    record["R"][:] = 9.0
-    (
-        record["R"][:2, 0],
-        record["R"][:2, 1],
-        record["e_R"],
-    ) = (
-        -3.0,
-        0.0,
-        7.0,
-    )
+    record["R"][:] = 9.0 + 9.0j
+    record["R"][:2], record["e_R"] = -3.0, 7.0
     parity.bound_coefficients(record, np.array([0.1, 0.2, 0.4]), 2)
     assert record["e_R"] == pytest.approx(np.full(N_TONES, 0.9))
 
@@ -221,27 +209,15 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
 
 def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_test_config):
     record = view["tones"]
-    record["D"], record["correlation"][0, 3], record["correlation"][1, 3] = (
-        100.0,
-        60.0,
-        80.0,
-    )
-    (
-        record["e_R"][3],
-        record["correlation"][0, 7],
-        tone_test_config["v_share"][:],
-    ) = (
-        10.0,
-        12.0,
-        0.6,
-    )
+    record["D"], record["N"][3], record["N"][7] = 100.0, 60.0 + 80.0j, 12.0
+    record["e_R"][3], tone_test_config["v_share"] = 10.0, 0.6
     parity.score_tones(record, tone_test_config, 6.0)
     root = sqrt(100.0 * tone_test_config["v_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
     record["eta"][3] = 200.0
     parity.score_tones(record, tone_test_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
-    record["correlation"][:] = 0.0
+    record["N"][:] = 0.0
     parity.score_tones(record, tone_test_config, 6.0)
     assert record["score"] == 0.0
 

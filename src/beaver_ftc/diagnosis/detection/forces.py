@@ -32,7 +32,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
-from beaver_ftc.diagnosis.gusts import drop_accelerometers, stop_gust
+from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -40,6 +40,7 @@ from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
 SIDE_INDEX, NORMAL_INDEX = range(2)  # across the body, and normal to it
 FORCE_NAMES = ("CY", "CZ")
+VANES = BETA, ALPHA  # of each force, in y
 SIDE_ROW = FORCES.index("CY")
 TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
 MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
@@ -91,16 +92,11 @@ def update_both_forces(forces, gust, meas, u, dt):
     for i in range(2):
         f_prev = forces.component[i].f_hat
         update_force(forces, gust, i, meas, u)
-        bound_lag(forces.component[i], f_prev, forces.n_seen, dt)
-        update_inertial(forces, forces.component[i], i, meas.y, dt)
+        f = forces.component[i]
+        f.e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
+        update_inertial(forces, f, i, meas.y, dt)
     fill_angle_rates(forces, meas)
     forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
-
-
-@kernel
-def bound_lag(f, f_prev, seen, dt):
-    """Fill e_lag = MAX_FORCE_LAG_S |f_hat - f_prev| / dt, 0 unless seen: force and flow differ in time."""
-    f.e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if seen else 0.0
 
 
 @kernel
@@ -114,18 +110,17 @@ def fill_vaneless_y(forces, w, y):
     forces.y_free[:] = y
     for i in range(2):
         f = forces.component[i]
-        vane = BETA if i == SIDE_INDEX else ALPHA
         e_w = 0.0
         for k in range(3):
             e_w += f.L[k] * w[k]
-        forces.y_free[vane] -= (f.innovation / forces.q_ratio + e_w) / f.vane[1]
+        forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[1]
 
 
 @kernel
 def drop_forces(forces, gust, inertial):
     """Stop using forces, and estimate the gust without accelerometers."""
     drop_accelerometers(gust)
-    stop_gust(inertial)
+    inertial.output.gusty = 0
     forces.in_use = 0
 
 
@@ -135,7 +130,7 @@ def update_inertial(forces, f, i, y, dt):
 
     angle <- angle + dt angle_rate      e_inertial = e - slope (y - angle)      e_drift = sum dt slope
     """
-    angle = y[BETA if i == SIDE_INDEX else ALPHA]
+    angle = y[VANES[i]]
     slope = f.vane[1] * forces.q_ratio
     f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
     f.e_drift += dt * slope
@@ -243,7 +238,7 @@ def _configure_force(
     y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
     forces, cfg = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
     f, terms = forces["component"][i], terms_of_force(aircraft, i)
-    vane, axis = ((BETA, 2), (ALPHA, 1))[i]
+    vane, axis = VANES[i], (2, 1)[i]
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
     f_all = per_C * _force_slopes(aircraft, FORCE_NAMES[i], trim)
     f_y = f_all[:-1]

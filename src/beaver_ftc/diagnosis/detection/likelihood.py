@@ -131,11 +131,11 @@ GROUP_SIZE = 4
 N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
 TESTS_RECORD = record(
     supporting_correlation_sign=N_GROUP_TESTS,  # sign of N that supports the hypothesis, or 0
-    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS),  # signature since the onset, rad/s2; state of its filter
+    # signature since the onset, rad/s2; state of its filter; g_s of the frame
+    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS),
     w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
     e_R=N_GROUP_TESTS,
-    # exp(-kappa t) of a growing loss, or 1 until a loss has ended; signature at the end of a loss, rad/s2
-    left=N_GROUP_TESTS, s_end=(2, N_GROUP_TESTS),
+    left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
     e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
     N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,  # N_p; N_c
     score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
@@ -158,14 +158,10 @@ def set_signs(b: np.void, kinds: Sequence[int]) -> None:
         b["tests"]["supporting_correlation_sign"][h // GROUP_SIZE, k : k + N_SLOTS] = SIGN_OF_KIND[kind]
 
 
-def max_test_groups(size: BlockCapacity) -> int:
-    """The number of groups of onset tests that the hypotheses of a block need."""
-    return (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
-
-
 @sized
 def block_dtype(size: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
+    n_groups = (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
@@ -179,8 +175,8 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         n_Z=int, tol=size.max_regressors, regressor=(size.max_regressors, 2),
         x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
-        tests=(TESTS_RECORD, max_test_groups(size)),
-        R=(max_test_groups(size), size.max_regressors, N_GROUP_TESTS),
+        tests=(TESTS_RECORD, n_groups),
+        R=(n_groups, size.max_regressors, N_GROUP_TESTS),
     )  # fmt: skip
 
 
@@ -289,22 +285,8 @@ def whiten_regressors(b, dt):
 
     In a block of one axis all values of a second axis are zero.
     """
-    K_x, K_d, a = b.K_x, b.K_d, b.a
-    x00, x01 = K_x[0, 0], K_x[0, 1]
-    x10, x11 = K_x[1, 0], K_x[1, 1]
-    d00, d01 = K_d[0, 0], K_d[0, 1]
-    d10, d11 = K_d[1, 0], K_d[1, 1]
-    Z = b.regressor
-    x = b.x_Z
-    g = b.g_Z
     for j in range(b.n_Z):
-        g0 = x[j, 0] + dt * (Z[j, 0] - x[j, 2])
-        g1 = x[j, 1] + dt * (Z[j, 1] - x[j, 3])
-        g[j, 0], g[j, 1] = g0, g1
-        x[j, 0] = g0 - x00 * g0 - x01 * g1
-        x[j, 1] = g1 - x10 * g0 - x11 * g1
-        x[j, 2] = a * x[j, 2] + (d00 * g0 + d01 * g1)
-        x[j, 3] = a * x[j, 3] + (d10 * g0 + d11 * g1)
+        whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
 
 
 @kernel
@@ -322,21 +304,17 @@ def update_calm_part(b, dt):
 
     The sums, pg and pp, are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before.
     """
-    calm = b.calm
-    p = b.p
-    g = b.g
-    decay = np.exp(-dt / CALM_MEMORY_S)
+    p, g, decay = b.p, b.g, np.exp(-dt / CALM_MEMORY_S)
     b.pg *= decay
     b.pp *= decay
     for i in range(b.n):
-        p[i] = g[i] - calm.g[i]
+        p[i] = g[i] - b.calm.g[i]
     for i in range(b.n):
         for j in range(b.n):
             b.pg += p[i] * b.S_inv[i, j] * g[j]
             b.pp += p[i] * b.S_inv[i, j] * p[j]
-    den = b.pp + CALM_PRIOR
-    num = b.pg + CALM_PRIOR + CALM_STDS * sqrt(den)
-    lam = min(max(num / den, 0.0), 1.0)
+    D = b.pp + CALM_PRIOR
+    lam = min(max((b.pg + CALM_PRIOR + CALM_STDS * sqrt(D)) / D, 0.0), 1.0)
     for i in range(b.n):
         p[i] *= lam
 
@@ -358,27 +336,21 @@ def tests_in_group(b, i):
 
 
 @kernel
-def n_test_groups(b):
-    """The number of groups of onset tests in use."""
-    return (b.n_h + GROUP_SIZE - 1) // GROUP_SIZE
+def n_test_groups(n_h):
+    """The number of groups of onset tests that n_h hypotheses need."""
+    return (n_h + GROUP_SIZE - 1) // GROUP_SIZE
 
 
 @kernel
 def reset_slot(b, slot):
     """Restart a slot: its onset is the next frame, without evidence."""
-    for group in range(n_test_groups(b)):
+    for group in range(n_test_groups(b.n_h)):
         t = b.tests[group]
         for k in range(slot, tests_in_group(b, group), N_SLOTS):
-            t.correlation[k] = t.information[k] = 0.0
-            t.w[0, k] = t.w[1, k] = 0.0
-            t.e_0[k] = t.e_tv[k] = 0.0
-            t.e_w[k] = 0.0
-            t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
+            t.correlation[k] = t.information[k] = t.w[0, k] = t.w[1, k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
             t.left[k] = 1.0
-            for i in range(4):
-                t.x_s[i, k] = 0.0
-            for j in range(b.n_Z):
-                b.R[group, j, k] = 0.0
+            t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
@@ -404,75 +376,56 @@ def update_signatures(h, t, first):
     """Fill s (2,) rad/s2 of hypothesis h for each of its onsets, tests first, first + 1, ...
 
     It is the signature of the frame; for a growing loss times 1 - left, left = exp(-kappa t); for the end of
-    a loss that of the onset, s_end.
+    a loss that of the onset.
     """
-    s0, s1 = h.signature[0], h.signature[1]
     for k in range(first, first + N_SLOTS):
-        if h.kind == LOSS_END:
-            if t.left[k] > 0.0:
-                t.left[k] = 0.0
-                t.s_end[0, k] = s0
-                t.s_end[1, k] = s1
-            t.s[0, k] = t.s_end[0, k]
-            t.s[1, k] = t.s_end[1, k]
-        elif h.kind == GROWING_LOSS:
+        grown = 1.0
+        if h.kind == GROWING_LOSS:
             t.left[k] *= h.decay
-            grown = 1.0 - t.left[k]
-            t.s[0, k] = grown * s0
-            t.s[1, k] = grown * s1
-        else:
-            t.s[0, k] = s0
-            t.s[1, k] = s1
+            grown -= t.left[k]
+        elif h.kind == LOSS_END:
+            if t.left[k] == 0.0:
+                continue
+            t.left[k] = 0.0
+        for i in range(2):
+            t.s[i, k] = grown * h.signature[i]
 
 
 @kernel
 def accumulate_tests(b, t, n, dt, decay):
-    """Whiten s of the first n tests of a group t, and add the frame to their sums:
+    """Whiten s of the first n tests of a group t, and add the frame to their sums, axis by axis:
 
-        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s      N_p <- decay N_p + w' p
+        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s
+        N_p <- decay N_p + w' p                    N_c <- decay N_c + w' g_c
         e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
         e_w <- decay e_w + eta_rate eta_r' |w|
 
-    gs0, gs1: g_s; x00 ... d11: entries of K_x and K_d; r0, r1, c0, c1: entries of eta_r and eta_0. In a block
-    of one axis all values of a second axis are zero.
+    In a block of one axis all values of a second axis are zero.
     """
-    K_x, K_d, S_inv = b.K_x, b.K_d, b.S_inv
-    x00, x01 = K_x[0, 0], K_x[0, 1]
-    x10, x11 = K_x[1, 0], K_x[1, 1]
-    d00, d01 = K_d[0, 0], K_d[0, 1]
-    d10, d11 = K_d[1, 0], K_d[1, 1]
-    S00, S01, S10, S11 = S_inv[0, 0], S_inv[0, 1], S_inv[1, 0], S_inv[1, 1]
-    a = b.a
-    g0 = b.g[0]
-    g1 = b.g[1]
-    p0 = b.p[0]
-    p1 = b.p[1]
-    r0 = b.eta_r[0]
-    r1 = b.eta_r[1]
-    c0 = b.eta_0[0]
-    c1 = b.eta_0[1]
-    x = t.x_s
-    s = t.s
-    w = t.w
-    eta_rate = b.eta_rate
-    for k in range(n):
-        gs0 = x[0, k] + dt * (s[0, k] - x[2, k])
-        gs1 = x[1, k] + dt * (s[1, k] - x[3, k])
-        x[0, k] = gs0 - x00 * gs0 - x01 * gs1
-        x[1, k] = gs1 - x10 * gs0 - x11 * gs1
-        x[2, k] = a * x[2, k] + (d00 * gs0 + d01 * gs1)
-        x[3, k] = a * x[3, k] + (d10 * gs0 + d11 * gs1)
-        w0 = S00 * gs0 + S01 * gs1
-        w1 = S10 * gs0 + S11 * gs1
-        t.correlation[k] = decay * t.correlation[k] + (w0 * g0 + w1 * g1)
-        t.information[k] = decay * t.information[k] + w0 * gs0 + w1 * gs1
-        t.N_p[k] = (decay * t.N_p[k]) + (w0 * p0 + w1 * p1)
-        tv = r0 * abs(w0 - w[0, k]) + r1 * abs(w1 - w[1, k])
-        const = c0 * abs(w0) + c1 * abs(w1)
-        t.e_0[k] = decay * t.e_0[k] + const
-        t.e_tv[k] = decay * t.e_tv[k] + tv
-        t.e_w[k] = decay * t.e_w[k] + eta_rate * (r0 * abs(w0) + r1 * abs(w1))
-        w[0, k], w[1, k] = w0, w1
+    x, g_s, w, a, N_c = t.x_s, t.g_s, t.w, b.a, t.correlation_from_coarse_gust
+    for i in range(b.n):
+        for k in range(n):
+            g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[2 + i, k])
+            x[i, k] = g_s[i, k]
+            x[2 + i, k] *= a
+    for i in range(b.n):
+        for j in range(b.n):
+            K_x, K_d = b.K_x[i, j], b.K_d[i, j]
+            for k in range(n):
+                x[i, k] -= K_x * g_s[j, k]
+                x[2 + i, k] += K_d * g_s[j, k]
+        S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
+        keep, c, r, r_w = 1.0 if i else decay, b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
+        for k in range(n):
+            w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
+            t.correlation[k] = keep * t.correlation[k] + w_i * g
+            t.information[k] = keep * t.information[k] + w_i * g_s[i, k]
+            t.N_p[k] = keep * t.N_p[k] + w_i * p
+            N_c[k] = keep * N_c[k] + w_i * g_c
+            t.e_0[k] = keep * t.e_0[k] + c * abs(w_i)
+            t.e_tv[k] = keep * t.e_tv[k] + r * abs(w_i - w[i, k])
+            t.e_w[k] = keep * t.e_w[k] + r_w * abs(w_i)
+            w[i, k] = w_i
 
 
 @kernel
@@ -485,18 +438,11 @@ def accumulate_regressors(b, t, R, n, decay):
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
-    w = t.w
-    e_R = t.e_R
-    g, tol = b.g_Z, b.tol
-    n_Z = b.n_Z
+    w, e_R, g, tol, n_Z = t.w, t.e_R, b.g_Z, b.tol, b.n_Z
     e_R[:n] = 0.0
     for j in range(0, n_Z - 1, 2):
-        ga0 = g[j, 0]
-        ga1 = g[j, 1]
-        gb0 = g[j + 1, 0]
-        gb1 = g[j + 1, 1]
-        Ra, Rb = R[j], R[j + 1]
-        tol_a, tol_b = tol[j], tol[j + 1]
+        ga0, ga1, gb0, gb1 = g[j, 0], g[j, 1], g[j + 1, 0], g[j + 1, 1]
+        Ra, Rb, tol_a, tol_b = R[j], R[j + 1], tol[j], tol[j + 1]
         for k in range(n):
             w0, w1 = w[0, k], w[1, k]
             R_a = decay * Ra[k] + (w0 * ga0 + w1 * ga1)
@@ -511,19 +457,6 @@ def accumulate_regressors(b, t, R, n, decay):
 
 
 @kernel
-def accumulate_gust(b, t, n, decay):
-    """Add the frame to the share of N that a coarse gust contributes: N_c <- decay N_c + w' g_c.
-
-    `accumulate_tests` must have filled w.
-    """
-    g0, g1 = (b.g_c[0], b.g_c[1])
-    for k in range(n):
-        t.correlation_from_coarse_gust[k] = decay * t.correlation_from_coarse_gust[k] + (
-            t.w[0, k] * g0 + t.w[1, k] * g1
-        )
-
-
-@kernel
 def accumulate_evidence(b, with_Z, dt, decay):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `decay`.
 
@@ -531,11 +464,9 @@ def accumulate_evidence(b, with_Z, dt, decay):
     """
     for h in range(b.n_h):
         update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
-    for i in range(n_test_groups(b)):
+    for i in range(n_test_groups(b.n_h)):
         t, n = b.tests[i], tests_in_group(b, i)
         accumulate_tests(b, t, n, dt, decay)
-        if b.has_coarse:
-            accumulate_gust(b, t, n, decay)
         if with_Z:
             accumulate_regressors(b, t, b.R[i], n, decay)
 
@@ -592,24 +523,18 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
     always include it, because the model's error is mapped: it is then large and lasting.
     """
-    sign = t.supporting_correlation_sign
-    r0 = b.eta_r[0]
-    r1 = b.eta_r[1]
-    level = b.alarm_level
-    share = b.noise_share
-    weight = 0.0 if without_eta else 1.0
+    sign, level, share = t.supporting_correlation_sign, b.alarm_level, b.noise_share
+    r0, r1 = b.eta_r[0], b.eta_r[1]
     for k in range(n):
         N, D = t.correlation[k], t.information[k]
-        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
-        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
         signed, known = sign[k] != 0.0, D > 0.0
         N_s = sign[k] * N if signed else abs(N)
+        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
+        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
         eta = uncertain_share(t, k, r0, r1)
-        e_all = e + (eta if mapped and not signed else weight * eta)
         score = evidence_ratio(level, share, N_s - e, eta, D)
-        llr = max_llr(signed, N_s, D)
-        lo = max_llr(signed, N_s - e_all, D)
-        hi = max_llr(signed, N_s + e_all, D)
+        e += 0.0 if without_eta and (signed or not mapped) else eta
+        llr, lo, hi = max_llr(signed, N_s, D), max_llr(signed, N_s - e, D), max_llr(signed, N_s + e, D)
         t.score[k] = score if known else 0.0
         t.llr_lo[k] = lo if known else 0.0
         t.llr_hi[k] = hi if known else 0.0
@@ -623,25 +548,20 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
     They are the largest over its onsets. decay: if a loss may end, the factor by which earlier upper bounds
     decay; else 0. mapped: see `evaluate_tests`.
     """
-    for i in range(n_test_groups(b)):
+    for i in range(n_test_groups(b.n_h)):
         evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
     for h, hyp in enumerate(b.hypothesis[: b.n_h]):
-        t = b.tests[h // GROUP_SIZE]
-        first = (h % GROUP_SIZE) * N_SLOTS
-        score, best, k_best = 0.0, -1.0, -1
-        lo, hi = (0.0, decay * hyp.llr_hi)
+        t, first = b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS
+        k_best = first
+        hyp.score, hyp.llr_lo, hyp.llr_hi = 0.0, 0.0, decay * hyp.llr_hi
         for k in range(first, first + N_SLOTS):
-            score = max(score, t.score[k])
-            lo = max(lo, t.llr_lo[k])
-            hi = max(hi, t.llr_hi[k])
-            if t.llr[k] > best:
-                best, k_best = t.llr[k], k
-        hyp.score = score
-        hyp.llr_lo, hyp.llr_hi = lo, hi
-        if k_best >= 0:
-            N = t.correlation[k_best]
-            D = t.information[k_best]
-            hyp.th, hyp.D = (estimate_theta(hyp.kind, N, D), D)
+            hyp.score = max(hyp.score, t.score[k])
+            hyp.llr_lo, hyp.llr_hi = max(hyp.llr_lo, t.llr_lo[k]), max(hyp.llr_hi, t.llr_hi[k])
+            if t.llr[k] > t.llr[k_best]:
+                k_best = k
+        if t.llr[k_best] > -1.0:
+            N, hyp.D = t.correlation[k_best], t.information[k_best]
+            hyp.th = estimate_theta(hyp.kind, N, hyp.D)
 
 
 @kernel

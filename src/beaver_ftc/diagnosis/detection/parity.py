@@ -58,7 +58,7 @@ tests of tones k is a frequency, t their record, c their configuration.
     b, f        block of a view; record of a force; `rates`: block of the rates that the view combines
     nu          innovation of the rates (3,), rad/s2
     L           acceleration per rad/s of rotation of the air, 1/s
-    N, R        (2, N_TONES), (n_Z, 2, N_TONES): sums as above, real and imaginary part
+    N, R        sums as above, (N_TONES,) and (n_Z, N_TONES) complex
     z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
     cfg         configuration of the statistical tests
 """
@@ -74,9 +74,10 @@ from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import moment_axis
-from beaver_ftc.diagnosis.detection import forces, likelihood
+from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
+    MAX_FORCE_REGRESSORS,
     MIN_UPDATES,
     NORMAL_INDEX,
     SIDE_INDEX,
@@ -110,8 +111,7 @@ MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
 TONE_RECORD = record(
     V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
     stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
-    # decay of a sum in an update; cos and sin of w dt; of an update, times a, of w and of 2 w
-    a=float, z=(2, N_TONES), rho=(2, N_TONES), rho2=(2, N_TONES),
+    a=float, z=(complex, N_TONES), rho=(complex, N_TONES), rho2=(complex, N_TONES),  # a: decay in an update
     # largest mean of cos(w t) d(t) for |d| <= 1; share of the larger of the variances of N's two parts
     c=N_TONES, v_share=N_TONES,
 )  # fmt: skip
@@ -122,10 +122,10 @@ def tones_dtype(n_Z: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
         n_new=int, sum_g=float, sum_Z=n_Z,  # frames since the last update; sums of g and g_Z over sqrt(S)
-        correlation=(2, N_TONES), R=(n_Z, 2, N_TONES),  # N and R_j: real and imaginary parts
+        N=(complex, N_TONES), R=(complex, n_Z, N_TONES),
         # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
         # filtered bound, and over its component at twice the frequency
-        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(2, N_TONES),
+        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(complex, N_TONES),
         D=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
     )  # fmt: skip
@@ -157,9 +157,9 @@ def update_tones(view, c, level, inside, with_Z, dt):
     t.n_new += 1
     if t.n_new < c.stride:
         return
-    resonate(c, t.correlation, t.sum_g)
+    resonate(t.N, c.rho, t.sum_g)
     for j in range(n_Z):
-        resonate(c, t.R[j], t.sum_Z[j])
+        resonate(t.R[j], c.rho, t.sum_Z[j])
         t.sum_Z[j] = 0.0
     t.D = c.a * c.a * t.D + t.n_new
     update_tone_eta(t, c, b, weight * view.eta[0], dt)
@@ -169,27 +169,21 @@ def update_tones(view, c, level, inside, with_Z, dt):
 
 
 @kernel
-def resonate(c, N, v):
-    """N <- rho N + v at each frequency: an update of N (2, N_TONES), real and imaginary part, by v."""
-    rho = c.rho
-    for j in range(N.shape[1]):
-        re = N[0, j]
-        im = N[1, j]
-        N[0, j] = rho[0, j] * re - rho[1, j] * im + v
-        N[1, j] = rho[1, j] * re + rho[0, j] * im
+def resonate(N, rho, v):
+    """N <- rho N + v at each frequency; N, rho (N_TONES,) complex."""
+    for k in range(N.size):
+        N[k] = rho[k] * N[k] + v
 
 
 @kernel
-def tone_gain(K_x, K_d, a, cos, sin, dt):
+def tone_gain(K_x, K_d, a, z, dt):
     """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
 
     g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
-    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = cos + i sin = exp(i w dt)
+    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
+
     """
-    q = (cos - a) * (cos - a) + sin * sin
-    re = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - a) / q
-    im = sin * (1.0 - K_x) - (dt * K_d * sin / q)
-    return dt / np.sqrt(re * re + im * im)
+    return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
 
 
 @kernel
@@ -201,19 +195,11 @@ def update_tone_eta(t, c, b, eta, dt):
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
-    rho2 = c.rho2
-    a = c.a
-    v = eta * t.n_new
-    for j in range(t.eta.size):
-        cos = c.z[0, j]
-        sin = c.z[1, j]
-        Wv = v * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, cos, sin, dt)
-        re = t.b_2[0, j]
-        im = t.b_2[1, j]
-        t.b_2[0, j] = rho2[0, j] * re - rho2[1, j] * im + Wv
-        t.b_2[1, j] = rho2[1, j] * re + rho2[0, j] * im
-        t.b_0[j] = a * t.b_0[j] + Wv
-        t.eta[j] = c.c[j] * (t.b_0[j] + np.hypot(t.b_2[0, j], t.b_2[1, j]))
+    for k in range(t.eta.size):
+        v = eta * t.n_new * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
+        t.b_0[k] = c.a * t.b_0[k] + v
+        t.b_2[k] = c.rho2[k] * t.b_2[k] + v
+        t.eta[k] = c.c[k] * (t.b_0[k] + abs(t.b_2[k]))
 
 
 @kernel
@@ -224,12 +210,9 @@ def bound_coefficients(t, tol, n_Z):
     """
     t.e_R[:] = 0.0
     for j in range(n_Z):
-        R = t.R[j]
-        tol_j = tol[j]
         for k in range(t.e_R.size):
-            re = abs(R[0, k])
-            im = abs(R[1, k])
-            t.e_R[k] += tol_j * (max(re, im) + 0.41421356237309515 * min(re, im))
+            x, y = abs(t.R[j, k].real), abs(t.R[j, k].imag)
+            t.e_R[k] += tol[j] * (max(x, y) + 0.41421356237309515 * min(x, y))
 
 
 @kernel
@@ -237,9 +220,9 @@ def score_tones(t, c, level):
     """Fill `score`, the largest over the frequencies: |N| - e_R over noise and eta, scaled to the level."""
     score = 0.0
     for k in range(t.e_R.size):
-        evidence = np.hypot(t.correlation[0, k], t.correlation[1, k]) - t.e_R[k]
-        v = c.v_share[k] * t.D
-        score = max(score, evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, evidence, t.eta[k], v))
+        N = abs(t.N[k]) - t.e_R[k]
+        ratio = evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, N, t.eta[k], c.v_share[k] * t.D)
+        score = max(score, ratio)
     t.score = score * level / c.alarm_level
 
 
@@ -259,21 +242,14 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
     rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
     """
-    c["c"] = max_tone_mean(TONES_RAD_S, rate)
-    c["V_min"] = V / MAX_V_FACTOR
-    c["V_max"] = V * MAX_V_FACTOR
     stride = max(round(TONE_INTERVAL_S / dt), 1)
-    phase = TONES_RAD_S * dt
-    a = exp(-stride * dt / TONE_MEMORY_S)
-    c["stride"] = stride
-    c["a"] = a
-    c["alarm_level"] = sqrt(-2.0 * np.log(false_alarm))
-    c["z"] = np.cos(phase), np.sin(phase)
-    c["rho"] = (a * np.cos(stride * phase), a * np.sin(stride * phase))
-    c["rho2"] = (a * np.cos(2.0 * stride * phase), a * np.sin(2.0 * stride * phase))
+    z, a = np.exp(1j * TONES_RAD_S * dt), exp(-stride * dt / TONE_MEMORY_S)
+    c["V_min"], c["V_max"] = V / MAX_V_FACTOR, V * MAX_V_FACTOR
+    c["stride"], c["a"], c["alarm_level"] = stride, a, sqrt(-2.0 * np.log(false_alarm))
+    c["z"], c["rho"], c["rho2"] = z, a * z**stride, a * z ** (2 * stride)
+    c["c"] = max_tone_mean(TONES_RAD_S, rate)
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    difference = (1.0 - a**2) / np.abs(1.0 - a**2 * np.exp(2j * stride * phase))
-    c["v_share"] = 0.5 * (1.0 + difference)
+    c["v_share"] = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - (a * z**stride) ** 2)
 
 
 VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
@@ -329,10 +305,8 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
 def view_innovation(view, forces, gust, inertial, nu, i):
     """Component i of the innovation that a view projects, rad/s2: of the rates, nu (3,), or of a force."""
     if i < SIDE_FORCE:
-        acc = 0.0
-        if subtracts_gust(view, gust):
-            acc = gust_of_view(view, gust, inertial).output.acc_mean[i]
-        return nu[i] - acc
+        own = inertial if view.vane_free else gust
+        return nu[i] - (own.output.acc_mean[i] if subtracts_gust(view, gust) else 0.0)
     f = forces.component[i - SIDE_FORCE]
     return f.e_inertial if view.by_inertia else f.innovation
 
@@ -342,14 +316,12 @@ def column_entry(view, forces, bound, G, place):
     """Entry 0 or 1 (place) of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane_pair[place], view.nulled
     if s == VANE_VIEW:
-        entry = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
-        return entry, VANE_TOLERANCE * abs(entry)
+        g = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
+        return g, VANE_TOLERANCE * abs(g)
     if i >= SIDE_FORCE:
         f = forces.component[i - SIDE_FORCE]
-        entry = f.G_prev[s]
-        return entry, f.e_G[s]
-    e = bound.eG[i, s] if bound.has_eG else 0.0
-    return G[i, s], e
+        return f.G_prev[s], f.e_G[s]
+    return G[i, s], bound.eG[i, s] if bound.has_eG else 0.0
 
 
 @kernel
@@ -369,13 +341,11 @@ def turn_view(view, forces, gust, bound, G):
     norm = np.sqrt(g_i * g_i + g_j * g_j)
     if norm == 0.0:
         return 0.0
-    view.direction[i] = -g_j / norm
-    view.direction[j] = g_i / norm
-    view.col[i] = g_i / norm
-    view.col[j] = g_j / norm
-    e_m = abs(view.direction[i]) * e_i + abs(view.direction[j]) * e_j
-    e_norm = abs(view.direction[j]) * e_i + abs(view.direction[i]) * e_j
-    return e_m / max(norm - e_norm, MIN_NORM_SHARE * norm)
+    c, s = g_i / norm, g_j / norm
+    view.direction[i], view.direction[j] = -s, c
+    view.col[i], view.col[j] = c, s
+    c, s = abs(c), abs(s)
+    return (s * e_i + c * e_j) / max(norm - (c * e_i + s * e_j), MIN_NORM_SHARE * norm)
 
 
 @kernel
@@ -386,25 +356,20 @@ def turn_vane_view(view, forces, gust):
 
     b: column of an error of the side vane, rad/s2 per rad; q: effect of the rolling gust on the rates, 1/s.
     """
-    f = forces.component[0]
-    b_p = f.vane_roll
-    b_r = f.vane[0]
-    b_Y = f.vane[1]
-    q_p = project_gust(gust.output.rate_damping[ROLL], gust.output.C, 0)
-    q_r = project_gust(gust.output.rate_damping[YAW], gust.output.C, 0)
-    m_p = -b_Y * q_r
-    m_r = b_Y * q_p
-    m_Y = b_p * q_r - b_r * q_p
+    f, C, L = forces.component[0], gust.output.C, gust.output.rate_damping
+    b_p, b_r, b_Y = f.vane_roll, f.vane[0], f.vane[1]
+    q_p, q_r = project_gust(L[ROLL], C, 0), project_gust(L[YAW], C, 0)
+    m_p, m_r, m_Y = -b_Y * q_r, b_Y * q_p, b_p * q_r - b_r * q_p
     norm_m = np.sqrt(m_p * m_p + m_r * m_r + m_Y * m_Y)
     if norm_m == 0.0:
         return 0.0
     norm_b = np.sqrt(b_p * b_p + b_r * b_r + b_Y * b_Y)
-    e_m = 0.0
+    e = 0.0
     for i, b_i, m_i in ((ROLL, b_p, m_p), (YAW, b_r, m_r), (SIDE_FORCE, b_Y, m_Y)):
         view.direction[i] = m_i / norm_m
         view.col[i] = b_i / norm_b
-        e_m += VANE_TOLERANCE * abs(view.direction[i] * b_i)
-    return e_m / ((1.0 - VANE_TOLERANCE) * norm_b)
+        e += VANE_TOLERANCE * abs(view.direction[i] * b_i)
+    return e / ((1.0 - VANE_TOLERANCE) * norm_b)
 
 
 @kernel
@@ -420,92 +385,65 @@ def uses_force(view):
 
 
 @kernel
-def gust_of_view(view, gust, inertial):
-    """The gust estimate that a view uses: from the vanes, or from inertial motion if it must not use them."""
-    return inertial if view.vane_free else gust
-
-
-@kernel
-def fill_sensitivity(view, forces, L):
-    """Fill `L_rate` and `L_force` (3,), 1/s: projected acceleration per rad/s of rotation of the air.
-
-    L_rate = m' L      L_force = sum over the forces of m L_f      L (3, 3) 1/s: rate damping
-    """
-    m = view.direction
-    for k in range(3):
-        p = m[ROLL] * L[ROLL, k]
-        q = m[PITCH] * L[PITCH, k]
-        r = m[YAW] * L[YAW, k]
-        view.L_rate[k] = p + q + r
-        view.L_force[k] = 0.0
-        for i in range(2):
-            view.L_force[k] += m[SIDE_FORCE + i] * forces.component[i].L[k] * forces.q_ratio
-
-
-@kernel
 def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
     """Fill R_y, Q_x, Q_d and eta of a view from the declared ones, projected on m; V m/s.
 
     R_y = m^2 R_y      sqrt(Q_x) = |m| sqrt(noise)      eta = |m| eta
+    L_rate = m' L      L_force = sum over the forces of m L_f      Q_d: of the gust, by L_rate and L_force
+
     """
-    b, m = view.block, view.direction
+    b, m, L = view.block, view.direction, gust.output.rate_damping
     R_y, std, eta, Q_d = 0.0, 0.0, 0.0, 0.0
+    view.L_rate[:] = view.L_force[:] = 0.0
     for i in range(3):
         R_y += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].R_y[i // 2]
-        std += abs(m[i]) * np.sqrt(noise.Q[i])
-        if view.vane_free:
-            std += abs(m[i]) * forces.gust_noise[i]
+        std += abs(m[i]) * (np.sqrt(noise.Q[i]) + view.vane_free * forces.gust_noise[i])
         eta += abs(m[i]) * (noise.eta[i] + noise.eta_free[i])
-    for k, f in enumerate(forces.component):
-        std += abs(m[SIDE_FORCE + k]) * np.sqrt(f.var[view.by_inertia])
-        if view.by_inertia:
-            Q_d += (m[SIDE_FORCE + k] * forces.q_ratio) ** 2 * f.Q_e
-        eta += abs(m[SIDE_FORCE + k]) * (f.eta_u * forces.q_ratio + f.e_lag)
+        for j in range(3):
+            view.L_rate[j] += m[i] * L[i, j]
+    for i, f in enumerate(forces.component):
+        m_i = m[SIDE_FORCE + i]
+        std += abs(m_i) * np.sqrt(f.var[view.by_inertia])
+        eta += abs(m_i) * (f.eta_u * forces.q_ratio + f.e_lag)
+        Q_d += view.by_inertia * (m_i * forces.q_ratio) ** 2 * f.Q_e
+        for j in range(3):
+            view.L_force[j] += m_i * f.L[j] * forces.q_ratio
     if gust.output.gusty:
-        fill_sensitivity(view, forces, gust.output.rate_damping)
         if subtracts_gust(view, gust):
-            Q_d += remaining_drift(gust_of_view(view, gust, inertial), V, view.L_rate, view.L_force)
+            own = inertial if view.vane_free else gust
+            Q_d += remaining_drift(own, V, view.L_rate, view.L_force)
         else:
             Q_d += full_drift(gust, V, view.L_rate, view.L_force)
         for i in range(3):
             for j in range(3):
                 b.P_dd[0, 0] += m[i] * m[j] * gust.output.var_turn[i, j]
-    limited = max(eta, likelihood.MIN_ETA_RAD_S2)
-    b.R_y[0] = R_y
-    b.Q_x[0] = std * std
-    view.eta[0] = eta
-    b.Q_d[0, 0] = Q_d + noise.q * limited * limited
+    b.R_y[0], b.Q_x[0], view.eta[0] = R_y, std * std, eta
+    b.Q_d[0, 0] = Q_d + noise.q * max(eta, likelihood.MIN_ETA_RAD_S2) ** 2
 
 
 @kernel
-def fill_view_regressors(view, blocks, forces, gust, inertial, nu):
+def fill_view_regressors(view, blocks, forces, nu_col):
     """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
 
-    nu (3,) rad/s2.
+    nu_col rad/s2: innovation along the column.
     """
-    b, m = view.block, view.direction
-    i_1, i_2 = view.plane_pair[0], view.plane_pair[1]
-    rates = blocks[PITCH_BLOCK if i_1 == PITCH else LATERAL_BLOCK]
-    for j in range(rates.n_Z):
-        if i_1 == PITCH:
-            b.regressor[j, 0] = m[PITCH] * rates.regressor[j, 0]
-        else:
-            b.regressor[j, 0] = m[ROLL] * rates.regressor[j, 0] + m[YAW] * rates.regressor[j, 1]
+    b, m, force = view.block, view.direction, view.plane_pair[1]
+    rates = blocks[PITCH_BLOCK if view.plane_pair[0] == PITCH else LATERAL_BLOCK]
     n = rates.n_Z
-    if i_2 >= SIDE_FORCE and m[i_2] != 0.0:
-        f = forces.component[i_2 - SIDE_FORCE]
+    for j in range(n):
+        b.regressor[j, 0] = 0.0
+        for i in range(rates.n):
+            b.regressor[j, 0] += m[rates.axes[i]] * rates.regressor[j, i]
+    if force >= SIDE_FORCE and m[force] != 0.0:
+        f = forces.component[force - SIDE_FORCE]
         for j in range(f.n_Z):
-            b.regressor[n + j, 0] = m[i_2] * f.regressor[j]
+            b.regressor[n + j, 0] = m[force] * f.regressor[j]
         n += f.n_Z
         if view.by_inertia:
-            b.regressor[n, 0] = m[i_2] * f.e_drift
-            n = n + 1
+            b.regressor[n, 0] = m[force] * f.e_drift
+            n += 1
     if view.nulled != AXIS_VIEW:
-        b.regressor[n, 0] = 0.0
-        for i in range(m.size):
-            if view.col[i] != 0.0:
-                nu_i = view_innovation(view, forces, gust, inertial, nu, i)
-                b.regressor[n, 0] += view.leak * view.col[i] * nu_i
+        b.regressor[n, 0] = view.leak * nu_col
 
 
 @kernel
@@ -531,13 +469,15 @@ def project_innovation(views, with_Z, noise, blocks, forces, gust, inertial, nu,
         if not view.used:
             continue
         fill_view_noise(view, noise, blocks, forces, gust, inertial, V)
-        m, nu_m = view.direction, view.block.nu
-        nu_m[0] = 0.0
+        m, col, nu_m, nu_col = view.direction, view.col, 0.0, 0.0
         for i in range(m.size):
-            if m[i] != 0.0:
-                nu_m[0] += m[i] * view_innovation(view, forces, gust, inertial, nu, i)
+            if m[i] != 0.0 or col[i] != 0.0:
+                nu_i = view_innovation(view, forces, gust, inertial, nu, i)
+                nu_m += m[i] * nu_i
+                nu_col += col[i] * nu_i
+        view.block.nu[0] = nu_m
         if with_Z or view.always_Z:
-            fill_view_regressors(view, blocks, forces, gust, inertial, nu)
+            fill_view_regressors(view, blocks, forces, nu_col)
 
 
 @kernel
@@ -674,36 +614,33 @@ def _unit_sum(ones: tuple[int, ...]) -> tuple[float, ...]:
 
 def required_size(aircraft: Aircraft) -> StatisticalSize:
     """The capacities that the records of an aircraft need."""
-    axes = [moment_axis(term) for term in aircraft.moments]
     directions = list(list_directions(aircraft, aircraft.forces_separate_surfaces))
-    n_rate = N_INPUT_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
+    n_rate = N_INPUT_READINGS + _largest_block([moment_axis(term) for term in aircraft.moments])
     n_force = (
-        max(len(terms_of_force(aircraft, i)) for i in (SIDE_INDEX, NORMAL_INDEX))
-        + forces.MAX_FORCE_REGRESSORS
-        - MAX_TERMS_OF_ONE
+        max(len(terms_of_force(aircraft, i)) for i in range(2)) + MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE
     )
     lost = [aircraft.dominant_axis[aircraft.surfaces.index(name)] for name in aircraft.class_of_losses]
-    n_lost = max(lost.count(PITCH), lost.count(ROLL) + lost.count(YAW))
     n_tested = max(len(d.tested_losses) for d in directions)
     error_map = aircraft.file.model_error_map
     n_boxes = len(error_map.boxes) if error_map else 0
     return StatisticalSize(
-        BlockCapacity(n_rate, 3 * n_lost + 2),
+        BlockCapacity(n_rate, 3 * _largest_block(lost) + 2),
         BlockCapacity(n_rate + n_force + 2, n_tested + 1),
         len(directions),
         n_boxes,
     )
 
 
+def _largest_block(axes: list[int]) -> int:
+    """How many of these axes the block of pitch or that of roll and yaw has, whichever has more."""
+    return max(axes.count(PITCH), len(axes) - axes.count(PITCH))
+
+
 def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
-    subtracts = (
-        forces["in_use"]
-        and gusty
-        and all(aircraft.separated_by_force(FORCE_NAMES[i]) for i in (SIDE_INDEX, NORMAL_INDEX))
-    )
+    subtracts = forces["in_use"] and gusty and all(aircraft.separated_by_force(name) for name in FORCE_NAMES)
     directions = list(list_directions(aircraft, bool(forces["in_use"])))
     stat["n_views"] = min(len(directions), len(stat["views"]))
     for view, d in zip(stat["views"], directions, strict=False):
@@ -799,7 +736,6 @@ def fill_view_signatures(view, forces, Gu):
         s = h.surface
         h.signature[0] = 1.0
         if h.kind != STEP_FAULT:
-            acc = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            h.signature[0] = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for i in range(2):
-                acc += m[SIDE_FORCE + i] * forces.component[i].Gu[s]
-            h.signature[0] = acc
+                h.signature[0] += m[SIDE_FORCE + i] * forces.component[i].Gu[s]

@@ -180,9 +180,9 @@ def test_the_error_of_one_angle_leaves_nothing_beyond_it(wrong):
     for _ in range(20):
         attitude, step = rng.uniform((-3, -1.2, -3), (3, 1.2, 3)), rng.uniform(-1e-3, 1e-3)
         redundancy["memory"]["predicted_reading"][PHI : PHI + 3] = attitude
-        relations.fill_quaternion(*attitude, redundancy["memory"]["q_pred"])
+        q = relations.attitude(redundancy["memory"]["predicted_reading"])
         readings[PHI : PHI + 3] = attitude + step * (np.arange(3) == wrong)
-        relations.fill_residuals(redundancy, readings)
+        relations.fill_residuals(redundancy, readings, q)
         watching.filter_beyond(monitor, readings)
         size += abs(step)
     beyond = abs(monitor["memory"]["beyond"]).max(axis=(1, 2))

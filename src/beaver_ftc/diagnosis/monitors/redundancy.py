@@ -158,7 +158,7 @@ MONITOR_MEMORY_RECORD = record(
     # size there, of this frame and the one before
     w_att=3, w_att_past=3, peak=3, peak_past=3, peak_older=3, floor=3, floor_past=3,
     # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
-    w=3, w_bound=3, w_bound_past=3, w_past=3,
+    w=3, w_bound=3,
     agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
     # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
     # beyond it no gyro can be broken
@@ -677,9 +677,3 @@ def run_tests(red, y, has_engine):
         for i in range(2):
             k = ENGINE_SPEED + i
             compare(red.test[RPM_TEST + i], y[k] - M.engine_commands[i], M.reading_bound[k])
-
-
-@kernel
-def start_drift(red, t):
-    """Fill the bound on the attitude's drift by t s, which begins with the flight."""
-    red.memory.e_drift = red.config.drift * t

@@ -100,7 +100,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     compare_duplicates,
     leak,
     run_tests,
-    start_drift,
     start_tests,
     store_sample,
     too_steep,
@@ -367,7 +366,7 @@ def begin_monitor(mon, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
     M, red = mon.memory, mon.redundancy
     M.stage, M.t_start = 1, t
-    start_drift(red, t)
+    red.memory.e_drift = red.config.drift * t
     start_tests(red, measured.signal, measured.force)
     start_bounds(mon.initial_errors, measured.signal)
     M.y_older[:] = red.memory.y_past
@@ -408,17 +407,14 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
-    M, D = mon.memory, mon.config.D
-    w, B, w_past, B_past = M.w, M.w_bound, M.w_past, M.w_bound_past
-    B_past[:] = B
-    w_past[:] = w
+    w, B, D = mon.memory.w, mon.memory.w_bound, mon.config.D
+    w_past, B_past = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        Dw, DB = 0.0, 0.0
         for j in range(3):
-            Dw += D[i, j] * w_past[j]
-            DB += (-D[i, j] if i == j else abs(D[i, j])) * B_past[j]
-        w[i] += dt * (nu[i] - Dw)
-        B[i] = max(B_past[i] + dt * (eta[i] + DB), 0.0)
+            w[i] -= dt * D[i, j] * w_past[j]
+            B[i] += dt * (-D[i, j] if i == j else abs(D[i, j])) * B_past[j]
+        w[i] += dt * nu[i]
+        B[i] = max(B[i] + dt * eta[i], 0.0)
 
 
 @kernel
@@ -553,27 +549,19 @@ def judge_gyros(mon, bank, bound, dt):
 
 
 @kernel
-def exceeds_uncoupled(mon, j, first):
-    """Whether test j, one of the three from `first` on, exceeds its bound by more than an error on one of the
-    other two axes explains.
-    """
-    most = 0.0
-    for i in range(3):
-        most = max(most, abs(mon.redundancy.test[first + i].r[0]))
-    test = mon.redundancy.test[j]
-    return test.ratio > 1.0 and abs(test.r[0]) > COUPLING_SHARE * most
-
-
-@kernel
 def latch_exceeded(mon):
-    """Record the tests that have exceeded their bounds since the alarm."""
-    red, exceeded = mon.redundancy, mon.memory.exceeded
+    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
+    that exceed them by more than an error on another axis explains.
+    """
+    tests, exceeded = mon.redundancy.test, mon.memory.exceeded
     for j in range(N_TESTS):
-        first = TURN_TEST if j < ANGLE_TEST else ANGLE_TEST
-        over = exceeds_uncoupled(mon, j, first) if j < SPEED_TEST else red.test[j].ratio > 1.0
-        if over:
+        most, first = 0.0, TURN_TEST if j < ANGLE_TEST else ANGLE_TEST
+        for i in range(3):
+            most = max(most, abs(tests[first + i].r[0]))
+        coupled = j < SPEED_TEST and abs(tests[j].r[0]) <= COUPLING_SHARE * most
+        if tests[j].ratio > 1.0 and not coupled:
             exceeded[j] = 1
-    latch_refuted(red, mon.initial_errors, exceeded)
+    latch_refuted(mon.redundancy, mon.initial_errors, exceeded)
 
 
 @kernel

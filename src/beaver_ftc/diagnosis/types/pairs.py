@@ -25,16 +25,12 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    clear_anomalies,
     last_error,
     observe_error,
     registry,
-    restore_first,
-    set_anomalous,
-    set_known,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
@@ -100,7 +96,7 @@ def observe_pitch(types, layout, est, nu, nu_max):
         return
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            set_anomalous(srf, abs(nu[PITCH]) > nu_max[PITCH])
+            srf.last.anomalous = abs(nu[PITCH]) > nu_max[PITCH]
 
 
 @kernel
@@ -116,7 +112,8 @@ def locate_second(types, layout, est, nu, nu_max):
     eff2 = est[layout.position[s2]].effect
     srf1 = types.surface[s1]
     lo, hi = constant_range(types.config, srf1, types.frame_index)
-    set_known(srf1, lo, hi)
+    srf1.last.lo, srf1.last.hi = lo, hi
+    srf1.last.anomalous = 0
     M2 = eff2.regressor[PITCH]
     M1 = eff1.regressor[PITCH]
     acc1 = M1 * last_error(srf1)
@@ -158,9 +155,7 @@ def isolate_lateral(types, layout, t):
     roll_alone = can_be_faulty(roll)
     yaw_alone = can_be_faulty(yaw)
     both = not roll_alone and not yaw_alone
-    refuted = (
-        pair.lateral_outside == 1 or not verdict.any_type_remains(roll) or not verdict.any_type_remains(yaw)
-    )
+    refuted = pair.lateral_outside == 1 or not verdict.left(roll, ALL) or not verdict.left(yaw, ALL)
     outside = both and refuted
     open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
     isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
@@ -192,17 +187,19 @@ def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
     srf1 = types.surface[types.pair.first_pitch]
     srf2 = types.surface[layout.partner[types.pair.first_pitch]]
-    restore_first(srf1)
+    srf1.sets.low[:] = srf1.first_sets.low
+    srf1.sets.high[:] = srf1.first_sets.high
+    srf1.sets.excluded[:] = srf1.first_sets.excluded
     registry.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
-        clear_anomalies(srf)
+        srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
 
 
 @kernel
 def dismiss_varying(c, srf):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    imitated = verdict.can_be_another(srf, verdict.sole_constant(srf), False)
+    imitated = verdict.can_be_another(srf, verdict.sole(srf, CONSTANT), False)
     doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
     return long_enough and verdict.would_have_shown(c, srf) and not doubt
@@ -220,16 +217,6 @@ def detect_second(types, layout):
 
 
 @kernel
-def pitch_type(c, srf):
-    """The type of the one fault of pitch, or -1 while it is open.
-
-    A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
-    """
-    kind = verdict.type_on_surface(c, srf)
-    return verdict.TYPE_UNDECIDED if kind >= 0 and MODE[kind] == GIVE_UP else kind
-
-
-@kernel
 def isolate_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
     if detect_second(types, layout):
@@ -237,7 +224,7 @@ def isolate_pitch(types, layout, t):
         s2 = layout.partner[types.pair.first_pitch]
         srf2 = types.surface[s2]
         anomalous = srf2.evidence.n_anomalous > 0
-        possible = can_be_faulty(srf2) and verdict.any_type_remains(srf2)
+        possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
         update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
         shows = anomalous and possible and verdict.explains_flight(srf2)
         update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
@@ -245,7 +232,10 @@ def isolate_pitch(types, layout, t):
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            update_status(srf, s == sole, pitch_type(types.config, srf) if s == sole else -1, t)
+            kind = verdict.type_on_surface(types.config, srf) if s == sole else -1
+            # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
+            open_yet = kind >= 0 and MODE[kind] == GIVE_UP
+            update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
 
 
 @kernel
@@ -320,12 +310,12 @@ def accommodate_pairs(types, layout):
     is done about it: a replaced elevator leads before all others."""
     lead, mode = NO_SURFACE, -1
     for s, srf in enumerate(types.surface):
-        verdict.set_mode(srf, -1)
+        srf.accommodation.mode = -1
         if acts_on(types, layout, s):
             possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
             own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
             if verdict.fault_shows(types.config, srf, own, possible):
-                verdict.set_mode(srf, own)
+                srf.accommodation.mode = own
                 leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or leads:
                     lead, mode = s, own

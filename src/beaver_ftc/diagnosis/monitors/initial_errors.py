@@ -187,7 +187,6 @@ def fill_effects(red, ini, y):
     y_past, h, H, C = red.memory.y_past, red.config.sample_time_s, ini.H, ini.C
     p, q, r = y_past[0], y_past[1], y_past[2]
     V = max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    H[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     sec = secant(y_past[THETA])
     sec_max = secant(abs(y_past[THETA]) + angle_of_chord(ini.e[H_THETA]))
@@ -239,41 +238,59 @@ def fill_flow_effects(red, ini, V, p, q, r):
     # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
     roll, yaw = p * ca + r * sa, p * sa - r * ca
     h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
-    pr = np.hypot(p, r)
+    pr, n = np.hypot(p, r), a_max / V  # rad/s
     climb = M.predicted_reading[ALTITUDE] - y[ALTITUDE]
-    # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    H[H_ALPHA, SPEED_TEST] = H[H_BETA, SPEED_TEST] = h2 * a_max
-    # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    H[H_ALPHA, ALPHA_TEST] = h2 * sec * (a_max / V + pr * abs(sb))
-    # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    H[H_ALPHA, BETA_TEST] = h2 * (pr + a_max * abs(sb) / V)
-    # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    H[H_BETA, ALPHA_TEST] = h2 * sec * sec_max * (abs(roll) + a_max / V)
-    # beta' with beta off: a turned by beta
-    H[H_BETA, BETA_TEST] = h2 * a_max / V
-    # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    H[H_AIRSPEED, ALPHA_TEST] = H[H_AIRSPEED, BETA_TEST] = h2 * sec * a_max / V
+    vert, across = np.hypot(d0, d2), np.hypot(sb, sa * cb)
+    # By row: SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB.
+    # alpha off: V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
+    # (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and sin(beta)
+    # (a_x, a_z) / V; in altitude' (cos(alpha), sin(alpha)), times V cos(beta), along (sin(theta), -cos(phi)
+    # cos(theta))
+    H[H_ALPHA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * (n + pr * abs(sb)),
+        h2 * (pr + n * abs(sb)),
+        0.0,
+        h * V * cb * vert,
+    )
+    # beta off: V' likewise; in alpha' tangents, and secants, of reading and truth differ by x over both
+    # cosines; in beta' a is turned by beta; in altitude' (cos(beta), -sin(beta)), times V
+    H[H_BETA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * sec_max * (abs(roll) + n),
+        h2 * n,
+        0.0,
+        h * V * np.hypot(ca * d0 + sa * d2, d1),
+    )
+    # V off: in alpha', beta' a / truth = (1 + x) a / reading; the true climb is the predicted one over 1 + x,
+    # which differ by x / (1 + x) of the latter
+    H[H_AIRSPEED, SPEED_TEST:] = (
+        0.0,
+        h2 * sec * n,
+        h2 * sec * n,
+        0.0,
+        abs(climb) / (1.0 - min(ini.e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)),
+    )
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
-    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    H[H_PHI, SPEED_TEST] = h2 * g * ct * np.hypot(sb, sa * cb)
-    H[H_PHI, ALPHA_TEST] = H[H_PHI, BETA_TEST] = h2 * g * ct * sec / V
+    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it. The
+    # vertical's part cos(theta) is turned, against the part of v across the first axis
+    H[H_PHI, SPEED_TEST:] = (
+        h2 * g * ct * across,
+        h2 * g * ct * sec / V,
+        h2 * g * ct * sec / V,
+        0.0,
+        h * V * ct * across,
+    )
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
-    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    H[H_THETA, SPEED_TEST] = h2 * g
-    H[H_THETA, ALPHA_TEST] = h2 * sec * g / V
-    H[H_THETA, BETA_TEST] = h2 * g * (abs(np.sin(y[PHI])) + abs(sb)) / V
-    # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
-    # (sin(theta), -cos(phi) cos(theta))
-    vert = np.hypot(d0, d2)
-    H[H_ALPHA, CLIMB_TEST] = h * V * cb * vert
-    # with beta off: (cos(beta), -sin(beta)) turned, times V
-    H[H_BETA, CLIMB_TEST] = h * V * np.hypot(ca * d0 + sa * d2, d1)
-    # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    H[H_AIRSPEED, CLIMB_TEST] = abs(climb) / (1.0 - min(ini.e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO))
-    # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    H[H_PHI, CLIMB_TEST] = h * V * ct * np.hypot(sb, sa * cb)
-    # with theta off: the vertical is turned, against v
-    H[H_THETA, CLIMB_TEST] = h * V
+    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest. The
+    # vertical is turned, against v
+    H[H_THETA, SPEED_TEST:] = (
+        h2 * g,
+        h2 * sec * g / V,
+        h2 * g * (abs(np.sin(y[PHI])) + abs(sb)) / V,
+        0.0,
+        h * V,
+    )
     # Signed effects. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi),
     # cos(phi)) is turned by the error
     C[PHI_DOWN] = h * g * d2
@@ -293,7 +310,7 @@ def fill_flow_effects(red, ini, V, p, q, r):
     # either sign, is an uncertainty of both
     C[VANE_ROLL] = h * roll
     C[VANE_YAW] = h * yaw
-    C[ALPHA_FORCE] = h * abs(sb) * a_max / V
+    C[ALPHA_FORCE] = h * abs(sb) * n
     C[BETA_FORCE] = h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(a_normal) / V
     # V: a across the flow, over the airspeed
     C[SPEED_ALPHA] = h * a_normal * sec / V

@@ -361,9 +361,15 @@ def down(y):
 
 
 @kernel
+def dot(v, w):
+    """v . w of vectors (3,)."""
+    return v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+
+
+@kernel
 def vector_length(v):
     """|v| of a vector (3,)."""
-    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    return np.sqrt(dot(v, v))
 
 
 @kernel
@@ -407,8 +413,7 @@ def predict_readings(red):
     y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
     alpha, beta, V = y_past[ALPHA], y_past[BETA], y_past[AIRSPEED]
     v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    g = down(y_past)
-    y[ALTITUDE] = y_past[ALTITUDE] - h * (v[0] * g[0] + v[1] * g[1] + v[2] * g[2])
+    y[ALTITUDE] = y_past[ALTITUDE] - h * dot(v, down(y_past))
     M.a_size[2] = M.a_size[1]
     M.a_size[1] = M.a_size[0]
     M.a_size_past = vector_length(M.a_past)

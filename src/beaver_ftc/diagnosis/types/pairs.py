@@ -45,31 +45,28 @@ def latch_groups(pair, bank):
 
 
 @kernel
-def locate_lateral(types, layout, est, nu, nu_max):
-    """Find where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p.
+def locate_one(srf, own, other, nu, nu_max):
+    """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta solved for p, with
 
-        (da, dr) = (nu_L Nr - nu_N Lr, nu_N La - nu_L Na) / (La Nr - Na Lr),    |eta| <= (e_L, e_N)
+    p - u = (nu_L N - nu_N L) / (L1 N - N1 L),    |eta| <= nu_max + e
 
-    L, N: roll and yaw acceleration, rad/s2; La, Lr, Na, Nr: per rad of ailerons and of rudder.
+    L, N: roll and yaw acceleration, rad/s2; L1, N1 per rad of this surface (own), L, N of the other. False:
+    nowhere within its reach.
     """
+    L, N = other.regressor[ROLL], other.regressor[YAW]
+    det = own.regressor[ROLL] * N - own.regressor[YAW] * L
+    e_L = nu_max[ROLL] + own.e[ROLL] + other.e[ROLL]
+    e_N = nu_max[YAW] + own.e[YAW] + other.e[YAW]
+    return observe_error(srf, (nu[ROLL] * N - nu[YAW] * L) / det, (e_L * abs(N) + e_N * abs(L)) / abs(det))
+
+
+@kernel
+def locate_lateral(types, layout, est, nu, nu_max):
+    """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
     a, r = layout.main[ROLL], layout.main[YAW]
-    ail = est[layout.position[a]].effect
-    rud = est[layout.position[r]].effect
-    La = ail.regressor[ROLL]
-    Na = ail.regressor[YAW]
-    Lr = rud.regressor[ROLL]
-    Nr = rud.regressor[YAW]
-    nu_L, nu_N = nu[ROLL], nu[YAW]
-    e_L = nu_max[ROLL] + ail.e[ROLL] + rud.e[ROLL]
-    e_N = nu_max[YAW] + ail.e[YAW] + rud.e[YAW]
-    det = La * Nr - Na * Lr
-    size = abs(det)
-    da = (nu_L * Nr - nu_N * Lr) / det
-    e_a = (e_L * abs(Nr) + e_N * abs(Lr)) / size
-    reached = observe_error(types.surface[a], da, e_a)
-    dr = (nu_N * La - nu_L * Na) / det
-    e_r = (e_N * abs(La) + e_L * abs(Na)) / size
-    if not (observe_error(types.surface[r], dr, e_r) and reached):
+    ail, rud = est[layout.position[a]].effect, est[layout.position[r]].effect
+    reached = locate_one(types.surface[a], ail, rud, nu, nu_max)
+    if not (locate_one(types.surface[r], rud, ail, nu, nu_max) and reached):
         types.pair.lateral_outside = 1
 
 
@@ -114,11 +111,9 @@ def locate_second(types, layout, est, nu, nu_max):
     lo, hi = constant_range(types.config, srf1, types.frame_index)
     srf1.last.lo, srf1.last.hi = lo, hi
     srf1.last.anomalous = 0
-    M2 = eff2.regressor[PITCH]
-    M1 = eff1.regressor[PITCH]
+    M1, M2 = eff1.regressor[PITCH], eff2.regressor[PITCH]
     acc1 = M1 * last_error(srf1)
-    tol = abs(M1) * 0.5 * (hi - lo)
-    tol += nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
+    tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
     if not observe_error(types.surface[s2], (nu[PITCH] - acc1) / M2, tol / abs(M2)):
         types.surface[s2].status.basis = verdict.DEDUCED_HEALTHY
 
@@ -126,10 +121,11 @@ def locate_second(types, layout, est, nu, nu_max):
 @kernel
 def observe_pairs(types, layout, est, bank, nu_max):
     """Observe the elapsed frame, plane by plane, and judge the one before."""
+    nu = bank.output.innovation
     latch_groups(types.pair, bank)
-    registry.observe_surfaces(types, layout, est, bank.output.innovation, nu_max)
-    locate_lateral(types, layout, est, bank.output.innovation, nu_max)
-    observe_pitch(types, layout, est, bank.output.innovation, nu_max)
+    registry.observe_surfaces(types, layout, est, nu, nu_max)
+    locate_lateral(types, layout, est, nu, nu_max)
+    observe_pitch(types, layout, est, nu, nu_max)
     registry.judge_frame(types)
 
 

@@ -9,11 +9,9 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
-from beaver_ftc.diagnosis.monitors import redundancy
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
-Q, V = np.array([0.9, 0.1, -0.2, 0.3]), np.array([40.0, 2.0, -3.0])
 
 
 def design():
@@ -25,9 +23,6 @@ FILL = {
     "control effectiveness": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
     "level axes": ((3, 3), lambda out: gusts.fill_rotation(0.3, 0.2, out)),
-    "quaternion": ((4,), lambda out: redundancy.fill_quaternion(0.3, 0.2, 0.1, out)),
-    "turned": ((4,), lambda out: redundancy.advance_quaternion(Q, X, 0.02, out)),
-    "turned back": ((3,), lambda out: redundancy.turn_vector(X, 0.02, V, out)),
 }
 
 

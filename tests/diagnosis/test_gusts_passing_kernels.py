@@ -47,11 +47,7 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
-<<<<<<< HEAD
-    gusts.update_gust_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
-=======
     gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, dt)
->>>>>>> symbols-A
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
     assert record["memory"]["v_g"] == pytest.approx(blown)

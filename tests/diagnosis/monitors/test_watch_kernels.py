@@ -180,9 +180,9 @@ def test_the_error_of_one_angle_leaves_nothing_beyond_it(wrong):
     for _ in range(20):
         attitude, step = rng.uniform((-3, -1.2, -3), (3, 1.2, 3)), rng.uniform(-1e-3, 1e-3)
         redundancy["memory"]["predicted_reading"][PHI : PHI + 3] = attitude
-        relations.fill_quaternion(*attitude, redundancy["memory"]["q_pred"])
+        q = relations.attitude(redundancy["memory"]["predicted_reading"])
         readings[PHI : PHI + 3] = attitude + step * (np.arange(3) == wrong)
-        relations.fill_residuals(redundancy, readings)
+        relations.fill_residuals(redundancy, readings, q)
         watching.filter_beyond(monitor, readings)
         size += abs(step)
     beyond = abs(monitor["memory"]["beyond"]).max(axis=(1, 2))
@@ -823,14 +823,20 @@ def test_at_its_bound_a_test_is_within_it():
     assert suspects({SPEED_TEST: 1.0, DENSITY_TEST: 1.0}, lead=DENSITY_TEST) == {QDYN} | at_first
 
 
+def latched(monitor, j):
+    monitor["memory"]["exceeded"] = 0
+    watching.latch_exceeded(monitor)
+    return bool(monitor["memory"]["exceeded"][j])
+
+
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
     """The others have less of it, or more of what was before."""
     monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test=TURN_TEST + 1)
     monitor["redundancy"]["test"]["r"][TURN_TEST : TURN_TEST + 3, 1:] = 1e3
     monitor["redundancy"]["test"]["r"][TURN_TEST, 0] = 50.0
-    assert watching.exceeds_uncoupled(monitor, TURN_TEST + 1, TURN_TEST)
+    assert latched(monitor, TURN_TEST + 1)
     monitor["redundancy"]["test"]["r"][TURN_TEST, 0] = 70.0
-    assert not watching.exceeds_uncoupled(monitor, TURN_TEST + 1, TURN_TEST)
+    assert not latched(monitor, TURN_TEST + 1)
     (
         monitor["redundancy"]["test"]["r"][TURN_TEST, 0],
         monitor["redundancy"]["test"]["r"][TURN_TEST + 2, 0],
@@ -838,14 +844,14 @@ def test_of_a_kind_the_first_filter_says_how_large_it_is():
         0.0,
         -70.0,
     )
-    assert not watching.exceeds_uncoupled(monitor, TURN_TEST + 1, TURN_TEST)
+    assert not latched(monitor, TURN_TEST + 1)
     for c in (TURN_TEST, ANGLE_TEST):
         small = new_watch()
         (
             small["redundancy"]["test"]["ratio"][c],
             small["redundancy"]["test"]["r"][c, 0],
         ) = 2.0, 1e-6
-        assert watching.exceeds_uncoupled(small, c, c), "of small residuals the largest is involved"
+        assert latched(small, c), "of small residuals the largest is involved"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, cases, shares, surfaces
 
 import fault_kinds
-from beaver_ftc.diagnosis.types.table import held_surface
 from samples import samples
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
@@ -102,31 +101,6 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
     assert excluded[fault_kinds.STUCK]
     assert excluded[fault_kinds.FLOAT]
     assert not excluded[fault_kinds.BIAS]
-
-
-@pytest.mark.parametrize("earlier", [True, False])
-def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earlier):
-    plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", actuators="servo")
-    surface, kind = plant.fdi["types"]["surface"][0], fault_kinds.STUCK
-    held, jam = surface["release"], surface["stuck"]
-    held["back_lo"][:, kind] = 0.1 if earlier else np.inf, 0.2
-    held["back_hi"][:, kind] = 0.15 if earlier else -np.inf, 0.3
-    jam["lo_before"], jam["hi_before"] = (0.01, 0.02), (0.05, 0.06)
-    surface["sets"]["low"][kind], surface["sets"]["high"][kind] = -0.4, 0.4
-    held_surface.store_stuck(surface, kind)
-    low, high = list(held["back_lo"][:, kind]), list(held["back_hi"][:, kind])
-    if earlier:
-        assert (low, high) == ([0.1, 0.2], [0.15, 0.3])
-        assert (list(jam["lo_before"]), list(jam["hi_before"])) == (
-            [0.01, 0.02],
-            [0.05, 0.06],
-        )
-    else:
-        assert (low, high) == ([0.2, np.inf], [0.3, -np.inf])
-        assert (list(jam["lo_before"]), list(jam["hi_before"])) == (
-            [0.02, -0.4],
-            [0.06, 0.4],
-        )
 
 
 class Masked(DesignPlant):

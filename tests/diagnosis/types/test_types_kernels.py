@@ -180,12 +180,12 @@ def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval,
 
 
 def test_an_offset_is_unlimited_at_a_stop():
-    _, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert commanded_surface.offset_of_frame(surface) == pytest.approx((-0.2, -0.15))
+    fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == pytest.approx((-0.2, -0.15))
     surface["judged"]["hi"] = HIGH
-    assert commanded_surface.offset_of_frame(surface) == (pytest.approx(-0.2), np.inf)
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == (pytest.approx(-0.2), np.inf)
     surface["judged"]["lo"] = LOW
-    assert commanded_surface.offset_of_frame(surface)[0] == -np.inf
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
@@ -209,11 +209,11 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
         0.34,
     )
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert commanded_surface.offset_of_frame(surface) == pytest.approx((0.1, 0.15))
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == pytest.approx((0.1, 0.15))
     surface["commands"]["u_max"][1] = 0.36
-    assert commanded_surface.offset_of_frame(surface)[1] == np.inf
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[1] == np.inf
     surface["commands"]["u_min"][1] = -0.51
-    assert commanded_surface.offset_of_frame(surface)[0] == -np.inf
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
@@ -431,18 +431,12 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert on(held_surface.runaway_distance, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.runaway_low, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(held_surface.runaway_high, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(held_surface.runaway_low, fdi, surface, 99) == HIGH
-    assert on(held_surface.runaway_high, fdi, surface, 99) == LOW
+        assert on(held_surface.runaway_interval, fdi, surface, frame, 1)[0] == pytest.approx(0.1 + way)
+        assert on(held_surface.runaway_interval, fdi, surface, frame, -1)[1] == pytest.approx(0.2 - way)
+    assert on(held_surface.runaway_interval, fdi, surface, 99, 1) == (HIGH, HIGH)
+    assert on(held_surface.runaway_interval, fdi, surface, 99, -1) == (LOW, LOW)
     surface["evidence"]["k_first"] = -1
-    assert (
-        on(held_surface.runaway_low, fdi, surface, 9),
-        on(held_surface.runaway_high, fdi, surface, 9),
-    ) == (
-        LOW,
-        HIGH,
-    )
+    assert on(held_surface.runaway_interval, fdi, surface, 9, 1) == (LOW, HIGH)
 
 
 @pytest.mark.parametrize(
@@ -711,33 +705,6 @@ def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(k
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
     assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(expected)
-
-
-def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
-    surface["stuck"]["lo_before"], surface["stuck"]["hi_before"] = (
-        (0.0, 0.1),
-        (0.2, 0.4),
-    )
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.25, 0.26
-    restore_sets(surface)
-    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.store_stuck(surface, STUCK)  # no earlier release: the later are the earlier ones now
-    held = surface["release"]
-    assert (held["back_lo"][0, STUCK], held["back_hi"][0, STUCK]) == (0.2, 0.3)
-    assert not held_surface.may_return(surface, held_surface.LATER_SLOT, STUCK)
-    assert (
-        surface["stuck"]["lo_before"].tolist(),
-        surface["stuck"]["hi_before"].tolist(),
-    ) == (
-        [0.1, 0.1],
-        [0.4, 0.4],
-    )
-    restore_sets(surface)
-    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.1, 0.4)
-    surface["judged"]["anomalous"], surface["sets"]["low"][STUCK] = 1, 0.3
-    restore_sets(surface)
-    assert surface["sets"]["low"][STUCK] == 0.3
 
 
 def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):

@@ -74,16 +74,20 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     H_BETA,
     H_PHI,
     H_THETA,
-    MAX_PITCH_RAD,
     MIN_AIRSPEED_MPS,
     MIN_QDYN_PA,
+    N_EFFECTS,
     N_INITIAL,
     QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
     TURN_TEST,
+    down,
+    leak,
+    secant,
     too_steep,
+    vector_length,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
@@ -148,14 +152,9 @@ def start_bounds(ini, y):
     e = ini.e_start
     e[H_ALPHA] = chord_of_angle(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD)
     e[H_BETA] = chord_of_angle(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD)
-    V = max(y[AIRSPEED], MIN_AIRSPEED_MPS)
-    V_air = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
-        2.0 * max(y[QDYN], MIN_QDYN_PA) / standard_density(y[ALTITUDE])
-    )
-    (most, least) = (  # of reading and truth, in the thickest and in the thinnest air
-        V / V_air * np.sqrt(1.0 + DENSITY_SHARE),
-        V / V_air * np.sqrt(1.0 - DENSITY_SHARE),
-    )
+    V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / standard_density(y[ALTITUDE]))
+    ratio = max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V_air
+    most, least = ratio * np.sqrt(1.0 + DENSITY_SHARE), ratio * np.sqrt(1.0 - DENSITY_SHARE)
     e[H_AIRSPEED] = min(max(most - 1.0, 1.0 - least), MAX_SPEED_RATIO - 1.0)
     e[H_PHI] = e[H_THETA] = MAX_CHORD
     ini.e[:] = e
@@ -173,13 +172,11 @@ def widen_bounds(red, ini):
     lost = 1.0 - red.config.decay[SLOW_POLE]
     for i in range(N_INITIAL):
         j = change_test(i)
-        most = ini.e_start[i]
         d = allowed_effect(red, j, SLOW_POLE) + ini.e[i] * ini.H_m[i, j, SLOW_POLE]
         if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
             d *= (1.0 + ini.e[i]) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-        ini.d[i] = min(d, most)
-        e = ini.e[i] + lost * ini.d[i]
-        ini.e[i] = min(e, most)
+        ini.d[i] = min(d, ini.e_start[i])
+        ini.e[i] = min(ini.e[i] + lost * ini.d[i], ini.e_start[i])
 
 
 @kernel
@@ -187,21 +184,19 @@ def fill_effects(red, ini, y):
     """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,), taken at the sample before, from which y is
     predicted.
     """
-    y_past, h = red.memory.y_past, red.config.sample_time_s
+    y_past, h, H, C = red.memory.y_past, red.config.sample_time_s, ini.H, ini.C
     p, q, r = y_past[0], y_past[1], y_past[2]
     V = max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    phi = y_past[PHI]
-    theta = y_past[THETA]
-    H = ini.H
-    C = ini.C
-    H[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    sec = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
-    sec_max = 1.0 / np.cos(min(abs(theta) + angle_of_chord(ini.e[H_THETA]), MAX_PITCH_RAD))
+    sec = secant(y_past[THETA])
+    sec_max = secant(abs(y_past[THETA]) + angle_of_chord(ini.e[H_THETA]))
     second = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
+    C[PHI_Q] = h * q
+    C[PHI_R] = h * r
+    C[THETA_TURN] = h * (q * np.sin(y_past[PHI]) + r * np.cos(y_past[PHI]))
     qr = h * np.hypot(q, r)
-    heading = h * abs(q * np.sin(phi) + r * np.cos(phi)) * sec_max
+    heading = abs(C[THETA_TURN]) * sec_max
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
@@ -213,13 +208,11 @@ def fill_effects(red, ini, y):
         # theta' = q cos(phi) - r sin(phi) there is no theta.
         H[H_PHI, ANGLE_TEST + i] = sec * (qr + sec * second)
         H[H_THETA, ANGLE_TEST + i] = sec * ((heading if i != 1 else 0.0) + sec_max * second)
-    (C[PHI_Q], C[PHI_R], C[THETA_TURN]) = (h * q, h * r, h * (q * np.sin(phi) + r * np.cos(phi)))
     fill_flow_effects(red, ini, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
-    dlog_V = np.log(max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V)
-    H[H_AIRSPEED, DENSITY_TEST] = 2.0 * abs(dlog_V)
-    C[SPEED_DENSITY] = 2.0 * dlog_V
+    C[SPEED_DENSITY] = 2.0 * np.log(max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    H[H_AIRSPEED, DENSITY_TEST] = abs(C[SPEED_DENSITY])
 
 
 @kernel
@@ -227,83 +220,97 @@ def fill_flow_effects(red, ini, V, p, q, r):
     """Fill H and C for the tests of speed, flow and climb, and by gravity.
 
     V m/s; p, q, r rad/s: of the sample before. h2: h times 1 + h (|a| / V + |p| + |q| + |r|), the second
-    order in h. sa, ca, sb, ...: sines and cosines of alpha, beta, phi, theta. x: the error of the row's
-    hypothesis.
+    order in h. sa, ca, sb, cb, ct: sines and cosines of alpha, beta, theta; d0, d1, d2: the vertical. x: the
+    error of the row's hypothesis.
     """
-    M, h, g = red.memory, red.config.sample_time_s, red.config.g
+    M, h, g, H, C = red.memory, red.config.sample_time_s, red.config.g, ini.H, ini.C
     y, a = M.y_past, M.a
-    H = ini.H
-    C = ini.C
     sa, ca = np.sin(y[ALPHA]), np.cos(y[ALPHA])
     sb, cb = np.sin(y[BETA]), np.cos(y[BETA])
-    sp, cp = np.sin(y[PHI]), np.cos(y[PHI])
-    st, ct = np.sin(y[THETA]), np.cos(y[THETA])
-    # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    beta = abs(y[BETA])
+    ct, (d0, d1, d2) = np.cos(y[THETA]), down(y)
+    # the largest |beta| if beta is off; 1 / cos of it by its reading, and the largest one
     beta_max = abs(y[BETA]) + angle_of_chord(ini.e[H_BETA])
-    sec = 1.0 / np.cos(min(beta, MAX_PITCH_RAD))
-    sec_max = 1.0 / np.cos(min(beta_max, MAX_PITCH_RAD))
+    sec, sec_max = secant(y[BETA]), secant(beta_max)
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
     a_normal = a[2] * ca - a[0] * sa
     a_side = a[1] * cb - (a[0] * ca + a[2] * sa) * sb
-    a_max = max(M.a_size, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
+    a_max = max(M.a_size[0], vector_length(a))
     # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
     roll, yaw = p * ca + r * sa, p * sa - r * ca
     h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
-    pr = np.hypot(p, r)
+    pr, n = np.hypot(p, r), a_max / V  # rad/s
     climb = M.predicted_reading[ALTITUDE] - y[ALTITUDE]
-    # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    H[H_ALPHA, SPEED_TEST] = H[H_BETA, SPEED_TEST] = h2 * a_max
-    # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    H[H_ALPHA, ALPHA_TEST] = h2 * sec * (a_max / V + pr * abs(sb))
-    # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    H[H_ALPHA, BETA_TEST] = h2 * (pr + a_max * abs(sb) / V)
-    # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    H[H_BETA, ALPHA_TEST] = h2 * sec * sec_max * (abs(roll) + a_max / V)
-    # beta' with beta off: a turned by beta
-    H[H_BETA, BETA_TEST] = h2 * a_max / V
-    # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    H[H_AIRSPEED, ALPHA_TEST] = H[H_AIRSPEED, BETA_TEST] = h2 * sec * a_max / V
+    vert, across = np.hypot(d0, d2), np.hypot(sb, sa * cb)
+    # By row: SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB.
+    # alpha off: V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
+    # (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and sin(beta)
+    # (a_x, a_z) / V; in altitude' (cos(alpha), sin(alpha)), times V cos(beta), along (sin(theta), -cos(phi)
+    # cos(theta))
+    H[H_ALPHA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * (n + pr * abs(sb)),
+        h2 * (pr + n * abs(sb)),
+        0.0,
+        h * V * cb * vert,
+    )
+    # beta off: V' likewise; in alpha' tangents, and secants, of reading and truth differ by x over both
+    # cosines; in beta' a is turned by beta; in altitude' (cos(beta), -sin(beta)), times V
+    H[H_BETA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * sec_max * (abs(roll) + n),
+        h2 * n,
+        0.0,
+        h * V * np.hypot(ca * d0 + sa * d2, d1),
+    )
+    # V off: in alpha', beta' a / truth = (1 + x) a / reading; the true climb is the predicted one over 1 + x,
+    # which differ by x / (1 + x) of the latter
+    H[H_AIRSPEED, SPEED_TEST:] = (
+        0.0,
+        h2 * sec * n,
+        h2 * sec * n,
+        0.0,
+        abs(climb) / (1.0 - min(ini.e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)),
+    )
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
-    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    H[H_PHI, SPEED_TEST] = h2 * g * ct * np.hypot(sb, sa * cb)
-    H[H_PHI, ALPHA_TEST] = H[H_PHI, BETA_TEST] = h2 * g * ct * sec / V
+    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it. The
+    # vertical's part cos(theta) is turned, against the part of v across the first axis
+    H[H_PHI, SPEED_TEST:] = (
+        h2 * g * ct * across,
+        h2 * g * ct * sec / V,
+        h2 * g * ct * sec / V,
+        0.0,
+        h * V * ct * across,
+    )
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
-    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    H[H_THETA, SPEED_TEST] = h2 * g
-    H[H_THETA, ALPHA_TEST] = h2 * sec * g / V
-    H[H_THETA, BETA_TEST] = h2 * g * (abs(sp) + abs(sb)) / V
-    # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
-    # (sin(theta), -cos(phi) cos(theta))
-    vert = np.hypot(st, cp * ct)
-    H[H_ALPHA, CLIMB_TEST] = h * V * cb * vert
-    # with beta off: (cos(beta), -sin(beta)) turned, times V
-    H[H_BETA, CLIMB_TEST] = h * V * np.hypot(ca * st - sa * cp * ct, sp * ct)
-    # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    H[H_AIRSPEED, CLIMB_TEST] = abs(climb) / (1.0 - min(ini.e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO))
-    # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    H[H_PHI, CLIMB_TEST] = h * V * ct * np.hypot(sb, sa * cb)
-    # with theta off: the vertical is turned, against v
-    H[H_THETA, CLIMB_TEST] = h * V
+    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest. The
+    # vertical is turned, against v
+    H[H_THETA, SPEED_TEST:] = (
+        h2 * g,
+        h2 * sec * g / V,
+        h2 * g * (abs(np.sin(y[PHI])) + abs(sb)) / V,
+        0.0,
+        h * V,
+    )
     # Signed effects. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi),
     # cos(phi)) is turned by the error
-    C[PHI_DOWN] = h * g * ct * cp
-    C[PHI_SIDE] = h * g * ct * sp
+    C[PHI_DOWN] = h * g * d2
+    C[PHI_SIDE] = h * g * d1
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch = abs(y[THETA])
-    C[THETA_G] = h * g * np.cos(min(pitch + 0.5 * angle_of_chord(ini.e[H_THETA]), 0.5 * pitch + 0.25 * np.pi))
+    mean = min(pitch + 0.5 * angle_of_chord(ini.e[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
+    C[THETA_G] = h * g * np.cos(mean)
     # alpha: altitude' = V cos(beta) vert sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
-    path = abs(np.arctan2(st, cp * ct) - y[ALPHA]) + (0.5 * angle_of_chord(ini.e[H_ALPHA]))
+    path = abs(np.arctan2(-d0, d2) - y[ALPHA]) + (0.5 * angle_of_chord(ini.e[H_ALPHA]))
     C[ALPHA_CLIMB] = h * V * cb * vert * np.cos(min(path, 0.5 * np.pi))
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta
     # off by e: alpha' changes by x cos(e / 2) roll over both cosines. The part of the force, of
     # either sign, is an uncertainty of both
     C[VANE_ROLL] = h * roll
     C[VANE_YAW] = h * yaw
-    C[ALPHA_FORCE] = h * abs(sb) * a_max / V
+    C[ALPHA_FORCE] = h * abs(sb) * n
     C[BETA_FORCE] = h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(a_normal) / V
     # V: a across the flow, over the airspeed
     C[SPEED_ALPHA] = h * a_normal * sec / V
@@ -316,11 +323,9 @@ def filter_effects(red, ini):
     a = red.config.decay
     for i in range(N_INITIAL):
         for j in range(RPM_TEST):
-            for m in range(a.size):
-                ini.H_m[i, j, m] = a[m] * ini.H_m[i, j, m] + ini.H[i, j]
-    for n in range(ini.C.size):
-        for m in range(a.size):
-            ini.C_m[n, m] = a[m] * ini.C_m[n, m] + ini.C[n]
+            leak(ini.H_m[i, j], a, ini.H[i, j])
+    for n in range(N_EFFECTS):
+        leak(ini.C_m[n], a, ini.C[n])
 
 
 @kernel
@@ -439,12 +444,6 @@ def refutes_initial(red, ini, h, j):
         if abs(test.r[m]) > factor * test.B[m] + effect:
             return True
     return False
-
-
-@kernel
-def store_bounds(ini):
-    """e_alarm: e of the moment of the alarm, since later residuals may be the effect of another error."""
-    ini.e_alarm[:] = ini.e
 
 
 @kernel

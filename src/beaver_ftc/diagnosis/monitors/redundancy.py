@@ -19,7 +19,8 @@ its gusts within a filter's memory.
     w, w_max                         body rates (3,), bound on |p| + |q| + |r|; rad/s
     e_w                              sum of the bounds on the errors of the three gyros, rad/s
     v, a, a_past       (3,)          velocity m/s, acceleration m/s2 with gravity, that of the sample before
-    q, q_past, q_pred  (4,)          attitude as unit quaternion, body to level axes, scalar first
+    q, p               (z1, z2)      quaternion z1 + z2 j of complex numbers; an attitude turns body to level
+                                     axes
     h                                time between two samples, s: a JSBSim frame
     i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
     red, c, M                        record of the tests, its configuration, its memory
@@ -37,12 +38,11 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_slopes
-from beaver_ftc.diagnosis.detection.filters import advance_bound, advance_gyro
+from beaver_ftc.diagnosis.detection.filters import advance_gyro
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,
-    MANIFOLD,
     N_SENSORS,
     PHI,
     SENSORS,
@@ -75,20 +75,9 @@ TEST_BY_NAME = {
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
 DUPLICATE = np.array([i for i, _ in DUPLICATES], np.int64)
-COUNTERPART = np.array(
-    [SENSORS.index(counterpart_and_tolerance.reading) for _, counterpart_and_tolerance in DUPLICATES],
-    np.int64,
-)
-COUNTERPART_TEST = np.array(
-    [
-        TEST_BY_NAME[ROWS[SENSORS.index(counterpart_and_tolerance.reading)].test]
-        for _, counterpart_and_tolerance in DUPLICATES
-    ],
-    np.int64,
-)
-DUPLICATE_TOLERANCE = np.array(
-    [counterpart_and_tolerance.within for _, counterpart_and_tolerance in DUPLICATES], float
-)
+COUNTERPART = np.array([SENSORS.index(equal.reading) for _, equal in DUPLICATES], np.int64)
+COUNTERPART_TEST = np.array([TEST_BY_NAME[ROWS[i].test] for i in COUNTERPART], np.int64)
+DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
@@ -132,12 +121,12 @@ REDUNDANCY_RECORD = record(
     memory=record(
         # bounds on the error of each reading: e; part of it that changes; part of it by drift, rad; before
         reading_bound=N_SENSORS, e_new=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
-        # of the sample before; predict_readings advances v and a_past
-        y_past=N_SENSORS, q_past=4, v=3, a=3, a_past=3,
-        # m/s2: |a| in the elapsed step, in the two steps before it; of a_past
-        a_size=float, a_sizes=2, a_size_past=float,
+        # of the sample before; predict_readings turns a_past into the present axes
+        y_past=N_SENSORS, a=3, a_past=3,
+        # m/s2: |a| in the elapsed step and in the two before it; of a_past
+        a_size=3, a_size_past=float,
         e_first=float,  # m/s2, in the first step only: no sample precedes it
-        predicted_reading=N_SENSORS, scratch=4, q_pred=4,
+        predicted_reading=N_SENSORS, scratch=3,
         engine_commands=2,  # engine speed rpm, manifold pressure inHg
     ),
     test=(TEST_RECORD, N_TESTS),
@@ -169,7 +158,7 @@ MONITOR_MEMORY_RECORD = record(
     # size there, of this frame and the one before
     w_att=3, w_att_past=3, peak=3, peak_past=3, peak_older=3, floor=3, floor_past=3,
     # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
-    w=3, w_bound=3, w_bound_past=3, w_past=3,
+    w=3, w_bound=3,
     agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
     # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
     # beyond it no gyro can be broken
@@ -180,7 +169,6 @@ MONITOR_MEMORY_RECORD = record(
     # sound sensors, of the part of an initial error; range of the readings
     n_since=int, r_sum=3, B_sum=3, e_sum=3, y_min=3, y_max=3,
     climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
-    dv=3,  # m/s, body axes: what the residuals add up to
 )  # fmt: skip
 
 MONITOR_OUTPUT_RECORD = record(
@@ -315,69 +303,73 @@ POSITION_FACTOR = 4.0 / 3.0
 
 
 @kernel
-def fill_quaternion(phi, theta, psi, out):
-    """Fill out (4,) with q of the Euler angles, rad."""
-    c1, c2, c3 = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
-    s1, s2, s3 = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
-    out[0] = c1 * c2 * c3 + s1 * s2 * s3
-    out[1] = s1 * c2 * c3 - c1 * s2 * s3
-    out[2] = c1 * s2 * c3 + s1 * c2 * s3
-    out[3] = c1 * c2 * s3 - s1 * s2 * c3
+def leak(x, a, v):
+    """x <- a x + v: filters of poles a (m,); x (m,)."""
+    for m in range(a.size):
+        x[m] = a[m] * x[m] + v
 
 
 @kernel
-def advance_quaternion(q_past, w, h, out):
-    """Fill out (4,) with q_past after h s at body rates w: one Euler step, q_past (1, h w / 2) / |...|."""
-    x = 0.5 * h * w[0]
-    y = 0.5 * h * w[1]
-    z = 0.5 * h * w[2]
-    q = q_past
+def times(p, q):
+    """p q of two quaternions: (p1 q1 - p2 q2*, p1 q2 + p2 q1*)."""
+    return p[0] * q[0] - p[1] * q[1].conjugate(), p[0] * q[1] + p[1] * q[0].conjugate()
+
+
+@kernel
+def inverse_times(p, q):
+    """p* q: the turn from attitude p to q."""
+    return times((p[0].conjugate(), -p[1]), q)
+
+
+@kernel
+def attitude(y):
+    """q of the Euler angles: psi about the third axis, theta about the second, phi about the first."""
+    c2, s2 = np.cos(y[THETA] / 2), np.sin(y[THETA] / 2)
+    c3, s3 = np.cos(y[PSI] / 2), np.sin(y[PSI] / 2)
+    z = complex(np.cos(y[PHI] / 2), np.sin(y[PHI] / 2))
+    return complex(c2 * c3, -s2 * s3) * z, complex(s2 * c3, c2 * s3) * z.conjugate()
+
+
+@kernel
+def turn_of_step(w, h):
+    """The turn by h w in one Euler step: (1, h w / 2) / |...|."""
+    x, y, z = 0.5 * h * w[0], 0.5 * h * w[1], 0.5 * h * w[2]
     norm = np.sqrt(1.0 + x * x + y * y + z * z)
-    out[0] = (q[0] - q[1] * x - q[2] * y - q[3] * z) / norm
-    out[1] = (q[1] + q[0] * x + q[2] * z - q[3] * y) / norm
-    out[2] = (q[2] + q[0] * y + q[3] * x - q[1] * z) / norm
-    out[3] = (q[3] + q[0] * z + q[1] * y - q[2] * x) / norm
+    return complex(1.0, x) / norm, complex(y, z) / norm
 
 
 @kernel
-def small_turn(q_a, q_b, n):
-    """Component n (1, 2, 3), body axes, of the small rotation from q_a to q_b, rad: 2 (q_a* q_b)_n."""
-    a = q_a
-    b = q_b
-    i = n
-    j = n % 3 + 1
-    k = (n + 1) % 3 + 1
-    half = a[0] * b[i] - a[i] * b[0] - a[j] * b[k] + a[k] * b[j]
-    scalar = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    return 2.0 * half if scalar >= 0.0 else -2.0 * half
+def turned(q, v):
+    """q* v q: the components of a constant vector v (3,) in axes that have turned by q."""
+    z1, z2 = times(inverse_times(q, (complex(0.0, v[0]), complex(v[1], v[2]))), q)
+    return z1.imag, z2.real, z2.imag
 
 
 @kernel
 def turn_share(y, i, j):
     """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
-    phi, theta = y[PHI], y[THETA]
-    if i == 0:
-        return (1.0, 0.0, -np.sin(theta))[j]
-    if i == 1:
-        return (0.0, np.cos(phi), np.sin(phi) * np.cos(theta))[j]
-    return (0.0, -np.sin(phi), np.cos(phi) * np.cos(theta))[j]
+    if j == 2:
+        return down(y)[i]
+    return (1.0, 0.0, 0.0)[i] if j == 0 else (0.0, np.cos(y[PHI]), -np.sin(y[PHI]))[i]
 
 
 @kernel
-def turn_vector(w, h, v, out):
-    """Fill out (3,) with a constant vector v in body axes that have turned at rates w for h s (Rodrigues):
+def down(y):
+    """The vertical unit vector, downwards, in body axes."""
+    c = np.cos(y[THETA])
+    return -np.sin(y[THETA]), np.sin(y[PHI]) * c, np.cos(y[PHI]) * c
 
-    out = v - sine w x v + versine (w (w . v) - |w|^2 v),    tan(angle / 2) = h |w| / 2
-    """
-    w_size = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
-    angle = 2.0 * np.arctan(0.5 * h * w_size)
-    sine = np.sin(angle) / w_size if w_size > 0.0 else 0.0
-    versine = (1.0 - np.cos(angle)) / w_size**2 if w_size > 0.0 else 0.0
-    wv = w[0] * v[0] + w[1] * v[1] + w[2] * v[2]
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        cross = w[j] * v[k] - w[k] * v[j]
-        out[i] = v[i] - sine * cross + versine * (w[i] * wv - w_size**2 * v[i])
+
+@kernel
+def dot(v, w):
+    """v . w of vectors (3,)."""
+    return v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+
+
+@kernel
+def vector_length(v):
+    """|v| of a vector (3,)."""
+    return np.sqrt(dot(v, v))
 
 
 @kernel
@@ -387,101 +379,101 @@ def bound_readings(red, y):
     for i in range(N_SENSORS):
         size = abs(wrapped(y[i])) if i == PSI else abs(y[i])
         e = (c.e_zero[i] + c.e_slope[i] * size) / (1.0 - c.e_slope[i])
-        M.reading_bound[i] = e
         M.e_new[i] = e - c.const[i] + READING_ROUNDING * abs(y[i])
-    for i in range(PHI, PHI + 3):
-        M.reading_bound[i] += M.e_drift
+        M.reading_bound[i] = e + M.e_drift if PHI <= i <= PSI else e
 
 
 @kernel
 def store_sample(red, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    M, g = red.memory, red.config.g
-    M.y_past[:], M.e_older[:] = y, M.e_past
+    M, g = red.memory, down(y)
+    M.y_past[:] = y
+    M.e_older[:] = M.e_past
     M.e_past[:] = M.reading_bound
-    fill_quaternion(y[PHI], y[THETA], y[PSI], M.q_past)
-    alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    M.v[0] = V * np.cos(alpha) * np.cos(beta)
-    M.v[1], M.v[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    theta, phi = y[THETA], y[PHI]
-    M.a[0] = force[0] - g * np.sin(theta)
-    M.a[1] = force[1] + g * np.cos(theta) * np.sin(phi)
-    M.a[2] = force[2] + g * np.cos(theta) * np.cos(phi)
-
-
-@kernel
-def vector_length(v):
-    """|v| of a vector (3,)."""
-    return np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    for i in range(3):
+        M.a[i] = force[i] + red.config.g * g[i]
 
 
 @kernel
 def predict_readings(red):
-    """Fill y_pred: attitude, flow and altitude now, from the sample before.
+    """Fill y_pred: attitude, flow and altitude now, from the sample before. Returns the attitude.
 
-    v <- v + h (3/2 a - 1/2 a_past), turned by -h w. Afterwards v is the predicted one, and a_past that of the
-    sample before in the present body axes.
+    v <- v + h (3/2 a - 1/2 a_past), turned by -h w, as a_past is then. Of q = z1 + z2 j
+
+        phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
     """
     M, h = red.memory, red.config.sample_time_s
-    w = M.y_past[:3]
-    y = M.predicted_reading
-    x = M.scratch[:3]
-    advance_quaternion(M.q_past, w, h, M.q_pred)
-    q0 = M.q_pred[0]
-    q1 = M.q_pred[1]
-    q2 = M.q_pred[2]
-    q3 = M.q_pred[3]
-    y[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
-    y[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
-    y[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    theta = M.y_past[THETA]
-    phi = M.y_past[PHI]
-    v = M.v
-    climb = v[0] * np.sin(theta) - v[1] * np.sin(phi) * np.cos(theta) - v[2] * np.cos(phi) * np.cos(theta)
-    y[ALTITUDE] = M.y_past[ALTITUDE] + h * climb
-    M.a_sizes[1], M.a_sizes[0] = (M.a_sizes[0], M.a_size)
+    y, y_past, x = M.predicted_reading, M.y_past, M.scratch
+    step = turn_of_step(y_past, h)
+    q = times(attitude(y_past), step)
+    roll = q[0] * q[0] - (q[1] * q[1]).conjugate()
+    nose = 2.0 * q[0] * q[1]
+    y[PHI] = np.arctan2(roll.imag, roll.real)
+    y[THETA] = np.arcsin(min(max(nose.real, -1.0), 1.0))
+    y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
+    alpha, beta, V = y_past[ALPHA], y_past[BETA], y_past[AIRSPEED]
+    v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
+    y[ALTITUDE] = y_past[ALTITUDE] - h * dot(v, down(y_past))
+    M.a_size[2] = M.a_size[1]
+    M.a_size[1] = M.a_size[0]
     M.a_size_past = vector_length(M.a_past)
     for i in range(3):
         x[i] = AB_NOW * M.a[i] - AB_PAST * M.a_past[i]
-    M.a_size = vector_length(x)
+    M.a_size[0] = vector_length(x)
     for i in range(3):
         x[i] = v[i] + h * x[i]
-    turn_vector(w, h, x, v)
-    turn_vector(w, h, M.a, M.a_past)
+    v = turned(step, x)
+    a = turned(step, M.a)
+    for i in range(3):
+        M.a_past[i] = a[i]
     V = vector_length(v)
     y[AIRSPEED] = V
     y[ALPHA] = np.arctan2(v[2], v[0])
     y[BETA] = np.arcsin(v[1] / max(V, MIN_SPEED_MPS))
+    return q
 
 
 @kernel
-def fill_residuals(red, y):
-    """Fill the residual of each test: y - y_pred; of the density log(rho / rho_past), rho = qdyn / V^2."""
-    tests, M, y_pred = red.test, red.memory, red.memory.predicted_reading
-    fill_quaternion(y[PHI], y[THETA], y[PSI], M.scratch)
+def fill_residuals(red, y, q):
+    """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
+    log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
+    """
+    tests, y_pred, y_past = red.test, red.memory.predicted_reading, red.memory.y_past
+    z1, z2 = inverse_times(q, attitude(y))
+    turn = (z1.imag, z2.real, z2.imag)
     for i in range(3):
-        tests[TURN_TEST + i].residual = small_turn(M.q_pred, M.scratch, i + 1)
+        tests[TURN_TEST + i].residual = 2.0 * turn[i] if z1.real >= 0.0 else -2.0 * turn[i]
         tests[ANGLE_TEST + i].residual = wrapped(y[PHI + i] - y_pred[PHI + i])
-    tests[SPEED_TEST].residual = y[AIRSPEED] - y_pred[AIRSPEED]
-    tests[ALPHA_TEST].residual = y[ALPHA] - y_pred[ALPHA]
-    tests[BETA_TEST].residual = y[BETA] - y_pred[BETA]
-    rho = y[QDYN] / y[AIRSPEED] ** 2
-    rho_past = M.y_past[QDYN] / M.y_past[AIRSPEED] ** 2
-    tests[DENSITY_TEST].residual = np.log(max(rho, MIN_HALF_DENSITY) / max(rho_past, MIN_HALF_DENSITY))
-    tests[CLIMB_TEST].residual = y[ALTITUDE] - y_pred[ALTITUDE]
+    for j, i in ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE)):
+        tests[j].residual = y[i] - y_pred[i]
+    rho = max(y[QDYN] / y[AIRSPEED] ** 2, MIN_HALF_DENSITY)
+    tests[DENSITY_TEST].residual = np.log(rho / max(y_past[QDYN] / y_past[AIRSPEED] ** 2, MIN_HALF_DENSITY))
 
 
 @kernel
-def pitch_bound(red, y):
-    """Bound |theta| in this sample and the one before, rad: |y| + e."""
+def highest(red, y, i):
+    """Bound |y_i| in this sample and the one before: |y| + e."""
     M = red.memory
-    return max(abs(y[THETA]) + M.reading_bound[THETA], abs(M.y_past[THETA]) + M.e_past[THETA])
+    return max(abs(y[i]) + M.reading_bound[i], abs(M.y_past[i]) + M.e_past[i])
+
+
+@kernel
+def lowest(red, y, i):
+    """Lower bound on y_i in this sample and the one before: y - e."""
+    M = red.memory
+    return min(y[i] - M.reading_bound[i], M.y_past[i] - M.e_past[i])
+
+
+@kernel
+def secant(angle):
+    """1 / cos(angle), rad, of no more than MAX_PITCH_RAD."""
+    return 1.0 / np.cos(min(abs(angle), MAX_PITCH_RAD))
 
 
 @kernel
 def too_steep(red, y):
     """Whether the tests of turning and of the angles restart, in this sample and the one before."""
-    return pitch_bound(red, y) > MAX_PITCH_RAD
+    return highest(red, y, THETA) > MAX_PITCH_RAD
 
 
 @kernel
@@ -499,14 +491,13 @@ def bound_acceleration(red, w_max, e_w):
     """
     c, M = red.config, red.memory
     e_tilt = extrapolate_bound(red, PHI) + extrapolate_bound(red, THETA)
-    g = c.g
     e_force2 = 0.0
-    e_a = g * (c.const[PHI] + c.const[THETA])
+    e_a = c.g * (c.const[PHI] + c.const[THETA])
     for i in range(AX, AX + 3):
         e_force2 += extrapolate_bound(red, i) ** 2
         e_a += c.const[i]
     e_turn = c.sample_time_s * (w_max * e_a + AB_PAST * e_w * M.a_size_past)
-    return EARTH_M_S2 + M.e_first + g * e_tilt + np.sqrt(e_force2) + e_turn
+    return EARTH_M_S2 + M.e_first + c.g * e_tilt + np.sqrt(e_force2) + e_turn
 
 
 @kernel
@@ -518,36 +509,22 @@ def bound_attitude(red, y, w_max, e_w):
     J. sec: largest 1 / cos(theta).
     """
     tests, c, M = red.test, red.config, red.memory
-    e = M.e_past
-    e_new = M.e_new
-    sec = 1.0 / np.cos(min(pitch_bound(red, y), MAX_PITCH_RAD))
-    e_sum = e[PHI] + e[THETA] + e[PSI]
+    e, e_new = M.e_past, M.e_new
+    sec = secant(highest(red, y, THETA))
     turn = c.sample_time_s * w_max
     tilt = abs(y[PHI] - M.y_past[PHI]) + abs(y[THETA] - M.y_past[THETA])
     e_brief = e[THETA] - c.const[THETA] + e[PSI] - c.const[PSI] + e_new[THETA] + e_new[PSI]
-    for i in range(3):
-        e_att = w_max * (e_sum + sec * e[THETA]) + tilt * e_brief / c.sample_time_s
-        tests[TURN_TEST + i].bound_per_s = EARTH_TURN_RAD_S + 2.0 * c.drift + e[P + i] + turn * e_w + e_att
-        e_att = 2.0 * sec * w_max * (e[PHI] + e[THETA])
-        e_rate = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + e_att
-        tests[ANGLE_TEST + i].bound_per_s, tests[ANGLE_TEST + i].bound_per_sample = (
-            sec * e_rate + c.drift,
-            e_new[PHI + i],
-        )
+    e_axes = w_max * (e[PHI] + e[THETA] + e[PSI] + sec * e[THETA]) + tilt * e_brief / c.sample_time_s
+    e_rate = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + 2.0 * sec * w_max * (e[PHI] + e[THETA])
     s_theta = abs(np.sin(y[THETA])) + e_new[THETA]
     s_phi = abs(np.sin(y[PHI])) + e_new[PHI]
+    for i in range(3):
+        tests[TURN_TEST + i].bound_per_s = EARTH_TURN_RAD_S + 2.0 * c.drift + e[P + i] + turn * e_w + e_axes
+        tests[ANGLE_TEST + i].bound_per_s = sec * e_rate + c.drift
+        tests[ANGLE_TEST + i].bound_per_sample = e_new[PHI + i]
     tests[TURN_TEST].bound_per_sample = e_new[PHI] + s_theta * e_new[PSI]
     tests[TURN_TEST + 1].bound_per_sample = e_new[THETA] + s_phi * e_new[PSI]
     tests[TURN_TEST + 2].bound_per_sample = e_new[PSI] + s_phi * e_new[THETA]
-
-
-@kernel
-def min_altitude(red, y):
-    """Lower bound on the height in this sample and the one before, m: y - e of the altimeter."""
-    M = red.memory
-    h_min = y[ALTITUDE] - M.reading_bound[ALTITUDE]
-    h_past = M.y_past[ALTITUDE] - M.e_past[ALTITUDE]
-    return max(min(h_min, h_past), LEAST_HEIGHT_M)
 
 
 @kernel
@@ -558,36 +535,30 @@ def bound_flow(red, y, w_max, e_w):
     sec: largest 1 / cos(beta); second: 1 and the second order in h; gust: how much faster a gust changes.
     """
     tests, c, M = red.test, red.config, red.memory
-    e, e_past = M.reading_bound, M.e_past
-    e_new, y_past = M.e_new, M.y_past
-    V_min = max(min(y[AIRSPEED] - e[AIRSPEED], y_past[AIRSPEED] - e_past[AIRSPEED]), MIN_AIRSPEED_MPS)
-    beta_max = max(abs(y[BETA]) + e[BETA], abs(y_past[BETA]) + e_past[BETA])
-    sec = 1.0 / np.cos(min(beta_max, MAX_PITCH_RAD))
-    e_vane = e_past[ALPHA] + e_past[BETA]
+    e, h = M.e_past, c.sample_time_s
+    V = max(lowest(red, y, AIRSPEED), MIN_AIRSPEED_MPS)
+    sec = secant(highest(red, y, BETA))
+    e_vane, e_V = e[ALPHA] + e[BETA], e[AIRSPEED]
     e_a = bound_acceleration(red, w_max, e_w)
-    a_max = M.a_size + e_a
-    second = 1.0 + c.sample_time_s * (2.0 * M.a_size / V_min + w_max)
-    gust = np.sqrt(max(y[AIRSPEED] / c.max_airspeed_mps, 1.0) * max(c.low_m / min_altitude(red, y), 1.0))
-    e_flow = (
-        sec**2 * ((e_a + a_max * (e_vane + e_past[AIRSPEED] / V_min)) / V_min + w_max * e_vane) + sec * e_w
-    )
-    tests[SPEED_TEST].gust_gain, tests[SPEED_TEST].bound_per_sample = (gust, e_new[AIRSPEED])
-    tests[SPEED_TEST].bound_per_s = (
-        e_a + second * a_max * e_vane + c.sample_time_s * (a_max / V_min) ** 2 * e_past[AIRSPEED]
-    )
-    for j, i in ((ALPHA_TEST, ALPHA), (BETA_TEST, BETA)):
-        (tests[j].gust_gain, tests[j].bound_per_sample, tests[j].bound_per_s) = (
-            gust * sec / V_min,
-            e_new[i],
-            second * e_flow,
-        )
-    e_tilt = e_past[PHI] + e_past[THETA]
-    a_recent = max(a_max, M.a_sizes[0], M.a_sizes[1])
-    e_climb = (y_past[AIRSPEED] + e_past[AIRSPEED]) * (e_tilt + e_vane) + e_past[AIRSPEED]
+    a = M.a_size[0] + e_a
+    second = 1.0 + h * (2.0 * M.a_size[0] / V + w_max)
+    low = max(lowest(red, y, ALTITUDE), LEAST_HEIGHT_M)
+    gust = np.sqrt(max(y[AIRSPEED] / c.max_airspeed_mps, 1.0) * max(c.low_m / low, 1.0))
+    e_flow = sec**2 * ((e_a + a * (e_vane + e_V / V)) / V + w_max * e_vane) + sec * e_w
+    tests[SPEED_TEST].gust_gain = gust
+    tests[SPEED_TEST].bound_per_s = e_a + second * a * e_vane + h * (a / V) ** 2 * e_V
+    for j in (ALPHA_TEST, BETA_TEST):
+        tests[j].gust_gain = gust * sec / V
+        tests[j].bound_per_s = second * e_flow
     tests[CLIMB_TEST].bound_per_s = (
-        c.wind_max + c.gust_max + e_climb + POSITION_FACTOR * c.sample_time_s * a_recent
+        c.wind_max
+        + c.gust_max
+        + (M.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + e_vane)
+        + e_V
+        + POSITION_FACTOR * h * max(a, M.a_size[1], M.a_size[2])
     )
-    tests[CLIMB_TEST].bound_per_sample = e_new[ALTITUDE]
+    for j, i in ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE)):
+        tests[j].bound_per_sample = M.e_new[i]
 
 
 @kernel
@@ -607,8 +578,7 @@ def bound_log(red, y, i):
 def bound_density(red, y):
     """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height."""
     test, c, M = red.test[DENSITY_TEST], red.config, red.memory
-    e = M.reading_bound
-    e_new = M.e_new
+    e, e_new = M.reading_bound, M.e_new
     climb = M.y_past[AIRSPEED] + M.e_past[AIRSPEED] + c.wind_max + c.gust_max
     e_log = bound_log(red, y, QDYN) + 2.0 * bound_log(red, y, AIRSPEED)
     test.bound_per_s = climb / DENSITY_SCALE_HEIGHT_M + e_log / c.sample_time_s
@@ -624,8 +594,7 @@ def bound_residuals(red, y):
     The errors of the sample before act through the prediction, those of this sample through the reading that
     is compared with it.
     """
-    e = red.memory.e_past
-    y_past = red.memory.y_past
+    e, y_past = red.memory.e_past, red.memory.y_past
     e_w = e[P] + e[Q] + e[R]
     w_max = abs(y_past[P]) + abs(y_past[Q]) + abs(y_past[R]) + e_w
     bound_attitude(red, y, w_max, e_w)
@@ -639,14 +608,12 @@ def filter_test(red, test):
 
     r <- a r + residual,    B = B_s + B_n + bound_per_sample + gust_gain gust_change,    ratio = max |r| / B
     """
-    c = red.config
-    test.ratio = 0.0
+    c, test.ratio = red.config, 0.0
+    leak(test.r, c.decay, test.residual)
+    leak(test.B_s, c.decay, c.sample_time_s * test.bound_per_s)
     for m, a in enumerate(c.decay):
-        test.r[m] = a * test.r[m] + test.residual
-        test.B_s[m] = advance_bound(test.B_s[m], test.bound_per_s, a, c.sample_time_s)
         test.B_n[m] = advance_gyro(test.B_n[m], test.past_bound, a)
-        B_now = test.B_n[m] + test.bound_per_sample
-        test.B[m] = test.B_s[m] + B_now + test.gust_gain * c.gust_change[m]
+        test.B[m] = test.B_s[m] + test.B_n[m] + test.bound_per_sample + test.gust_gain * c.gust_change[m]
         test.ratio = max(test.ratio, abs(test.r[m]) / test.B[m])
     test.past_bound = test.bound_per_sample
 
@@ -655,39 +622,30 @@ def filter_test(red, test):
 def restart_test(test):
     """Restart a test with this sample: its filters are empty, and the whole bound per sample is still due."""
     test.ratio = test.residual = 0.0
-    test.r[:], test.B_s[:] = 0.0, 0.0
-    test.B_n[:] = test.bound_per_sample
-    test.past_bound = test.bound_per_sample
+    test.r[:] = test.B_s[:] = 0.0
+    test.B_n[:] = test.past_bound = test.bound_per_sample
 
 
 @kernel
-def compare_engine(red, y):
-    """Compare the engine's readings with the command. There is no filter: each sample is judged alone."""
-    M = red.memory
-    red.test[RPM_TEST].residual = y[ENGINE_SPEED] - M.engine_commands[0]
-    red.test[RPM_TEST + 1].residual = y[MANIFOLD] - M.engine_commands[1]
-    for i in range(2):
-        e = M.reading_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
-        red.test[RPM_TEST + i].ratio = abs(red.test[RPM_TEST + i].residual) / e
+def compare(test, residual, bound):
+    """Judge a residual alone, without a filter, by the bound on it."""
+    test.residual, test.B[0] = residual, bound + COMPARISON_ROUNDING
+    test.ratio = abs(residual) / test.B[0]
 
 
 @kernel
 def compare_duplicates(red, y, fresh):
     """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which it is
-    fresh; fresh (sampled sensors,): |y_i - y_j| / (tolerance + e_i + e_j) > 1 if one of the two is broken.
+    fresh; fresh (sampled sensors,). One of the two is broken if they differ by more than tolerance + e_i +
+    e_j.
     """
-    M = red.memory
+    e = red.memory.reading_bound
     for d in range(DUPLICATE.size):
-        i = DUPLICATE[d]
-        j = COUNTERPART[d]
-        test = red.test[N_EQUATIONS + d]
+        i, j, test = DUPLICATE[d], COUNTERPART[d], red.test[N_EQUATIONS + d]
         test.ratio = 0.0
         if fresh[i - N_IN_EQUATIONS]:
-            test.residual = y[i] - y[j]
-            if PHI <= j <= PSI:
-                test.residual = wrapped(test.residual)
-            test.B[0] = DUPLICATE_TOLERANCE[d] + M.reading_bound[i] + M.reading_bound[j] + COMPARISON_ROUNDING
-            test.ratio = abs(test.residual) / test.B[0]
+            r = y[i] - y[j]
+            compare(test, wrapped(r) if PHI <= j <= PSI else r, DUPLICATE_TOLERANCE[d] + e[i] + e[j])
 
 
 @kernel
@@ -696,8 +654,9 @@ def start_tests(red, y, force):
     M = red.memory
     bound_readings(red, y)
     store_sample(red, y, force)
-    M.e_older[:], M.a_past[:] = (M.e_past, M.a)
-    M.a_size = M.a_sizes[0] = vector_length(M.a) + FORCE_JUMP_M_S2
+    M.e_older[:] = M.e_past
+    M.a_past[:] = M.a
+    M.a_size[:2] = vector_length(M.a) + FORCE_JUMP_M_S2
     M.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(red, y)
     for j in range(RPM_TEST):
@@ -710,8 +669,7 @@ def run_tests(red, y, has_engine):
     c, M = red.config, red.memory
     M.e_drift += c.sample_time_s * c.drift
     bound_readings(red, y)
-    predict_readings(red)
-    fill_residuals(red, y)
+    fill_residuals(red, y, predict_readings(red))
     bound_residuals(red, y)
     M.e_first = 0.0
     steep = too_steep(red, y)
@@ -721,10 +679,6 @@ def run_tests(red, y, has_engine):
         else:
             filter_test(red, red.test[j])
     if has_engine:
-        compare_engine(red, y)
-
-
-@kernel
-def start_drift(red, t):
-    """Fill the bound on the attitude's drift by t s, which begins with the flight."""
-    red.memory.e_drift = red.config.drift * t
+        for i in range(2):
+            k = ENGINE_SPEED + i
+            compare(red.test[RPM_TEST + i], y[k] - M.engine_commands[i], M.reading_bound[k])

@@ -56,13 +56,12 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import attitude
-from beaver_ftc.diagnosis.detection.filters import advance_bound, bank_axis
+from beaver_ftc.diagnosis.detection.filters import bank_axis
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     effect_at_alarm,
     explains_exceeded,
     latch_refuted,
     start_bounds,
-    store_bounds,
     update_bounds,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -100,8 +99,8 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA,
     TURN_TEST,
     compare_duplicates,
+    leak,
     run_tests,
-    start_drift,
     start_tests,
     store_sample,
     too_steep,
@@ -132,26 +131,11 @@ MIN_AXIS_SHARE = 0.5
 TIME_ROUNDING_S = 1e-9
 
 
-@kernel
-def flow_sensor(j):
-    """The flow sensor that a test compares with the accelerometers."""
-    if j == SPEED_TEST:
-        return AIRSPEED
-    return ALPHA if j == ALPHA_TEST else BETA
-
-
-@kernel
-def flow_hypothesis(j):
-    """The hypothesis that the flow sensor of a test was broken when the monitor began (initial_errors.py)."""
-    if j == SPEED_TEST:
-        return H_AIRSPEED
-    return H_ALPHA if j == ALPHA_TEST else H_BETA
-
-
-@kernel
-def is_flow_test(j):
-    """Whether accelerometers take part in a test."""
-    return SPEED_TEST <= j <= BETA_TEST
+# By the test of the flow, from SPEED_TEST on: the flow sensor that it compares with the accelerometers, and
+# the hypothesis that this sensor was broken when the monitor began (initial_errors.py)
+FLOW_SENSOR, FLOW_HYPOTHESIS = (AIRSPEED, ALPHA, BETA), (H_AIRSPEED, H_ALPHA, H_BETA)
+# The sensor of each such hypothesis
+INITIAL_SENSOR = ALPHA, BETA, AIRSPEED, PHI, THETA
 
 
 @kernel
@@ -177,20 +161,18 @@ def is_frozen(mon, i):
 def clear_sensors(mon, y):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
     M, alarm = mon.memory, mon.output.alarm_test
-    if not is_flow_test(alarm):
+    if not SPEED_TEST <= alarm <= BETA_TEST:
         return
-    since = M.n_since * mon.redundancy.config.sample_time_s
-    soon = since < JUMP_WINDOW_S - TIME_ROUNDING_S
-    if soon and flow_jumped(mon, y):
-        clear_accelerometers(mon)
+    flow = FLOW_SENSOR[alarm - SPEED_TEST]
+    soon = M.n_since * mon.redundancy.config.sample_time_s < JUMP_WINDOW_S - TIME_ROUNDING_S
+    sound = soon and flow_jumped(mon, y)
     sum_flow(mon, y)
-    flow = flow_sensor(alarm)
-    if is_frozen(mon, flow) or (alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]):
-        clear_accelerometers(mon)
-    frozen = False
+    if sound or is_frozen(mon, flow) or (alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]):
+        M.cleared[AX:] = 1
+    broken = sum_exceeds_range(mon) or other_test_contradicts(mon, y)
     for i in range(AX, N_IN_EQUATIONS):
-        frozen = frozen or is_frozen(mon, i)
-    if frozen or sum_exceeds_range(mon) or other_test_contradicts(mon, y):
+        broken = broken or is_frozen(mon, i)
+    if broken:
         M.cleared[flow] = 1
     clear_gyros(mon, mon.redundancy.test[alarm])
 
@@ -210,12 +192,6 @@ def clear_gyros(mon, flow):
 
 
 @kernel
-def clear_accelerometers(mon):
-    """Clear all accelerometers."""
-    mon.memory.cleared[AX:] = 1
-
-
-@kernel
 def flow_jumped(mon, y):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it.
@@ -224,16 +200,12 @@ def flow_jumped(mon, y):
     ddy: second difference of the reading.
     """
     alarm, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
-    i = flow_sensor(alarm)
-    y_past = red.memory.y_past
-    test = red.test[alarm]
-    # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
+    i, y_past, test = FLOW_SENSOR[alarm - SPEED_TEST], red.memory.y_past, red.test[alarm]
     per_v = 1.0 if alarm == SPEED_TEST else 1.0 / max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
     per_a = red.config.sample_time_s * per_v
-    ddy = y[i] - 2.0 * y_past[i] + M.y_older[i]
-    least = MIN_JUMP_SHARE * abs(test.residual)
-    most = AB_NOW * M.jump * per_a
-    return abs(test.residual) > test.B[0] + FORCE_JUMP_M_S2 * per_a and abs(ddy) >= least > most
+    ddy = abs(y[i] - 2.0 * y_past[i] + M.y_older[i])
+    r = abs(test.residual)
+    return r > test.B[0] + FORCE_JUMP_M_S2 * per_a and ddy >= MIN_JUMP_SHARE * r > AB_NOW * M.jump * per_a
 
 
 @kernel
@@ -244,25 +216,23 @@ def sum_flow(mon, y):
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
     red, M, ini = mon.redundancy, mon.memory, mon.initial_errors
-    c = red.config
-    for j in range(3):
-        y_j = y[flow_sensor(SPEED_TEST + j)]
-        test = red.test[SPEED_TEST + j]
+    h = red.config.sample_time_s
+    for n in range(3):
+        j, y_n, k = SPEED_TEST + n, y[FLOW_SENSOR[n]], FLOW_HYPOTHESIS[n]
+        test = red.test[j]
         if M.n_since == 0:
-            M.y_min[j] = M.y_max[j] = y_j
-            M.B_sum[j] = (  # noise of the first and of the last sample
-                2.0 * test.bound_per_sample + test.gust_gain * c.gust_max
-            )
+            M.y_min[n] = M.y_max[n] = y_n
+            # noise of the first and of the last sample
+            M.B_sum[n] = 2.0 * test.bound_per_sample + test.gust_gain * red.config.gust_max
             continue
-        M.r_sum[j] += test.residual
-        h = flow_hypothesis(SPEED_TEST + j)
-        M.B_sum[j] += c.sample_time_s * test.bound_per_s
-        M.e_sum[j] += ini.e_alarm[h] * ini.H[h, SPEED_TEST + j]
-        M.y_min[j], M.y_max[j] = (min(M.y_min[j], y_j), max(M.y_max[j], y_j))
+        M.r_sum[n] += test.residual
+        M.B_sum[n] += h * test.bound_per_s
+        M.e_sum[n] += ini.e_alarm[k] * ini.H[k, j]
+        M.y_min[n] = min(M.y_min[n], y_n)
+        M.y_max[n] = max(M.y_max[n], y_n)
     alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
-    climb = c.sample_time_s * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA])
-    for m in range(c.decay.size):
-        M.climb[m] = c.decay[m] * M.climb[m] + climb
+    climb = h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA])
+    leak(M.climb, red.config.decay, climb)
     M.n_since += 1
 
 
@@ -284,7 +254,7 @@ def other_test_contradicts(mon, y):
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.memory.exceeded[other]:
         return False
-    h = flow_hypothesis(alarm)
+    h = FLOW_HYPOTHESIS[alarm - SPEED_TEST]
     for m in range(red.config.decay.size):
         r = abs(mon.memory.climb[m])
         speed = red.test[SPEED_TEST]
@@ -301,32 +271,22 @@ def suspect_accelerometers(mon, by_gyro):
     """Suspect the accelerometers along whose axis most of the spurious velocity dv is, unless a gyro explains
     it. along, down, side: of dv, m/s, along and across the flow; sound: bound on |dv| of sound sensors.
     """
-    M, suspect = mon.memory, mon.output.suspect
-    y_past = mon.redundancy.memory.y_past
-    r = M.r_sum
-    B = M.B_sum
-    alpha = y_past[ALPHA]
-    beta = y_past[BETA]
-    V = max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
-    # symmetry
-    along = r[0]
-    down = V * np.cos(beta) * r[1]
-    side = V * r[2]
-    dv = M.dv
-    most = 0.0
-    plane = np.cos(beta) * along - np.sin(beta) * side
-    dv[0] = np.cos(alpha) * plane - np.sin(alpha) * down
-    dv[1] = np.sin(beta) * along + np.cos(beta) * side
-    dv[2] = np.sin(alpha) * plane + np.cos(alpha) * down
-    sound = B[0] + V * (B[1] + B[2])  # m/s, of sound sensors
-    frozen = NO_SENSOR
-    for i in range(3):
-        most = max(most, abs(dv[i]))
-        frozen = AX + i if is_frozen(mon, AX + i) else frozen
+    M, y_past, r, B = mon.memory, mon.redundancy.memory.y_past, mon.memory.r_sum, mon.memory.B_sum
+    alpha, beta, V = y_past[ALPHA], y_past[BETA], max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+    along, down, side = r[0], V * np.cos(beta) * r[1], V * r[2]
+    plane = np.cos(beta) * along - np.sin(beta) * side  # along the flow's projection on the plane of symmetry
+    dv = (
+        np.cos(alpha) * plane - np.sin(alpha) * down,
+        np.sin(beta) * along + np.cos(beta) * side,
+        np.sin(alpha) * plane + np.cos(alpha) * down,
+    )
+    sound = B[0] + V * (B[1] + B[2])
+    most, frozen = max(abs(dv[0]), abs(dv[1]), abs(dv[2])), NO_SENSOR
+    for i in range(AX, N_IN_EQUATIONS):
+        frozen = i if is_frozen(mon, i) else frozen
     for i in range(AX, N_IN_EQUATIONS):
         cause = frozen == i or (frozen < 0 and abs(dv[i - AX]) + sound >= MIN_AXIS_SHARE * most)
-        suspect[i] = cause and not by_gyro and not M.cleared[i]
+        mon.output.suspect[i] = cause and not by_gyro and not M.cleared[i]
 
 
 @kernel
@@ -385,10 +345,11 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     update_bounds(red, ini, y)
     count_same(mon, y)
     if M.substep == 0:
-        M.w_att_past[:], M.peak_older[:] = (M.w_att, M.peak_past)
+        M.w_att_past[:] = M.w_att
+        M.peak_older[:] = M.peak_past
         M.peak_past[:] = M.peak
         M.floor_past[:] = M.floor
-        M.peak[:], M.floor[:] = 0.0, 0.0
+        M.peak[:] = M.floor[:] = 0.0
     for i in range(3):
         w = -red.test[TURN_TEST + i].residual / red.config.sample_time_s
         if M.substep == 0:
@@ -443,7 +404,7 @@ def begin_monitor(mon, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
     M, red = mon.memory, mon.redundancy
     M.stage, M.t_start = 1, t
-    start_drift(red, t)
+    red.memory.e_drift = red.config.drift * t
     start_tests(red, measured.signal, measured.force)
     start_bounds(mon.initial_errors, measured.signal)
     M.y_older[:] = red.memory.y_past
@@ -484,20 +445,14 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
-    M, D = mon.memory, mon.config.D
-    w = M.w
-    B = M.w_bound
-    w_past = M.w_past
-    B_past = M.w_bound_past
-    B_past[:] = B
-    w_past[:] = w
+    w, B, D = mon.memory.w, mon.memory.w_bound, mon.config.D
+    w_past, B_past = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        Dw, DB = 0.0, 0.0
         for j in range(3):
-            Dw += D[i, j] * w_past[j]
-            DB += (-D[i, j] if i == j else abs(D[i, j])) * B_past[j]
-        w[i] += dt * (nu[i] - Dw)
-        B[i] = max(B_past[i] + dt * (eta[i] + DB), 0.0)
+            w[i] -= dt * D[i, j] * w_past[j]
+            B[i] += dt * (-D[i, j] if i == j else abs(D[i, j])) * B_past[j]
+        w[i] += dt * nu[i]
+        B[i] = max(B[i] + dt * eta[i], 0.0)
 
 
 @kernel
@@ -507,12 +462,12 @@ def exclude_gyros(mon):
     gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
     M, c = mon.memory, mon.redundancy.config
+    h = c.sample_time_s
     for i in range(3):
         test = mon.redundancy.test[TURN_TEST + i]
-        e = M.w_bound[i] + DAMPING_TOLERANCE * abs(M.w[i])
-        for m, a in enumerate(c.decay):
-            M.gap[i, m] = a * M.gap[i, m] + test.residual + c.sample_time_s * M.w[i]
-            M.gap_bound[i, m] = advance_bound(M.gap_bound[i, m], e, a, c.sample_time_s)
+        leak(M.gap[i], c.decay, test.residual + h * M.w[i])
+        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + DAMPING_TOLERANCE * abs(M.w[i])))
+        for m in range(c.decay.size):
             if abs(M.gap[i, m]) > M.gap_bound[i, m] + test.B[m]:
                 M.gyros_excluded = 1
 
@@ -533,7 +488,7 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     if o.top_ratio > 1.0 and not o.alarmed:
         raise_alarm(mon, found, t)
         o.alarm_test = o.worst_test_index
-        store_bounds(mon.initial_errors)
+        mon.initial_errors.e_alarm[:] = mon.initial_errors.e
     if o.alarmed:
         filter_beyond(mon, measured.signal)
         if M.substep == 0 and M.stage == FULL_STAGE:
@@ -555,9 +510,9 @@ def find_worst(mon):
     o = mon.output
     if mon.memory.substep == 0:
         o.worst_test_index, o.top_ratio = 0, 0.0
-    for j in range(N_TESTS):
-        if mon.redundancy.test[j].ratio > o.top_ratio:
-            o.worst_test_index, o.top_ratio = (j, mon.redundancy.test[j].ratio)
+    for j, test in enumerate(mon.redundancy.test):
+        if test.ratio > o.top_ratio:
+            o.worst_test_index, o.top_ratio = j, test.ratio
 
 
 @kernel
@@ -632,27 +587,19 @@ def judge_gyros(mon, bank, bound, dt):
 
 
 @kernel
-def exceeds_uncoupled(mon, j, first):
-    """Whether test j, one of the three from `first` on, exceeds its bound by more than an error on one of the
-    other two axes explains.
-    """
-    most = 0.0
-    for i in range(3):
-        most = max(most, abs(mon.redundancy.test[first + i].r[0]))
-    test = mon.redundancy.test[j]
-    return test.ratio > 1.0 and abs(test.r[0]) > COUPLING_SHARE * most
-
-
-@kernel
 def latch_exceeded(mon):
-    """Record the tests that have exceeded their bounds since the alarm."""
-    red, exceeded = mon.redundancy, mon.memory.exceeded
+    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
+    that exceed them by more than an error on another axis explains.
+    """
+    tests, exceeded = mon.redundancy.test, mon.memory.exceeded
     for j in range(N_TESTS):
-        first = TURN_TEST if j < ANGLE_TEST else ANGLE_TEST
-        over = exceeds_uncoupled(mon, j, first) if j < SPEED_TEST else red.test[j].ratio > 1.0
-        if over:
+        most, first = 0.0, TURN_TEST if j < ANGLE_TEST else ANGLE_TEST
+        for i in range(3):
+            most = max(most, abs(tests[first + i].r[0]))
+        coupled = j < SPEED_TEST and abs(tests[j].r[0]) <= COUPLING_SHARE * most
+        if tests[j].ratio > 1.0 and not coupled:
             exceeded[j] = 1
-    latch_refuted(red, mon.initial_errors, exceeded)
+    latch_refuted(mon.redundancy, mon.initial_errors, exceeded)
 
 
 @kernel
@@ -681,7 +628,7 @@ def find_suspects(mon):
     frozen = frozen_suspect(mon)
     for i in range(N_INITIAL):
         if not frozen and explains_exceeded(mon.initial_errors, i, alarm):
-            suspect[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
+            suspect[INITIAL_SENSOR[i]] = 1
 
 
 @kernel
@@ -835,14 +782,11 @@ def filter_beyond(mon, y):
     red, M = mon.redundancy, mon.memory
     for i in range(3):
         r = red.test[ANGLE_TEST + i].residual
-        for m, a in enumerate(red.config.decay):
-            M.swing[i, m] = a * M.swing[i, m] + abs(r)
+        leak(M.swing[i], red.config.decay, abs(r))
         for j in range(3):
             c = turn_share(y, j, i)
             M.c_max[i, j] = max(M.c_max[i, j], abs(c))
-            x = red.test[TURN_TEST + j].residual - c * r
-            for m, a in enumerate(red.config.decay):
-                M.beyond[i, j, m] = a * M.beyond[i, j, m] + x
+            leak(M.beyond[i, j], red.config.decay, red.test[TURN_TEST + j].residual - c * r)
 
 
 @kernel

@@ -21,13 +21,12 @@ constant while it is there, is never excluded, and so never misnamed. What canno
 candidate.
 
 A file under table/ describes fault types; its `TYPES` are the rows. This file says what is in a row
-(`FaultType`) and has two parts of a surface's record, which no other file writes:
+(`FaultType`) and has two parts of a surface's record:
 
 - Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
   once its set is empty, and stays excluded until the surface's diagnosis restarts.
 - Observations: where the surface was, if it alone is at fault, in three frames or blocks:
-  `last` is of the elapsed frame, `judged` of the one before it,
-  `earlier` of the one before that. Positions in rad.
+  `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
 
 registry.py reads the rows into arrays and records; in each frame it finds where each surface was and tests
 every type. verdict.py and pairs.py conclude; they name no type.
@@ -100,46 +99,43 @@ class FaultType:
 
     The feasible set; kernels:
 
-    consistent_interval(config, surface, type_index, k)
+    consistent_interval(c, srf, h, k)
                             the parameters (low, high) that explain the judged frame, in which something was
                             wrong; UNLIMITED_SET if every one does, EMPTY_SET (low > high) excludes the
                             type
-    parameter_range(surface)
-                            the parameters (low, high) that there are; unlimited if left out
-    set_after_frame(surface, type_index)
+    parameter_range(srf)    the parameters (low, high) that there are; unlimited if left out
+    set_after_frame(srf, h)
                             the set (low, high) to go on with after a frame; the one there is if left out
     memory_dtype, memory_record_name
-                            a record of its own, found at `surface.<memory_record_name>`
-    reset_memory(surface, type_index)
-                            its memory is reset: nothing is known yet
-    before_judging_frame(config, surface, type_index)
+                            a record of its own, found at `srf.<memory_record_name>`
+    reset_memory(srf, h)    its memory is reset: nothing is known yet
+    before_judging_frame(c, srf, h)
                             called for every frame, before it is judged
-    on_skipped_frame(config, surface, type_index, k)  called for a frame that is not judged
-    on_possible_release(config, surface, type_index, k)
+    on_skipped_frame(c, srf, h, k)
+                            called for a frame that is not judged
+    on_possible_release(c, srf, h, k)
                             a repair may have released the surface as the frame began
-    propagate_release(config, surface, type_index)    advance such a release by a frame (held_surface.py)
-    possible_deflection_range(config, surface, type_index, k)
+    propagate_release(c, srf, h)
+                            advance such a release by a frame (held_surface.py)
+    possible_deflection_range(c, srf, h, k)
                             least and greatest deflection under it by the elapsed frame, rad; of a constant
                             type
 
     The evidence that a verdict needs:
 
-    has_shown(surface)      kernel: whether the type has shown itself. A type with this part explains a flight
+    has_shown(srf)          kernel: whether the type has shown itself. A type with this part explains a flight
                             only once it has shown itself
-    show_half_cycles
-                            half-cycles of the slowest oscillation within which such a type shows itself
+    show_half_cycles        half-cycles of the slowest oscillation within which such a type shows itself
     evidence_at_rest        what a surface that was given up, and stays where it was, says of the type:
                             REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE (it may be there all
                             the same) or REST_POSITION_IS_PARAMETER (its parameter is the deflection at
                             which the surface stands)
-    wait_half_cycles
-                            half-cycles of evidence that a fault on another surface needs while this type is
+    wait_half_cycles        half-cycles of evidence that a fault on another surface needs while this type is
                             left here
-    follows_command
-                            whether the deflection error depends on the command. While a type that does not
+    follows_command         whether the deflection error depends on the command. While a type that does not
                             is left on one surface, no other surface is isolated in its place
     can_look_like           names of types that this one can look like: they are not named while it is left
-    motion_rules_out(surface, stop_direction)
+    motion_rules_out(srf, stop)
                             kernel: whether the surface has moved as this type cannot, towards the stop
                             of that direction (0: of a type without one)
     stop_direction          the stop that it runs to: 1 upper, -1 lower, 0 neither
@@ -149,10 +145,9 @@ class FaultType:
     accommodation_mode      SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET or WAIT_FOR_SURFACE
     other_accommodation_modes
                             other modes that serve it
-    end_type
-                            name of the type that it becomes at the end of its range: where both are left, the
+    end_type                name of the type that it becomes at the end of its range: where both are left, the
                             modes of that one serve this one too
-    deflection_error(surface, type_index)
+    deflection_error(srf, h)
                             kernel: how far the surface is off its command, rad; not finite if not known
     deflection_error_precedence
                             of the types left, the one with the least number gives the deflection error
@@ -161,17 +156,16 @@ class FaultType:
 
     deflection_relation     deflection by command and one parameter, where that is all that the type says; of
                             a type that is not constant theta may differ from frame to frame
-    frames_test
-                            name of the comparison of frames that excludes it, where one frame or two do not
+    frames_test             name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
     Words, Python functions (verdict.py):
 
-    estimate_parameter(fdi, s, type_index)
+    estimate_parameter(fdi, s, h)
                             its parameter, None without one
-    estimate_parameter_interval(fdi, s, type_index)
+    estimate_parameter_interval(fdi, s, h)
                             the set that the parameter is certain to lie in, or None
-    estimate_frequency_rad_s(fdi, s, type_index)
+    estimate_frequency_rad_s(fdi, s, h)
                             of a periodic type, or None
     """
 
@@ -235,13 +229,6 @@ def middle_estimate(fdi: np.void, s: int, h: int) -> float:
 
 
 @kernel
-def reset_feasible(srf):
-    """Allow every type with any parameter."""
-    srf.sets.low[:], srf.sets.high[:] = -np.inf, np.inf
-    srf.sets.excluded[:] = 0
-
-
-@kernel
 def put_set(srf, h, interval):
     """Put an interval in place of the set of a type."""
     srf.sets.low[h], srf.sets.high[h] = interval
@@ -263,37 +250,11 @@ def intersect_set(srf, h, other):
         srf.sets.excluded[h] = 1
 
 
-@kernel
-def exclude_type(srf, h):
-    """Exclude a type."""
-    srf.sets.excluded[h] = 1
-
-
-@kernel
-def restore_first(srf):
-    """Restore the sets that were stored when the surface was isolated (pairs.py)."""
-    srf.sets.low[:], srf.sets.high[:] = (srf.first_sets.low, srf.first_sets.high)
-    srf.sets.excluded[:] = srf.first_sets.excluded
-
-
 # u: where a healthy surface was; lo, hi: where this one can have been; anomalous: whether more than the
 # declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
 # positions a mean weighted by G may be off; hides: whether the lower and the upper stop can cut a deflection
 # off unseen.
 OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
-
-
-@kernel
-def allow_reach(srf):
-    """The surface may have been anywhere within reach."""
-    srf.last.lo, srf.last.hi = (srf.actuator.reach_lo, srf.actuator.reach_hi)
-
-
-@kernel
-def shift_observations(srf):
-    """Shift the observations by one frame: the last becomes the judged one, and that one the earlier one."""
-    copy_observation(srf.earlier, srf.judged)
-    copy_observation(srf.judged, srf.last)
 
 
 @kernel
@@ -339,26 +300,6 @@ def observe_error(srf, e, tol):
     last.anomalous = abs(e) > tol
     mark_stops(srf, 2.0 * tol)
     return last.lo <= last.hi
-
-
-@kernel
-def set_known(srf, lo, hi):
-    """Set the interval (lo, hi) in which a surface with a known fault was; the frame is no longer anomalous
-    for it.
-    """
-    (srf.last.lo, srf.last.hi, srf.last.anomalous) = lo, hi, 0
-
-
-@kernel
-def set_anomalous(srf, anomalous):
-    """Set whether the elapsed frame is anomalous: more than the declared uncertainty was at work."""
-    srf.last.anomalous = anomalous
-
-
-@kernel
-def clear_anomalies(srf):
-    """Mark all three observations as not anomalous."""
-    srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
 
 
 @kernel

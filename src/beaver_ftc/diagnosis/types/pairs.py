@@ -25,16 +25,12 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    clear_anomalies,
     last_error,
     observe_error,
     registry,
-    restore_first,
-    set_anomalous,
-    set_known,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
@@ -49,31 +45,28 @@ def latch_groups(pair, bank):
 
 
 @kernel
-def locate_lateral(types, layout, est, nu, nu_max):
-    """Find where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p.
+def locate_one(srf, own, other, nu, nu_max):
+    """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta solved for p, with
 
-        (da, dr) = (nu_L Nr - nu_N Lr, nu_N La - nu_L Na) / (La Nr - Na Lr),    |eta| <= (e_L, e_N)
+    p - u = (nu_L N - nu_N L) / (L1 N - N1 L),    |eta| <= nu_max + e
 
-    L, N: roll and yaw acceleration, rad/s2; La, Lr, Na, Nr: per rad of ailerons and of rudder.
+    L, N: roll and yaw acceleration, rad/s2; L1, N1 per rad of this surface (own), L, N of the other. False:
+    nowhere within its reach.
     """
+    L, N = other.regressor[ROLL], other.regressor[YAW]
+    det = own.regressor[ROLL] * N - own.regressor[YAW] * L
+    e_L = nu_max[ROLL] + own.e[ROLL] + other.e[ROLL]
+    e_N = nu_max[YAW] + own.e[YAW] + other.e[YAW]
+    return observe_error(srf, (nu[ROLL] * N - nu[YAW] * L) / det, (e_L * abs(N) + e_N * abs(L)) / abs(det))
+
+
+@kernel
+def locate_lateral(types, layout, est, nu, nu_max):
+    """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
     a, r = layout.main[ROLL], layout.main[YAW]
-    ail = est[layout.position[a]].effect
-    rud = est[layout.position[r]].effect
-    La = ail.regressor[ROLL]
-    Na = ail.regressor[YAW]
-    Lr = rud.regressor[ROLL]
-    Nr = rud.regressor[YAW]
-    nu_L, nu_N = nu[ROLL], nu[YAW]
-    e_L = nu_max[ROLL] + ail.e[ROLL] + rud.e[ROLL]
-    e_N = nu_max[YAW] + ail.e[YAW] + rud.e[YAW]
-    det = La * Nr - Na * Lr
-    size = abs(det)
-    da = (nu_L * Nr - nu_N * Lr) / det
-    e_a = (e_L * abs(Nr) + e_N * abs(Lr)) / size
-    reached = observe_error(types.surface[a], da, e_a)
-    dr = (nu_N * La - nu_L * Na) / det
-    e_r = (e_N * abs(La) + e_L * abs(Na)) / size
-    if not (observe_error(types.surface[r], dr, e_r) and reached):
+    ail, rud = est[layout.position[a]].effect, est[layout.position[r]].effect
+    reached = locate_one(types.surface[a], ail, rud, nu, nu_max)
+    if not (locate_one(types.surface[r], rud, ail, nu, nu_max) and reached):
         types.pair.lateral_outside = 1
 
 
@@ -100,7 +93,7 @@ def observe_pitch(types, layout, est, nu, nu_max):
         return
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            set_anomalous(srf, abs(nu[PITCH]) > nu_max[PITCH])
+            srf.last.anomalous = abs(nu[PITCH]) > nu_max[PITCH]
 
 
 @kernel
@@ -116,12 +109,11 @@ def locate_second(types, layout, est, nu, nu_max):
     eff2 = est[layout.position[s2]].effect
     srf1 = types.surface[s1]
     lo, hi = constant_range(types.config, srf1, types.frame_index)
-    set_known(srf1, lo, hi)
-    M2 = eff2.regressor[PITCH]
-    M1 = eff1.regressor[PITCH]
+    srf1.last.lo, srf1.last.hi = lo, hi
+    srf1.last.anomalous = 0
+    M1, M2 = eff1.regressor[PITCH], eff2.regressor[PITCH]
     acc1 = M1 * last_error(srf1)
-    tol = abs(M1) * 0.5 * (hi - lo)
-    tol += nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
+    tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
     if not observe_error(types.surface[s2], (nu[PITCH] - acc1) / M2, tol / abs(M2)):
         types.surface[s2].status.basis = verdict.DEDUCED_HEALTHY
 
@@ -129,10 +121,11 @@ def locate_second(types, layout, est, nu, nu_max):
 @kernel
 def observe_pairs(types, layout, est, bank, nu_max):
     """Observe the elapsed frame, plane by plane, and judge the one before."""
+    nu = bank.output.innovation
     latch_groups(types.pair, bank)
-    registry.observe_surfaces(types, layout, est, bank.output.innovation, nu_max)
-    locate_lateral(types, layout, est, bank.output.innovation, nu_max)
-    observe_pitch(types, layout, est, bank.output.innovation, nu_max)
+    registry.observe_surfaces(types, layout, est, nu, nu_max)
+    locate_lateral(types, layout, est, nu, nu_max)
+    observe_pitch(types, layout, est, nu, nu_max)
     registry.judge_frame(types)
 
 
@@ -158,9 +151,7 @@ def isolate_lateral(types, layout, t):
     roll_alone = can_be_faulty(roll)
     yaw_alone = can_be_faulty(yaw)
     both = not roll_alone and not yaw_alone
-    refuted = (
-        pair.lateral_outside == 1 or not verdict.any_type_remains(roll) or not verdict.any_type_remains(yaw)
-    )
+    refuted = pair.lateral_outside == 1 or not verdict.left(roll, ALL) or not verdict.left(yaw, ALL)
     outside = both and refuted
     open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
     isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
@@ -192,17 +183,19 @@ def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
     srf1 = types.surface[types.pair.first_pitch]
     srf2 = types.surface[layout.partner[types.pair.first_pitch]]
-    restore_first(srf1)
+    srf1.sets.low[:] = srf1.first_sets.low
+    srf1.sets.high[:] = srf1.first_sets.high
+    srf1.sets.excluded[:] = srf1.first_sets.excluded
     registry.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
-        clear_anomalies(srf)
+        srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
 
 
 @kernel
 def dismiss_varying(c, srf):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    imitated = verdict.can_be_another(srf, verdict.sole_constant(srf), False)
+    imitated = verdict.can_be_another(srf, verdict.sole(srf, CONSTANT), False)
     doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
     return long_enough and verdict.would_have_shown(c, srf) and not doubt
@@ -220,16 +213,6 @@ def detect_second(types, layout):
 
 
 @kernel
-def pitch_type(c, srf):
-    """The type of the one fault of pitch, or -1 while it is open.
-
-    A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
-    """
-    kind = verdict.type_on_surface(c, srf)
-    return verdict.TYPE_UNDECIDED if kind >= 0 and MODE[kind] == GIVE_UP else kind
-
-
-@kernel
 def isolate_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
     if detect_second(types, layout):
@@ -237,7 +220,7 @@ def isolate_pitch(types, layout, t):
         s2 = layout.partner[types.pair.first_pitch]
         srf2 = types.surface[s2]
         anomalous = srf2.evidence.n_anomalous > 0
-        possible = can_be_faulty(srf2) and verdict.any_type_remains(srf2)
+        possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
         update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
         shows = anomalous and possible and verdict.explains_flight(srf2)
         update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
@@ -245,7 +228,10 @@ def isolate_pitch(types, layout, t):
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            update_status(srf, s == sole, pitch_type(types.config, srf) if s == sole else -1, t)
+            kind = verdict.type_on_surface(types.config, srf) if s == sole else -1
+            # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
+            open_yet = kind >= 0 and MODE[kind] == GIVE_UP
+            update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
 
 
 @kernel
@@ -320,12 +306,12 @@ def accommodate_pairs(types, layout):
     is done about it: a replaced elevator leads before all others."""
     lead, mode = NO_SURFACE, -1
     for s, srf in enumerate(types.surface):
-        verdict.set_mode(srf, -1)
+        srf.accommodation.mode = -1
         if acts_on(types, layout, s):
             possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
             own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
             if verdict.fault_shows(types.config, srf, own, possible):
-                verdict.set_mode(srf, own)
+                srf.accommodation.mode = own
                 leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or leads:
                     lead, mode = s, own

@@ -36,17 +36,14 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     OBSERVATION_RECORD,
     REST_EXCLUDES_TYPE,
+    REST_HIDES_TYPE,
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
-    allow_reach,
-    exclude_type,
+    copy_observation,
     intersect_set,
     observe_surface,
     put_set,
-    reset_feasible,
-    set_anomalous,
-    shift_observations,
     table,
 )
 from beaver_ftc.scenario.declared import Declared
@@ -83,10 +80,6 @@ def _parts_of(name: str) -> dict[int, Kernel]:
     return {h: part for h, part in parts.items() if part is not None}
 
 
-def _can_look_like(kind: FaultType, other_type: FaultType) -> bool:
-    return other_type.name in kind.can_look_like
-
-
 # The columns that verdict.py reads; `FaultType` says what they are.
 MODE, STOP_SIDE, REST = (
     _type_column(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
@@ -95,25 +88,23 @@ SHOW_HALF_CYCLES = _type_column("show_half_cycles")
 WAIT_HALF_CYCLES = _type_column("wait_half_cycles")
 FOLLOWS_COMMAND = _type_column("follows_command")
 MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
-CAN_LOOK_LIKE = np.array(
-    [[_can_look_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]
-)
+CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] for row in TYPES])
 SERVES = np.array(
-    [
-        [
-            accommodation_mode == row.accommodation_mode
-            or accommodation_mode in row.other_accommodation_modes
-            for row in TYPES
-        ]
-        for accommodation_mode in range(4)
-    ]
+    [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
 )
+# Masks of types (N_TYPES,): all, those of a constant parameter, others; of these, those that must show
+# themselves and those that need not; those of one mode, and those that can look like one type.
+ALL, CONSTANT = np.ones(N_TYPES, bool), np.arange(N_TYPES) < N_CONSTANT
+VARYING = ~CONSTANT
+VARYING_SHOWN, VARYING_QUIET = VARYING & MUST_SHOW, VARYING & ~MUST_SHOW
+VARYING_OF_MODE = VARYING & (np.arange(4)[:, None] == MODE)
+VARYING_LIKE = VARYING & CAN_LOOK_LIKE.T
+HIDDEN_AT_REST = REST == REST_HIDES_TYPE
+# The same of one name, by the first type of it; of any name, by TYPE_UNDECIDED (-1)
+NAMED = np.array([*(np.array(SAME_NAME) == h for h in range(N_TYPES)), ALL])
 # Types that give the deflection error of a surface, in the order in which they are used.
 ERROR_TYPES = np.array(
-    sorted(
-        _parts_of("deflection_error"), key=lambda type_index: TYPES[type_index].deflection_error_precedence
-    ),
-    dtype=int,
+    sorted(_parts_of("deflection_error"), key=lambda h: TYPES[h].deflection_error_precedence), dtype=int
 )
 END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
@@ -124,63 +115,47 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _compile_kernel(name: str, arguments: str, lines: list[str], namespace: dict[str, Any]) -> Kernel:
-    """A kernel whose body is `lines`, in which `part_3` is a part of type 3.
+def _write_kernel(name: str, arguments: str, given: str, line: str, last: str, **names: Any) -> Kernel:
+    """A kernel of these arguments with a line for each type that has the part `name`, {call} in it.
 
-    Compiled code calls only what it can name, so the calls are written out, one a type.
+    Compiled code calls only what it can name, so the calls are written out: part_3(srf, 3) is that of type 3,
+    for a part that is given srf and h.
     """
-    source = "\n    ".join([f"def {name}({arguments}):", *lines])
-    exec(compile(source, __file__, "exec"), namespace)
-    return kernel(namespace[name])
-
-
-def _call_expression(h: int, arguments: str) -> str:
-    """The call of a part of type `h`; the argument of that name is its number."""
-    given = (str(h) if argument == "type_index" else argument for argument in arguments.split(", "))
-    return f"part_{h}({', '.join(given)})"
-
-
-def _kernel_namespace(parts: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
-    """The names that a kernel which calls these parts needs."""
-    return {"__name__": __name__, **{f"part_{h}": part for h, part in parts.items()}, **other_names}
-
-
-def _call_each(name: str, arguments: str, result: Kernel | None = None) -> Kernel:
-    """A kernel that calls this part of every type; result(surface, h, interval): called with
-    what that returns."""
     parts = _parts_of(name)
-    parameters = ", ".join(argument for argument in arguments.split(", ") if argument != "type_index")
-    calls = {h: _call_expression(h, arguments) for h in parts}
-    lines = [f"result_kernel(surface, {h}, {call})" if result else call for h, call in calls.items()]
-    return _compile_kernel(
-        f"{name}_each", parameters, [*lines, "return"], _kernel_namespace(parts, result_kernel=result)
-    )
+    calls = {h: ", ".join(str(h) if each == "h" else each for each in given.split(", ")) for h in parts}
+    lines = [line.format(h=h, call=f"part_{h}({call})") for h, call in calls.items()]
+    names |= {"__name__": __name__, **{f"part_{h}": part for h, part in parts.items()}}
+    source = "\n    ".join([f"def {name}_of_types({arguments}):", *lines, last])
+    exec(compile(source, __file__, "exec"), names)
+    return kernel(names[f"{name}_of_types"])
 
 
-def _call_one(name: str, arguments: str, default: Any) -> Kernel:
-    """A kernel that returns what this part of the type `h` returns; `default` for
-    a type without it."""
-    parts = _parts_of(name)
-    lines = [f"if type_index == {h}: return {_call_expression(h, arguments)}" for h in parts]
-    parameters = arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
-    return _compile_kernel(
-        f"{name}_of", parameters, [*lines, "return default"], _kernel_namespace(parts, default=default)
-    )
+def _call_each(name: str, given: str, result: Kernel | None = None) -> Kernel:
+    """A kernel that calls this part of every type, and result(srf, h, interval) with what that returns."""
+    arguments = ", ".join(each for each in given.split(", ") if each != "h")
+    line = "result(srf, {h}, {call})" if result else "{call}"
+    return _write_kernel(name, arguments, given, line, "return", result=result)
 
 
-_FRAME_ARGUMENTS = "config, surface, type_index, k"
-reset_memory_each = _call_each("reset_memory", "surface, type_index")
-parameter_range_each = _call_each("parameter_range", "surface", put_set)
-before_judging_frame_each = _call_each("before_judging_frame", "config, surface, type_index")
-on_skipped_frame_each = _call_each("on_skipped_frame", _FRAME_ARGUMENTS)
-consistent_each = _call_each("consistent_interval", _FRAME_ARGUMENTS, intersect_set)
-on_possible_release_each = _call_each("on_possible_release", _FRAME_ARGUMENTS)
-set_after_each = _call_each("set_after_frame", "surface, type_index", put_set)
-propagate_release_each = _call_each("propagate_release", "config, surface, type_index")
-has_shown = _call_one("has_shown", "surface", True)
-motion_rules_out = _call_one("motion_rules_out", "surface, stop_direction", False)
-possible_deflection_range = _call_one("possible_deflection_range", _FRAME_ARGUMENTS, EMPTY_SET)
-error_of_type = _call_one("deflection_error", "surface, type_index", np.nan)
+def _call_one(name: str, given: str, default: Any) -> Kernel:
+    """A kernel that returns what this part of type h returns; `default` for a type without it."""
+    arguments = given if "h" in given.split(", ") else f"{given}, h"
+    line = "if h == {h}: return {call}"
+    return _write_kernel(name, arguments, given, line, "return default", default=default)
+
+
+reset_memory_each = _call_each("reset_memory", "srf, h")
+parameter_range_each = _call_each("parameter_range", "srf", put_set)
+before_judging_frame_each = _call_each("before_judging_frame", "c, srf, h")
+on_skipped_frame_each = _call_each("on_skipped_frame", "c, srf, h, k")
+consistent_each = _call_each("consistent_interval", "c, srf, h, k", intersect_set)
+on_possible_release_each = _call_each("on_possible_release", "c, srf, h, k")
+set_after_each = _call_each("set_after_frame", "srf, h", put_set)
+propagate_release_each = _call_each("propagate_release", "c, srf, h")
+has_shown = _call_one("has_shown", "srf", True)
+motion_rules_out = _call_one("motion_rules_out", "srf, stop", False)
+possible_deflection_range = _call_one("possible_deflection_range", "c, srf, h, k", EMPTY_SET)
+error_of_type = _call_one("deflection_error", "srf, h", np.nan)
 
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -314,9 +289,11 @@ def restart_types(types):
 @kernel
 def restart_surface(srf):
     """Nothing is known of this surface yet."""
-    reset_feasible(srf)
+    srf.sets.low[:] = -np.inf
+    srf.sets.high[:] = np.inf
+    srf.sets.excluded[:] = 0
     parameter_range_each(srf)
-    allow_reach(srf)
+    srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
     srf.evidence.k_first = -1
     srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
     reset_memory_each(srf)
@@ -352,8 +329,9 @@ def observe_surfaces(types, layout, est, nu, nu_max):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
     anomalous = not isolation.eta_explains(nu, nu_max)
     for s, srf in enumerate(types.surface):
-        shift_observations(srf)
-        set_anomalous(srf, anomalous)
+        copy_observation(srf.earlier, srf.judged)
+        copy_observation(srf.judged, srf.last)
+        srf.last.anomalous = anomalous
         fie, axis = est[layout.position[s]], layout.dominant_axis[s]
         eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
         observe_surface(types.config, srf, fie, axis, nu, nu_max, eff)
@@ -411,44 +389,31 @@ def observe_frame(types, layout, est, nu, bound):
 
 
 @kernel
-def begin_block(types, layout, est, n_bar_old):
-    """Begin a block with the elapsed frame; n_bar_old (3,) rad/s: bound on the gyros' noise as it began."""
-    block = types.block
-    block.nu[:], block.nu_bound[:] = 0.0, 0.0
-    block.n_start[:] = n_bar_old
-    for j in layout.position:
-        isolation.clear_mean_effect(est[j].mean_effect)
-
-
-@kernel
-def add_to_block(types, layout, est, nu, eta):
-    """Add the elapsed frame to the means over the block."""
-    block, share = types.block, 1.0 / types.config.frames_per_block
-    for i in range(3):
-        block.nu[i] += share * nu[i]
-        block.nu_bound[i] += share * eta[i]
-    for j in layout.position:
-        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share)
-
-
-@kernel
 def extend_block(types, layout, est, nu, bound):
-    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before:
+    """Add the elapsed frame to the means over its block; with the last frame, observe the block and judge
+    the one before:
 
     nu_bound = mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
     """
     c, block = types.config, types.block
+    share = 1.0 / c.frames_per_block
     if block.n_so_far == 0:
-        begin_block(types, layout, est, bound.n_old)
-    add_to_block(types, layout, est, nu, bound.eta_bar)
+        block.nu[:] = block.nu_bound[:] = 0.0
+        block.n_start[:] = bound.n_old
+    for j in layout.position:
+        if block.n_so_far == 0:
+            isolation.clear_mean_effect(est[j].mean_effect)
+        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share)
     block.n_so_far += 1
-    if block.n_so_far < c.frames_per_block:
-        return
-    block.n_so_far = 0
     for i in range(3):
-        block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
-    observe_surfaces(types, layout, est, block.nu, block.nu_bound)
-    judge_frame(types)
+        block.nu[i] += share * nu[i]
+        block.nu_bound[i] += share * bound.eta_bar[i]
+        if block.n_so_far == c.frames_per_block:
+            block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
+    if block.n_so_far == c.frames_per_block:
+        block.n_so_far = 0
+        observe_surfaces(types, layout, est, block.nu, block.nu_bound)
+        judge_frame(types)
 
 
 @kernel
@@ -468,15 +433,14 @@ def count_rest(types, s):
     if srf.evidence.n_rest > types.config.half_frames and not types.config.has_eG:
         for h in range(N_TYPES):
             if REST[h] == REST_EXCLUDES_TYPE:
-                exclude_type(srf, h)
+                srf.sets.excluded[h] = 1
 
 
 @kernel
 def agrees_at_rest(srf):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for h in range(N_TYPES):
-        lo, hi = srf.sets.low[h], srf.sets.high[h]
-        outside = srf.judged.lo > hi or srf.judged.hi < lo
+        outside = srf.judged.lo > srf.sets.high[h] or srf.judged.hi < srf.sets.low[h]
         if REST[h] == REST_POSITION_IS_PARAMETER and outside:
             return False
     return True

@@ -19,7 +19,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, PITCH_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
-    REST_HIDES_TYPE,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
@@ -28,19 +27,25 @@ from beaver_ftc.diagnosis.types import (
     set_middle,
 )
 from beaver_ftc.diagnosis.types.registry import (
+    ALL,
     CAN_LOOK_LIKE,
+    CONSTANT,
     END_TYPE,
     ERROR_TYPES,
     FOLLOWS_COMMAND,
+    HIDDEN_AT_REST,
     MODE,
-    MUST_SHOW,
     N_CONSTANT,
     N_TYPES,
-    REST,
+    NAMED,
     SAME_NAME,
     SERVES,
     SHOW_HALF_CYCLES,
     STOP_SIDE,
+    VARYING_LIKE,
+    VARYING_OF_MODE,
+    VARYING_QUIET,
+    VARYING_SHOWN,
     WAIT_HALF_CYCLES,
     error_of_type,
     has_shown,
@@ -77,28 +82,25 @@ def type_remains(srf, h):
 
 
 @kernel
-def constant_remains(srf):
-    """Whether a type with a constant parameter is left."""
-    # A loop: compiled code with np.all loads scipy.linalg, which takes longer than the flight.
-    for h in range(N_CONSTANT):
-        if type_remains(srf, h):
+def left(srf, mask):
+    """Whether a type of a mask (N_TYPES,) is left."""
+    # A loop: compiled code with np.any loads scipy.linalg, which takes longer than the flight.
+    for h in range(N_TYPES):
+        if mask[h] and type_remains(srf, h):
             return True
     return False
 
 
 @kernel
-def any_type_remains(srf):
-    """Whether any type is left."""
-    return not np.all(srf.sets.excluded)
+def constant_remains(srf):
+    """Whether a type with a constant parameter is left."""
+    return left(srf, CONSTANT)
 
 
 @kernel
 def name_remains(srf, named):
     """Whether a type of this name is left; with TYPE_UNDECIDED, one of any name."""
-    for h in range(N_TYPES):
-        if type_remains(srf, h) and named in (SAME_NAME[h], TYPE_UNDECIDED):
-            return True
-    return False
+    return left(srf, NAMED[named])
 
 
 @kernel
@@ -120,12 +122,12 @@ def would_have_shown(c, srf):
 
 
 @kernel
-def sole_type(srf, n):
-    """The one of the first n that is left, or TYPE_UNDECIDED; of several of one name, the
-    first."""
-    kind = TYPE_UNDECIDED
-    for h in range(n):
-        if type_remains(srf, h):
+def sole(srf, mask):
+    """The one type of a mask that is left, NO_TYPE, or TYPE_UNDECIDED if there are several; of several of one
+    name, the first."""
+    kind = NO_TYPE
+    for h in range(N_TYPES):
+        if mask[h] and type_remains(srf, h):
             if kind >= 0 and SAME_NAME[h] != SAME_NAME[kind]:
                 return TYPE_UNDECIDED
             kind = h if kind < 0 else kind
@@ -133,15 +135,9 @@ def sole_type(srf, n):
 
 
 @kernel
-def sole_constant(srf):
-    """The one type of constant parameter left, or TYPE_UNDECIDED."""
-    return sole_type(srf, N_CONSTANT)
-
-
-@kernel
-def sole_shown(srf):
-    """The one type left, constant or varying, or TYPE_UNDECIDED: in coarse sets a constant proves nothing."""
-    kind = sole_type(srf, N_TYPES)
+def sole_shown(srf, mask):
+    """The one type of a mask that is left, if it has shown itself; else TYPE_UNDECIDED."""
+    kind = sole(srf, mask)
     return kind if kind >= 0 and has_shown(srf, kind) else TYPE_UNDECIDED
 
 
@@ -149,34 +145,24 @@ def sole_shown(srf):
 def may_be_hidden(c, srf):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
-    if not constant_remains(srf) or srf.evidence.n_anomalous - srf.evidence.n_rest >= c.half_frames:
-        return False
-    for h in range(N_TYPES):
-        if REST[h] == REST_HIDES_TYPE and type_remains(srf, h):
-            return True
-    return False
-
-
-@kernel
-def can_imitate(srf, h, apparent):
-    """Whether a fault of type `h` may look like one of `apparent`, or of another type left of
-    that name and of constant parameter."""
-    for j in range(N_CONSTANT):
-        alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
-        if alike and not motion_rules_out(srf, STOP_SIDE[j], h):
-            return True
-    return False
+    return (
+        constant_remains(srf)
+        and srf.evidence.n_anomalous - srf.evidence.n_rest < c.half_frames
+        and left(srf, HIDDEN_AT_REST)
+    )
 
 
 @kernel
 def can_be_another(srf, apparent, dependent):
-    """Whether what looks like the constant `apparent` may be another type that is left; unless
-    `dependent`, one that does not follow the command."""
-    if apparent >= 0:
-        for h in range(N_CONSTANT, N_TYPES):
-            other = type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h])
-            if other and can_imitate(srf, h, apparent):
-                return True
+    """Whether what looks like the constant type `apparent`, or another left of its name, may be a varying
+    type that is left; unless `dependent`, one that does not follow the command.
+    """
+    for h in range(N_CONSTANT, N_TYPES):
+        if apparent >= 0 and type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h]):
+            for j in range(N_CONSTANT):
+                alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
+                if alike and not motion_rules_out(srf, STOP_SIDE[j], h):
+                    return True
     return False
 
 
@@ -218,7 +204,7 @@ def others_dismissed(types, sole):
     c, n = types.config, 1
     for s, srf in enumerate(types.surface):
         if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
-            if c.has_eG and any_type_remains(srf):
+            if c.has_eG and left(srf, ALL):
                 return False
             if not would_have_shown(c, srf):
                 return False
@@ -236,41 +222,18 @@ def type_on_surface(c, srf):
     one may yet show itself."""
     if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED
-    if c.has_eG:
-        return sole_shown(srf)
+    if c.has_eG:  # in coarse sets a constant proves nothing
+        return sole_shown(srf, ALL)
     shown = would_have_shown(c, srf)
     if constant_remains(srf):
-        kind = sole_constant(srf)
+        kind = sole(srf, CONSTANT)
         return kind if shown and not can_be_another(srf, kind, True) else TYPE_UNDECIDED
-    return varying_type(srf, shown)
-
-
-@kernel
-def varying_type(srf, shown):
-    """The same when no constant explains it: the one type left that need not show itself; else the one that
-    has."""
-    kind = sole_varying(srf, False)
+    # No constant explains it: the one type left that need not show itself; else the one that has.
+    kind = sole(srf, VARYING_QUIET)
     if kind == NO_TYPE:
-        kind = sole_varying(srf, True)
-        return kind if kind >= 0 and has_shown(srf, kind) else TYPE_UNDECIDED
-    if kind < 0 or not shown:
+        return sole_shown(srf, VARYING_SHOWN)
+    if kind < 0 or not shown or left(srf, VARYING_LIKE[kind]):
         return TYPE_UNDECIDED
-    for h in range(N_CONSTANT, N_TYPES):
-        if type_remains(srf, h) and CAN_LOOK_LIKE[h, kind]:
-            return TYPE_UNDECIDED
-    return kind
-
-
-@kernel
-def sole_varying(srf, must_show):
-    """The one type of a parameter that varies which is left, of those that must show themselves or of those
-    that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
-    kind = NO_TYPE
-    for h in range(N_CONSTANT, N_TYPES):
-        if type_remains(srf, h) and MUST_SHOW[h] == must_show:
-            kind = h if kind == NO_TYPE else TYPE_UNDECIDED
-            if kind == TYPE_UNDECIDED:
-                return TYPE_UNDECIDED
     return kind
 
 
@@ -305,13 +268,14 @@ def choose_mode(srf):
     SUBTRACT_OFFSET subtracts what the last frame shows to be off. It serves a type of another mode meanwhile,
     and moves the command, so that a surface that does not follow shows in the next frame.
     """
-    constant = constant_remains(srf)
-    for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-        if constant and serves_constants(srf, mode):
-            return mode
-    for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-        if not constant and serves_varying(srf, mode):
-            return mode
+    if constant_remains(srf):
+        for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
+            if serves_constants(srf, mode):
+                return mode
+    else:
+        for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
+            if left(srf, VARYING_OF_MODE[mode]):
+                return mode
     return SUBTRACT_OFFSET
 
 
@@ -326,15 +290,6 @@ def serves_constants(srf, mode):
             if not (SERVES[mode, h] or serves_end):
                 return False
     return is_own
-
-
-@kernel
-def serves_varying(srf, mode):
-    """Whether a mode is that of some type left whose parameter varies."""
-    for h in range(N_CONSTANT, N_TYPES):
-        if type_remains(srf, h) and MODE[h] == mode:
-            return True
-    return False
 
 
 @kernel
@@ -356,16 +311,10 @@ def presumed_surface(types, estimator, layout, est):
 
 
 @kernel
-def set_mode(srf, mode):
-    """Replace the mode of accommodation of a surface, -1 for none."""
-    srf.accommodation.mode = mode
-
-
-@kernel
 def clear_modes(surfs):
     """Let the law act upon no surface."""
     for srf in surfs:
-        set_mode(srf, -1)
+        srf.accommodation.mode = -1
 
 
 @kernel
@@ -378,7 +327,7 @@ def decide_mode(types, estimator, layout, est):
     srf = types.surface[s]
     mode = choose_mode(srf)
     if fault_shows(types.config, srf, mode, True):
-        set_mode(srf, mode)
+        srf.accommodation.mode = mode
         return s, mode
     return NO_SURFACE, mode
 
@@ -522,26 +471,18 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
     constant has been seen for long enough, or until those types are excluded that it can look like.
     """
     srf = fdi["types"]["surface"][s]
-    kinds = [
-        h for h, excluded in enumerate(srf["sets"]["excluded"]) if _may_be_faulty(fdi, s) and not excluded
-    ]
-    constant = [h for h in kinds if h < registry.N_CONSTANT]
+    kinds = np.flatnonzero(srf["sets"]["excluded"] == 0).tolist() if _may_be_faulty(fdi, s) else []
+    constant = [h for h in kinds if h < N_CONSTANT]
     if constant and not fdi["types"]["config"]["has_eG"]:
         ev = srf["evidence"]
-        half = fdi["types"]["config"]["half_frames"]
-        brief = ev["n_anomalous"] - ev["n_rest"] < half
-        kinds = [h for h in kinds if h in constant or brief or _counts_beside(h, constant)]
+        brief = ev["n_anomalous"] - ev["n_rest"] < fdi["types"]["config"]["half_frames"]
+        beside = CONSTANT | registry.MUST_SHOW | CAN_LOOK_LIKE[:, constant].any(axis=1)
+        kinds = [h for h in kinds if brief or beside[h]]
     pitch_pair = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
-    if pitch_pair and any(registry.MODE[h] == GIVE_UP for h in constant):
+    if pitch_pair and (MODE[constant] == GIVE_UP).any():
         # if the other surface is off as well, each constant may be one of another type
-        kinds += sorted(range(registry.N_CONSTANT), key=lambda h: registry.MODE[h] == SCALE_COMMAND)
+        kinds += sorted(range(N_CONSTANT), key=lambda h: MODE[h] == SCALE_COMMAND)
     return list(dict.fromkeys(registry.TYPE_NAMES[h] for h in kinds))
-
-
-def _counts_beside(h: int, constant: list[int]) -> bool:
-    """Whether a varying type counts together with these constant ones: it may yet show itself, or looks like
-    one of them."""
-    return bool(registry.MUST_SHOW[h] or registry.CAN_LOOK_LIKE[h, constant].any())
 
 
 def _candidate_texts(fdi: np.void, surfaces: Iterable[int], names: Sequence[str]) -> Iterator[str]:

@@ -39,11 +39,9 @@ from beaver_ftc.diagnosis.types import (
 
 
 @kernel
-def loss_of_frame(srf):
-    """The interval of 1 + theta in [0, 1] with p = (1 + theta) u in the judged frame; lo > hi if none."""
-    lo = srf.judged.lo
-    hi = srf.judged.hi
-    return isolation.consistent_theta(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
+def error_of_frame(srf):
+    """p - u of the surface in the judged frame, (lo, hi) rad."""
+    return srf.judged.lo - srf.judged.u, srf.judged.hi - srf.judged.u
 
 
 @kernel
@@ -54,23 +52,22 @@ def share_range(srf):
 
 @kernel
 def loss_interval(c, srf, h, k):
-    """The effectiveness that explains this frame."""
-    return loss_of_frame(srf)
+    """The 1 + theta in [0, 1] with p = (1 + theta) u in the judged frame; lo > hi if none."""
+    lo, hi = srf.judged.lo, srf.judged.hi
+    return isolation.consistent_theta(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
 
 
 @kernel
 def loss_range(c, srf, h, k):
     """(1 + theta) u, least and greatest."""
-    lo = srf.sets.low[h]
-    hi = srf.sets.high[h]
-    u = srf.last.u
-    return min(lo * u, hi * u), max(lo * u, hi * u)
+    lo, hi = srf.sets.low[h] * srf.last.u, srf.sets.high[h] * srf.last.u
+    return min(lo, hi), max(lo, hi)
 
 
 @kernel
 def varying_loss_set(c, srf, h, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
-    lo, hi = loss_of_frame(srf)
+    lo, hi = loss_interval(c, srf, h, k)
     changed = c.frames_per_block > 1 and srf.commands.u_min[1] < 0.0 < srf.commands.u_max[1]
     return EMPTY_SET if lo > hi and not changed else UNLIMITED_SET
 
@@ -117,28 +114,21 @@ MAX_GROWTH_RATIO = 1.8
 
 
 @kernel
-def offset_of_frame(srf):
+def bias_of_frame(c, srf, h, k):
     """b = p - u of the surface in the judged frame, (lo, hi) rad: unlimited at a stop.
 
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
-    Nothing but a loss takes it beyond. p_min, p_max: of the positions within the frame.
+    Nothing but a loss takes it beyond.
     """
-    lo = srf.judged.lo
-    hi = srf.judged.hi
-    u = srf.judged.u
-    cmd = srf.commands
-    if hi < srf.actuator.stop_lo or lo > srf.actuator.stop_hi:
+    seen, cmd, act = srf.judged, srf.commands, srf.actuator
+    if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
         return isolation.NO_THETA
-    p_min = lo - max(u - cmd.u_min[1], 0.0)
-    p_max = hi + max(cmd.u_max[1] - u, 0.0)
-    b_lo = lo - u if p_min > srf.actuator.stop_lo else -np.inf
-    return (b_lo, hi - u if p_max < srf.actuator.stop_hi else np.inf)
-
-
-@kernel
-def bias_of_frame(c, srf, h, k):
-    """The offsets that explain this frame."""
-    return offset_of_frame(srf)
+    lo, hi = error_of_frame(srf)
+    if seen.lo - max(seen.u - cmd.u_min[1], 0.0) <= act.stop_lo:
+        lo = -np.inf
+    if seen.hi + max(cmd.u_max[1] - seen.u, 0.0) >= act.stop_hi:
+        hi = np.inf
+    return lo, hi
 
 
 @kernel
@@ -158,11 +148,9 @@ def bias_range(c, srf, h, k):
 @kernel
 def mean_with_offset(srf, b, u_end):
     """Mean of u + b (rad) over the frame; if a stop is met at an instant, that of u_end + b."""
-    cmd = srf.commands
-    act = srf.actuator
-    mean = srf.last.u + b
+    cmd, act = srf.commands, srf.actuator
     stops = cmd.u_min[0] + b < act.stop_lo or cmd.u_max[0] + b > act.stop_hi
-    return clip_travel(srf, u_end + b) if stops else mean
+    return clip_travel(srf, u_end + b) if stops else srf.last.u + b
 
 
 def bias_interval(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
@@ -218,23 +206,24 @@ def narrow_offset(c, srf, lo, hi):
     if lo > M.b_hi:
         M.has_run[1] = 1
     tol = 0.0 if c.single_instant else max_growth(c, srf)
-    M.b_lo, M.b_hi = (max(M.b_lo, lo - tol), min(M.b_hi, hi + tol))
+    M.b_lo = max(M.b_lo, lo - tol)
+    M.b_hi = min(M.b_hi, hi + tol)
 
 
 @kernel
 def update_growing(c, srf, h, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
-    lo, hi = offset_of_frame(srf)
+    lo, hi = bias_of_frame(c, srf, h, k)
     if lo <= hi:
         narrow_offset(c, srf, lo, hi)
     if np.isinf(lo) or np.isinf(hi):
         return UNLIMITED_SET
     M = srf.growing_bias
-    M.up, M.down = (max(M.up, lo), min(M.down, hi))
-    was_up = M.up > 0.0
-    was_down = M.down < 0.0
-    shrinks = (was_up and hi < M.up) or (was_down and lo > M.down)
-    return EMPTY_SET if lo > hi or (was_up and was_down) or shrinks else UNLIMITED_SET
+    M.up = max(M.up, lo)
+    M.down = min(M.down, hi)
+    grew, fell = M.up > 0.0, M.down < 0.0
+    shrinks = (grew and hi < M.up) or (fell and lo > M.down)
+    return EMPTY_SET if lo > hi or (grew and fell) or shrinks else UNLIMITED_SET
 
 
 @kernel
@@ -294,8 +283,8 @@ def reset_swing(srf, h):
 @kernel
 def add_square(c, srf, h):
     """Sum (p - u)^2."""
-    e = 0.5 * (srf.judged.lo + srf.judged.hi) - srf.judged.u
-    srf.oscillatory.square += e**2
+    lo, hi = error_of_frame(srf)
+    srf.oscillatory.square += (0.5 * (lo + hi)) ** 2
 
 
 @kernel
@@ -306,29 +295,24 @@ def update_swing(c, srf, h, k):
     keeps its sign.
     """
     M = srf.oscillatory
-    lo = srf.judged.lo - srf.judged.u
-    hi = srf.judged.hi - srf.judged.u
+    lo, hi = error_of_frame(srf)
     sign = 1 if lo > 0.0 else (-1 if hi < 0.0 else 0)
     if sign == 0 or (not c.single_instant and srf.judged.hides[0 if sign == 1 else 1]):
         M.since = k + 1
         return UNLIMITED_SET
     if sign != M.sign:
-        end_half_cycle(M, k)
+        if (
+            M.sign != 0
+        ):  # a half-cycle ends here; the first one is cut off at its beginning and does not count
+            if M.n_half == 0:
+                M.first_end = k
+            else:
+                M.square_past += M.square
+            M.last_end = k
+            M.n_half += 1
+            M.square = 0.0
         M.sign, M.since = sign, k
     return EMPTY_SET if k - M.since > c.half_frames else UNLIMITED_SET
-
-
-@kernel
-def end_half_cycle(M, k):
-    """A half-cycle ends here; the first one is cut off at its beginning and does not count."""
-    if M.sign != 0:
-        if M.n_half == 0:
-            M.first_end = k
-        else:
-            M.square_past += M.square
-        M.last_end = k
-        M.n_half += 1
-        M.square = 0.0
 
 
 @kernel
@@ -389,16 +373,14 @@ def update_creep(c, srf, h, k):
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    lo = srf.judged.lo
-    hi = srf.judged.hi
-    M = srf.rate_limit
-    side, away = side_of_commands(c, srf), False
+    seen, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:
-        M.lo, M.hi = lo, hi
+        M.lo, M.hi = seen.lo, seen.hi
     else:
-        away = lo > M.hi if side == 1 else hi < M.lo
+        away = seen.lo > M.hi if side == 1 else seen.hi < M.lo
         narrow_creep(c, srf, M, side)
-    M.lo, M.hi = (max(M.lo, lo), min(M.hi, hi))
+    M.lo = max(M.lo, seen.lo)
+    M.hi = min(M.hi, seen.hi)
     M.side, M.k_last = side, k
     return EMPTY_SET if away else UNLIMITED_SET
 
@@ -422,8 +404,7 @@ def narrow_creep(c, srf, M, side):
 @kernel
 def orders_of_frame(c, srf):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
-    cmd = srf.commands
-    b = 2 if c.single_instant else 1
+    cmd, b = srf.commands, 2 if c.single_instant else 1
     return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])
 
 

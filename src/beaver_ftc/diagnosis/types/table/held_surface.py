@@ -53,7 +53,7 @@ HEALTHY_RAD = 1e-14
 @kernel
 def clear_releases(srf, b, h):
     """No release of this type is possible: the empty interval."""
-    (srf.release.back_lo[b, h], srf.release.back_hi[b, h]) = np.inf, -np.inf
+    srf.release.back_lo[b, h], srf.release.back_hi[b, h] = EMPTY_SET
 
 
 @kernel
@@ -74,7 +74,7 @@ def allow_before(srf, h):
 @kernel
 def empty_held(srf, h):
     """This type does not hold the surface in the judged frame: the empty interval."""
-    srf.release.held_lo[h], srf.release.held_hi[h] = (np.inf, -np.inf)
+    srf.release.held_lo[h], srf.release.held_hi[h] = EMPTY_SET
 
 
 @kernel
@@ -85,28 +85,22 @@ def simulate_return(c, srf, p0, sign=0):
     p <- f(p), f a step of the actuator towards u. The release is at the beginning of the frame; with a sign,
     at any instant of it: the least mean if it is -1, the greatest if it is 1.
     """
-    total = 0.0
-    n = 0
-    p = p0
-    p_min = p0
-    p_max = p0
+    total, p, p_min, p_max = 0.0, p0, p0, p0
     for k in range(c.frames_per_block):
         u = srf.commands.history[1, k]
         for _ in range(c.n_substeps):
             total += p
-            n += 1
             p_min, p_max = min(p_min, p), max(p_max, p)
             p = nearer(p, u, srf.actuator.approach_share, srf.actuator.step)
             if sign != 0:
                 p = min(p, p0) if sign == -1 else max(p, p0)
-    return (total / n, p, srf.judged.kappa * (p_max - p_min))
+    return total / (c.frames_per_block * c.n_substeps), p, srf.judged.kappa * (p_max - p_min)
 
 
 @kernel
 def release_explains(c, srf, h):
     """Whether a release at an instant of the judged block explains the block."""
-    lo = srf.release.held_lo[h]
-    hi = srf.release.held_hi[h]
+    lo, hi = srf.release.held_lo[h], srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
     low, _, tol_low = simulate_return(c, srf, lo, -1)
@@ -136,36 +130,23 @@ def narrow_return(c, srf, b, h):
     The mean over the frame rises with where the return began, and by no more than that. low, high: means of
     the returns from the ends of the interval.
     """
-    rel = srf.release
+    rel, seen = srf.release, srf.judged
     low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h])
     high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h])
     tol = max(tol_low, tol_high)
-    u = srf.judged.u
-    if max(abs(low - tol - u), abs(high + tol - u)) <= HEALTHY_RAD:
+    healthy = max(abs(low - tol - seen.u), abs(high + tol - seen.u)) <= HEALTHY_RAD
+    if healthy or low - tol > seen.hi or high + tol < seen.lo:
         return False
-    if low - tol > srf.judged.hi or high + tol < srf.judged.lo:
-        return False
-    lo = rel.back_lo[b, h] + max(srf.judged.lo - low - tol, 0.0)
-    hi = rel.back_hi[b, h] - max(high - tol - srf.judged.hi, 0.0)
+    lo = rel.back_lo[b, h] + max(seen.lo - low - tol, 0.0)
+    hi = rel.back_hi[b, h] - max(high - tol - seen.hi, 0.0)
     set_return(rel, b, h, lo, hi)
     return True
 
 
 @kernel
-def replace_earlier(srf, h):
-    """Take the later releases for the earlier ones, when no earlier one is possible any more."""
-    rel = srf.release
-    (rel.back_lo[EARLIER_SLOT, h], rel.back_hi[EARLIER_SLOT, h]) = (
-        rel.back_lo[LATER_SLOT, h],
-        rel.back_hi[LATER_SLOT, h],
-    )
-    clear_releases(srf, LATER_SLOT, h)
-
-
-@kernel
 def set_return(rel, b, h, lo, hi):
     """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
-    (rel.back_lo[b, h], rel.back_hi[b, h]) = (min(lo, hi), max(lo, hi))
+    rel.back_lo[b, h], rel.back_hi[b, h] = min(lo, hi), max(lo, hi)
 
 
 @kernel
@@ -207,9 +188,15 @@ def add_release(srf, h, lo, hi):
     rel = srf.release
     empty_held(srf, h)
     if lo <= hi and not rel.released[h]:
-        rel.held_lo[h], rel.held_hi[h] = (lo, hi)
-        rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
-        rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
+        rel.held_lo[h], rel.held_hi[h] = lo, hi
+        widen_later(rel, h, lo, hi)
+
+
+@kernel
+def widen_later(rel, h, lo, hi):
+    """Widen the interval of the later releases by (lo, hi), rad."""
+    rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
+    rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
 
 
 @kernel
@@ -226,8 +213,7 @@ def propagate_returns(c, srf, h):
     if c.frames_per_block > 1 and rel.held_lo[h] <= rel.held_hi[h]:
         _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1)
         _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1)
-        rel.back_lo[LATER_SLOT, h] = min(rel.back_lo[LATER_SLOT, h], lo)
-        rel.back_hi[LATER_SLOT, h] = max(rel.back_hi[LATER_SLOT, h], hi)
+        widen_later(rel, h, lo, hi)
 
 
 @kernel
@@ -254,23 +240,18 @@ def update_stuck(c, srf, h, k):
 
 @kernel
 def add_stuck_release(c, srf, h, k):
-    """Add a release from the interval of the jammed position."""
-    store_stuck(srf, h)
+    """Add a release from the interval of the jammed position. When no earlier release is possible any more,
+    the later ones are the earlier ones.
+    """
+    M, rel = srf.stuck, srf.release
+    if not may_return(srf, EARLIER_SLOT, h):
+        for ends, end in ((M.lo_before, srf.sets.low[h]), (M.hi_before, srf.sets.high[h])):
+            ends[EARLIER_SLOT], ends[LATER_SLOT] = ends[LATER_SLOT], end
+        rel.back_lo[EARLIER_SLOT, h] = rel.back_lo[LATER_SLOT, h]
+        rel.back_hi[EARLIER_SLOT, h] = rel.back_hi[LATER_SLOT, h]
+        clear_releases(srf, LATER_SLOT, h)
     lo, hi, _ = frame_start(c, srf, k)
     add_release(srf, h, max(lo, srf.sets.low[h]), min(hi, srf.sets.high[h]))
-
-
-@kernel
-def store_stuck(srf, h):
-    """When no earlier release is possible any more, the later ones are the earlier ones."""
-    M = srf.stuck
-    if not may_return(srf, EARLIER_SLOT, h):
-        (M.lo_before[EARLIER_SLOT], M.hi_before[EARLIER_SLOT]) = (
-            M.lo_before[LATER_SLOT],
-            M.hi_before[LATER_SLOT],
-        )
-        (M.lo_before[LATER_SLOT], M.hi_before[LATER_SLOT]) = (srf.sets.low[h], srf.sets.high[h])
-        replace_earlier(srf, h)
 
 
 @kernel
@@ -381,63 +362,65 @@ def runaway_distance(c, srf, k):
 
 
 @kernel
-def runaway_low(c, srf, k):
-    """Return the least upward deflection of a runaway by a frame, rad; the stop at most."""
-    if srf.evidence.k_first < 0:
-        return srf.actuator.stop_lo
-    return min(srf.actuator.stop_hi, srf.evidence.first_lo + runaway_distance(c, srf, k))
+def runaway_interval(c, srf, k, stop):
+    """Where a runaway can be by frame k, rad: beyond its way at the least rate, or at the stop (1 upper, -1
+    lower)."""
+    act, ev = srf.actuator, srf.evidence
+    way = runaway_distance(c, srf, k)
+    if ev.k_first < 0:
+        return act.stop_lo, act.stop_hi
+    if stop == 1:
+        return min(act.stop_hi, ev.first_lo + way), act.stop_hi
+    return act.stop_lo, max(act.stop_lo, ev.first_hi - way)
 
 
 @kernel
-def runaway_high(c, srf, k):
-    """Return the least downward deflection of a runaway by a frame, rad; the stop at most."""
-    if srf.evidence.k_first < 0:
-        return srf.actuator.stop_hi
-    return max(srf.actuator.stop_lo, srf.evidence.first_hi - runaway_distance(c, srf, k))
+def release_runaway(c, srf, h, k, stop):
+    """It may be released on its way; within a frame of several instants, further on."""
+    lo, hi, k0 = frame_start(c, srf, k)
+    way_lo, way_hi = runaway_interval(c, srf, k0, stop)
+    lo, hi = max(lo, way_lo), min(hi, way_hi)
+    if not c.single_instant and lo <= hi:
+        lo, hi = (lo, way_hi) if stop == 1 else (way_lo, hi)
+    add_release(srf, h, lo, hi)
 
 
 @kernel
-def update_up(c, srf, h, k):
-    """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
-    return held_interval(c, srf, h, runaway_low(c, srf, k), srf.actuator.stop_hi)
+def judge_up(c, srf, h, k):
+    """Upwards."""
+    lo, hi = runaway_interval(c, srf, k, 1)
+    return held_interval(c, srf, h, lo, hi)
 
 
 @kernel
-def update_down(c, srf, h, k):
-    """The same downwards."""
-    return held_interval(c, srf, h, srf.actuator.stop_lo, runaway_high(c, srf, k))
+def judge_down(c, srf, h, k):
+    """Downwards."""
+    lo, hi = runaway_interval(c, srf, k, -1)
+    return held_interval(c, srf, h, lo, hi)
 
 
 @kernel
 def release_up(c, srf, h, k):
-    """It may be released on its way; within a frame of several instants, further on."""
-    lo, hi, k0 = frame_start(c, srf, k)
-    lo = max(lo, runaway_low(c, srf, k0))
-    if not c.single_instant and lo <= hi:
-        hi = srf.actuator.stop_hi
-    add_release(srf, h, lo, hi)
+    """Upwards."""
+    release_runaway(c, srf, h, k, 1)
 
 
 @kernel
 def release_down(c, srf, h, k):
-    """The same downwards."""
-    lo, hi, k0 = frame_start(c, srf, k)
-    hi = min(hi, runaway_high(c, srf, k0))
-    if not c.single_instant and lo <= hi:
-        lo = srf.actuator.stop_lo
-    add_release(srf, h, lo, hi)
+    """Downwards."""
+    release_runaway(c, srf, h, k, -1)
 
 
 @kernel
 def range_up(c, srf, h, k):
-    """Between its least way and the stop."""
-    return runaway_low(c, srf, k), srf.actuator.stop_hi
+    """Upwards."""
+    return runaway_interval(c, srf, k, 1)
 
 
 @kernel
 def range_down(c, srf, h, k):
-    """The same downwards."""
-    return srf.actuator.stop_lo, runaway_high(c, srf, k)
+    """Downwards."""
+    return runaway_interval(c, srf, k, -1)
 
 
 def upper_stop(fdi: np.void, s: int, h: int) -> float | None:
@@ -452,7 +435,7 @@ def lower_stop(fdi: np.void, s: int, h: int) -> float | None:
 
 HARDOVER_UP = FaultType(
     name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
-    reset_memory=allow_before, consistent_interval=update_up,
+    reset_memory=allow_before, consistent_interval=judge_up,
     on_possible_release=release_up,
     propagate_release=propagate_returns, possible_deflection_range=range_up,
     stop_direction=1,
@@ -461,7 +444,7 @@ HARDOVER_UP = FaultType(
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
-    reset_memory=allow_before, consistent_interval=update_down,
+    reset_memory=allow_before, consistent_interval=judge_down,
     on_possible_release=release_down,
     propagate_release=propagate_returns, possible_deflection_range=range_down,
     stop_direction=-1,

@@ -97,9 +97,7 @@ def test_what_is_not_heard_lets_the_rest_fade(view, tone_test_config, rng):
     listen(view, tone_test_config, samples)
     then = np.abs(view["tones"]["N"])
     listen(view, tone_test_config, np.full(10, 1e6), heard=False)
-    assert np.abs(view["tones"]["N"]) == pytest.approx(
-        then * exp(-10 * DT / TONE_MEMORY_S)
-    )
+    assert np.abs(view["tones"]["N"]) == pytest.approx(then * exp(-10 * DT / TONE_MEMORY_S))
 
 
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])

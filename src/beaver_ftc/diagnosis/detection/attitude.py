@@ -38,6 +38,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.detection.likelihood import (
     DRIFT_PRIOR_RAD_S2,
     LATERAL_BLOCK,
@@ -234,13 +235,6 @@ def respond(s, A, u, D, a, K0, K1, K2, dt):
     g = A - psi
     s[0], s[1], s[2] = psi + K0 * g, xi + K1 * g, d + K2 * g
     return g
-
-
-@kernel
-def leak(z, a, v):
-    """z <- a z + v: filters of leaks a (m,) on a number v."""
-    for m in range(a.size):
-        z[m] = a[m] * z[m] + v
 
 
 @kernel

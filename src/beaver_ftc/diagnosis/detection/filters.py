@@ -53,6 +53,13 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 
 @kernel
+def leak(x, a, v):
+    """x <- a x + v: filters of poles a (m,); x (m,)."""
+    for m in range(a.size):
+        x[m] = a[m] * x[m] + v
+
+
+@kernel
 def advance_bound(e, eta, a, dt, n=0.0):
     """a e + dt eta + (1 - a) n: bound on a residual, rad/s, a frame later [Zhang2005, sec. IV].
 

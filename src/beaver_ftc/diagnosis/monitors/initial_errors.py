@@ -60,6 +60,7 @@ red: record of the tests (redundancy.py, which says y and y_past); ini: record o
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
@@ -84,7 +85,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA,
     TURN_TEST,
     down,
-    leak,
     secant,
     too_steep,
     vector_length,

@@ -38,7 +38,7 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_slopes
-from beaver_ftc.diagnosis.detection.filters import advance_gyro
+from beaver_ftc.diagnosis.detection.filters import advance_gyro, leak
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -300,13 +300,6 @@ AB_NOW, AB_PAST = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
 POSITION_FACTOR = 4.0 / 3.0
-
-
-@kernel
-def leak(x, a, v):
-    """x <- a x + v: filters of poles a (m,); x (m,)."""
-    for m in range(a.size):
-        x[m] = a[m] * x[m] + v
 
 
 @kernel

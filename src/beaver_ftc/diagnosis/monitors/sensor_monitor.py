@@ -56,7 +56,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import attitude
-from beaver_ftc.diagnosis.detection.filters import bank_axis
+from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     effect_at_alarm,
     explains_exceeded,
@@ -99,7 +99,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA,
     TURN_TEST,
     compare_duplicates,
-    leak,
     run_tests,
     start_tests,
     store_sample,

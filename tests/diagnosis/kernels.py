@@ -125,7 +125,7 @@ def of_stages(fdi, kernel):
         ("bound",): fdi["bound"],
         ("shared",): fdi["isolation"]["config"]["shared"],
         ("abrupt",): fdi["config"]["abrupt"],
-        ("all_types",): fdi["config"]["all_types"],
+        ("all_types",): fdi["config"]["diagnoses_all_types"],
         ("n_substeps",): fdi["config"]["n_substeps"],
         ("bank",): fdi["bank"],
         ("fdae",): fdi["fdae"],

@@ -107,6 +107,12 @@ def restart(att):
 
 
 @kernel
+def add_turn(att, i, turn):
+    """Add what the attitude has turned about axis i beyond the gyro in a sample, rad."""
+    att.turn[i] += turn
+
+
+@kernel
 def compare_attitude(att, blocks, eta, with_Z, x, dt):
     """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score` and `gyro`.
 

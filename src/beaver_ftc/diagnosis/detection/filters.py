@@ -297,6 +297,13 @@ def configure_fdae(fdae: np.void, declared: Declared) -> None:
 
 
 @kernel
+def start(bank, fdae, x, n):
+    """Begin all filters at the first measurement x (3,) rad/s; n (3,) rad/s: errors of the gyros to come."""
+    fdae.memory.xhat[:], fdae.memory.e[:], fdae.memory.m[:] = x, n, n
+    bank.memory.e[: bank.config.n_filters] = n
+
+
+@kernel
 def fill_gaussians(v, c0, dc, n, first, out):
     """Fill out from `first` on with exp(-(z - j)^2 / 2), j < n; return the sum of their squares.
 

@@ -378,7 +378,7 @@ def add_turn(mon, att, y):
         attitude.restart(att)
         return
     for i in range(3):
-        att.turn[i] += mon.redundancy.test[TURN_TEST + i].residual
+        attitude.add_turn(att, i, mon.redundancy.test[TURN_TEST + i].residual)
     mon.memory.turn_max = att.turn_max
 
 
@@ -390,6 +390,12 @@ def name_gyro(mon, found, i, t):
     if o.keeps_surface and found.isolated_estimator < 0:
         o.keeps_surface, o.alarmed_at_s = 0, found.detected_at_s
     mark_isolated(mon, i, t)
+
+
+@kernel
+def rule_out_gyros(mon):
+    """No gyro can be broken: a surface may be isolated."""
+    mon.memory.gyros_excluded = 1
 
 
 @kernel
@@ -468,7 +474,7 @@ def exclude_gyros(mon):
         leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + DAMPING_TOLERANCE * abs(M.w[i])))
         for m in range(c.decay.size):
             if abs(M.gap[i, m]) > M.gap_bound[i, m] + test.B[m]:
-                M.gyros_excluded = 1
+                rule_out_gyros(mon)
 
 
 @kernel

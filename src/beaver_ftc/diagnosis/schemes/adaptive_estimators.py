@@ -74,9 +74,7 @@ def skip_substep(fdi, prediction, measured):
 @kernel
 def start_filters(fdi, x):
     """Begin the detection filters at the first measurement x (3,), all of the gyros' errors to come."""
-    memory, n = fdi.fdae.memory, fdi.bound.n_gyro
-    memory.xhat[:], memory.e[:], memory.m[:] = x, n, n
-    fdi.bank.memory.e[: fdi.bank.config.n_filters] = n
+    filters.start(fdi.bank, fdi.fdae, x, fdi.bound.n_gyro)
 
 
 @kernel
@@ -328,7 +326,7 @@ def update_tests(fdi, prediction, measured, k, t):
     if stat.attitude.enabled:
         attitude.compare_attitude(stat.attitude, blocks, eta, cfg.regress, measured.x, dt)
         if fdi.verdict.detected and stat.attitude.score > 1.0:
-            fdi.sensor_monitor.memory.gyros_excluded = 1
+            sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
     parity.turn_views(views, force, gust, fdi.bound, means.G_old, means.Gu_old)
     parity.project_innovation(views, cfg.regress, stat.noise, blocks, force, gust, vaneless, nu, y[AIRSPEED])
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)

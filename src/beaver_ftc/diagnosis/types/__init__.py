@@ -265,6 +265,18 @@ def copy_observation(to, of):
 
 
 @kernel
+def set_anomalous(srf, anomalous):
+    """Say of the last observation of a surface whether more than the declared uncertainty was at work."""
+    srf.last.anomalous = anomalous
+
+
+@kernel
+def forget_anomalies(srf):
+    """Nothing but the declared uncertainty was at work in what is kept of a surface."""
+    srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
+
+
+@kernel
 def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     """Find where a surface can have been: the p that agree with |nu - G (p - u)| <= nu_max on every axis.
 

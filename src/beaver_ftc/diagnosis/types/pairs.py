@@ -25,9 +25,11 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
+    forget_anomalies,
     last_error,
     observe_error,
     registry,
+    set_anomalous,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
@@ -93,7 +95,7 @@ def observe_pitch(types, layout, est, nu, nu_max):
         return
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            srf.last.anomalous = abs(nu[PITCH]) > nu_max[PITCH]
+            set_anomalous(srf, abs(nu[PITCH]) > nu_max[PITCH])
 
 
 @kernel
@@ -110,7 +112,7 @@ def locate_second(types, layout, est, nu, nu_max):
     srf1 = types.surface[s1]
     lo, hi = constant_range(types.config, srf1, types.frame_index)
     srf1.last.lo, srf1.last.hi = lo, hi
-    srf1.last.anomalous = 0
+    set_anomalous(srf1, 0)
     M1, M2 = eff1.regressor[PITCH], eff2.regressor[PITCH]
     acc1 = M1 * last_error(srf1)
     tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
@@ -189,7 +191,7 @@ def begin_second(types, layout):
     registry.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
-        srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
+        forget_anomalies(srf)
 
 
 @kernel

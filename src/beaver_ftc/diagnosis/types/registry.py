@@ -44,6 +44,7 @@ from beaver_ftc.diagnosis.types import (
     intersect_set,
     observe_surface,
     put_set,
+    set_anomalous,
     table,
 )
 from beaver_ftc.scenario.declared import Declared
@@ -331,7 +332,7 @@ def observe_surfaces(types, layout, est, nu, nu_max):
     for s, srf in enumerate(types.surface):
         copy_observation(srf.earlier, srf.judged)
         copy_observation(srf.judged, srf.last)
-        srf.last.anomalous = anomalous
+        set_anomalous(srf, anomalous)
         fie, axis = est[layout.position[s]], layout.dominant_axis[s]
         eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
         observe_surface(types.config, srf, fie, axis, nu, nu_max, eff)

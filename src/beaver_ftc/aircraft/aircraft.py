@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from math import pi, prod, radians
 from pathlib import Path
 from types import MappingProxyType
@@ -33,8 +34,9 @@ from beaver_ftc.aircraft.schema import (
 )
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.files import data_root
+from beaver_ftc.documents.files import PACKAGE, data_root, digest_of_files
 from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of, validate
+from beaver_ftc.plugins import SERVICES, entries
 
 M_PER_FT = 0.3048
 KG_PER_LB = 0.45359237
@@ -434,7 +436,10 @@ IMPORTED = {
 }
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
-_FORMAT = 10  # of what is derived: files of another are derived again
+# What makes the copy of an aircraft, beside the code of the service `derive`.
+_TEMPLATES = "actuator.xml", "instrumented.xml"
+_CODE = ".py", ".yaml"
+_COPIES = "plant/instrumented.py", "plant/model_file.py"
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 
@@ -514,7 +519,12 @@ def kept_folder() -> Path:
 
 def first_line() -> str:
     """The first line of a file that was derived, by this way of deriving and of this JSBSim."""
-    return f"{DERIVED}: format {_FORMAT}, JSBSim {version('jsbsim')}.\n"
+    files = [*(_root() / name for name in _TEMPLATES), *(PACKAGE / name for name in _COPIES)]
+    service = entries(SERVICES).get("derive", "").partition(":")[0]
+    found = find_spec(service) if service else None
+    if found and found.origin:
+        files += sorted(path for path in Path(found.origin).parent.iterdir() if path.suffix in _CODE)
+    return f"{DERIVED}: version {digest_of_files(*files)}, JSBSim {version('jsbsim')}.\n"
 
 
 def is_derived(name: str) -> bool:

@@ -399,12 +399,18 @@ class Aircraft:
 
 
 def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
-    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does.
+
+    An aircraft may lack a rudder, or ailerons: what leads the other of roll and yaw then leads both.
+    """
     index_by_axis = {
         axis: s
         for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
         if name in aircraft.primary
     }
+    lateral = index_by_axis.get(0, index_by_axis.get(2))
+    if lateral is not None:
+        index_by_axis = {0: lateral, 2: lateral} | index_by_axis
     for axis, name in enumerate(("roll", "pitch", "yaw")):
         if axis not in index_by_axis:
             raise BadInput(

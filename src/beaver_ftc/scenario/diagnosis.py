@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, Strict, field_validator, model_valid
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.design import Severity
-from beaver_ftc.documents.document import Conflict, Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Conflict, Location, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, needs_leaders, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named
@@ -49,6 +49,7 @@ def leaders_missed(scenario: Any, aircraft: "Aircraft") -> Iterator[Conflict]:
     """Laws and schemes that need a surface for each axis, of an aircraft without a rudder or ailerons."""
     if len(aircraft.primary) == len(AXES):
         return
+    wanted: list[tuple[Location, str, str | None]]
     wanted = [(("control",), "law", scenario.control.law), (("fdi",), "scheme", scenario.fdi.scheme)]
     for i, change in enumerate(scenario.changes):
         wanted += [(("changes", i), "law", change.law), (("changes", i), "scheme", change.scheme)]

@@ -242,7 +242,8 @@ def _prepared(
     own, absent = _own(source, folder.parent.parent / "own")
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
-    surfaces = find_surfaces(source.model, own, wanted.surfaces)
+    named = {str(surface): names for surface, names in wanted.surfaces.items()}
+    surfaces = find_surfaces(source.model, own, named)
     notes += surfaces.notes
     said, along = outline.own_control(source.model, own, surfaces)
     notes += said

@@ -384,7 +384,7 @@ def differences(
 @dataclass(frozen=True)
 class _Flown:
     """Accelerations of the model and of the copy, and what their aerodynamics see, (commands, states, ...);
-    deflection, rad, of the first surface that moves."""
+    deflection (commands, states, 1), rad, of the first surface that moves."""
 
     model: np.ndarray
     copy: np.ndarray
@@ -403,7 +403,7 @@ class _Flown:
         of_size = [of if name.startswith(_CAUSES) else 0.0 for name, of in zip(seen, off / size, strict=True)]
         least = max(DIFFERENT, _OF_LARGEST * max(of_size, default=0.0))
         because = [name for name, of in zip(seen, of_size, strict=True) if of > least]
-        share, rad = float(shares[(*place, axis)]), float(self.deflection[place])
+        share, rad = float(shares[(*place, axis)]), float(self.deflection[place][0])
         return Difference(surface, share, _AXES[axis], rad, tuple(because))
 
 
@@ -435,7 +435,7 @@ def _in_state(
 ) -> tuple[list[float], ...]:  # fmt: skip
     """Accelerations and what is seen, of the model and of the copy; and the deflection of a surface."""
     low, high = airspeed_mps
-    placed = state | {"ic/vt-fps": (low + state["ic/vt-fps"] * (high - low)) / M_PER_FT}
+    placed = {**state, "ic/vt-fps": (low + state["ic/vt-fps"] * (high - low)) / M_PER_FT}
     own, copy = pair
     _place(own, placed)
     for name in surfaces.read:
@@ -443,7 +443,7 @@ def _in_state(
     _place(copy, placed)
     accelerations = [[fdm[name] for name in _ACCELERATIONS] for fdm in pair]
     seen = [[fdm[name] for name in of] for fdm, of in zip(pair, names, strict=True)]
-    return (*accelerations, *seen, surfaces.deflection(own, surface))
+    return (*accelerations, *seen, [surfaces.deflection(own, surface)])
 
 
 def _place(fdm: Executive, state: Mapping[str, float]) -> None:

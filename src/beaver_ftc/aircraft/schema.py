@@ -557,7 +557,7 @@ class AircraftFile(Section):
     damage: cases of damage that a scenario can have, by name
     name: name of the aircraft
     description: description of the aircraft in one line
-    surfaces: three or more control surfaces, by name
+    surfaces: two or more control surfaces, by name
     signals: measured dimensionless signals that multiply terms
     mass: mass and inertia
     geometry: reference dimensions

@@ -42,8 +42,8 @@ from beaver_ftc.documents.errors import NO_FAILURE, BadInput, Stopped, suggestio
 
 __all__ = [
     "DETECTORS", "LAWS", "OF_THE_CORE", "OURS", "SERVICES", "WHEN_IMPORTED", "Range", "Registered", "entries",
-    "folders", "is_compiled", "loaded", "made", "offered", "options_of", "plugin_class", "refusal",
-    "register", "registered", "required", "settings", "tunable", "watch_imports", "wrong_options",
+    "folders", "is_compiled", "loaded", "made", "needs_leaders", "offered", "options_of", "plugin_class",
+    "refusal", "register", "registered", "required", "settings", "tunable", "watch_imports", "wrong_options",
 ]  # fmt: skip
 
 SERVICES, WHEN_IMPORTED = "beaver_ftc.services", "beaver_ftc.when_imported"
@@ -231,6 +231,11 @@ def compiled_rows(group: str) -> dict[str, dict[str, Any]]:
     """Rows of plugins.yaml whose kernels are compiled, by name; of a plug-in of ours they fly in its
     place."""
     return {name: row for name, row in _ours(group).items() if "kernels" in row}
+
+
+def needs_leaders(group: str, name: str) -> bool:
+    """Whether a scheme or law of ours needs a surface for each of roll, pitch and yaw."""
+    return bool(_ours(group).get(name, {}).get("leader_of_each_axis"))
 
 
 def options_of(group: str, name: str) -> dict[str, dict[str, Any]]:

@@ -37,7 +37,8 @@ def derive(
 
     aircraft: jsbsim:NAME for an aircraft of the installed jsbsim package, the path of a JSBSim model, or the
     folder of an aircraft.
-    envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg.
+    envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg;
+    and with the names of the model's surfaces, if they are not the usual ones: surfaces.
     out: Folder in which the aircraft folder is written. Default: the cache.
     engines: Give each engine a lever of its own. The law can then turn the aircraft with different thrusts.
     This option requires --out.

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -110,12 +111,26 @@ def test_what_was_derived_by_this_way_of_deriving_is_an_aircraft(beside):
     text = (FOLDER / "aircraft.yaml").read_text()
     for line, known in (
         (aircraft.first_line(), True),
-        (aircraft.first_line().replace("format ", "format 1"), False),
+        (aircraft.first_line().replace("version ", "version 1"), False),
     ):
         (folder / "aircraft.yaml").write_text(line + text)
         assert is_derived(name) is known
     (folder / "aircraft.yaml").write_text(aircraft.first_line() + text)
     assert load(f"jsbsim:{name}").name == "trainer"
+
+
+@pytest.mark.parametrize(
+    "changed", ["actuator.xml", "instrumented.xml", "model_file.py", "fit.py", "outline.yaml"]
+)
+def test_what_was_derived_by_other_templates_or_code_is_derived_again(changed, beside, monkeypatch):
+    """A template of the copy, the code that copies, the code and the outline of the fit."""
+    name, text = "mine", (FOLDER / "aircraft.yaml").read_text()
+    shutil.copytree(FOLDER, derived_folder(name))
+    (derived_folder(name) / "aircraft.yaml").write_text(aircraft.first_line() + text)
+    assert is_derived(name)
+    read_bytes = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read_bytes(path) + b" " * (path.name == changed))
+    assert not is_derived(name)
 
 
 def test_what_a_surface_does_is_the_sum_of_its_terms_at_the_usual_signals():

@@ -233,7 +233,11 @@ def test_surfaces_are_laid_out_by_axis_partner_and_estimator():
         "partner": [2, -1, 0, -1, -1], "loss": [-1, -1, 0, 1, -1],
         "position": [-1, -1, -1, -1, 2],
     }  # fmt: skip
-    for primary, missing in ((("a", "d"), "roll"), (("c", "a"), "pitch"), (("c", "d"), "yaw")):
+    for primary, main in ((("a", "d"), [0, 3, 0]), (("c", "d"), [2, 3, 2])):  # no ailerons, no rudder
+        without = SimpleNamespace(**{**vars(aircraft), "primary": primary})
+        state.configure_layout(layout, entries, without)
+        assert layout["main"].tolist() == main
+    for primary, missing in ((("c", "a"), "pitch"), (("d",), "roll")):
         without = SimpleNamespace(**{**vars(aircraft), "primary": primary})
         with pytest.raises(BadInput) as refused:
             state.configure_layout(layout, entries, without)

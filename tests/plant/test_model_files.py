@@ -157,8 +157,12 @@ def test_systems_are_read_in_and_comments_that_come_first_are_descriptions(jet):
 
 
 def test_an_instrumented_copy(jet, tmp_path, changed):
-    assert instrumented.surfaces_of(jet) == ("aileron", "elevator")
-    assert instrumented.others_of(jet) == ("fcs/spoiler-pos-norm", "gear/gear-pos-norm")
+    assert instrumented.surfaces_of(jet) == {
+        "aileron": ("fcs/left-aileron-pos-deg",),
+        "elevator": ("fcs/elevator-pos-norm", "fcs/elevator-pos-rad", "fcs/mag-elevator-pos-rad"),
+    }
+    ours = [name for names in instrumented.surfaces_of(jet).values() for name in names]
+    assert instrumented.others_of(jet, ours) == ("fcs/spoiler-pos-norm", "gear/gear-pos-norm")
     assert instrumented.engines_of(jet) == 1
     glider = tmp_path / "glider.xml"
     glider.write_text("<fdm_config><propulsion/></fdm_config>")
@@ -209,9 +213,9 @@ def test_aerodynamics_in_a_file_of_their_own_are_read_in(jet, tmp_path):
     begin, end = text.index("<aerodynamics>"), text.index("</aerodynamics>") + len("</aerodynamics>")
     put(jet.parent / "aero.xml", text[begin:end])
     jet.write_text(text[:begin] + '<aerodynamics file="aero"/>' + text[end:])
-    assert instrumented.surfaces_of(jet) == ("aileron", "elevator")
+    assert list(instrumented.surfaces_of(jet)) == ["aileron", "elevator"]
     model = instrumented.instrument(jet, tmp_path / "copy", {"elevator": (-0.4, 0.35)})
-    assert "actuated-elevator-effective-magnitude" in model.read_text()
+    assert "fcs/effective-mag-elevator-pos-rad" in model.read_text()
 
 
 def test_aircraft_of_the_package():

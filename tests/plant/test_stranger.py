@@ -171,8 +171,11 @@ def test_no_command_lets_it_act(machine, asked, monkeypatch):
     given = {"scenario": machine.scenario, "folder": "./trainer", "out": machine.root / "trainer" / "out"}
     said = refused(*(word.format(**given) for word in asked))
     machine.untouched()
-    assert "trainer.xml:" in said
-    assert '<output name="' in said
+    if "{folder}/trainer.xml" in asked:  # of a model alone a copy is made, without them
+        assert said.startswith("trainer: its aerodynamics read no surface by a known name")
+    else:
+        assert "trainer.xml:" in said
+        assert '<output name="' in said
 
 
 @needs.service("compare")

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         ErrorMapSection,
         Interval,
         OutputSection,
+        Property,
     )
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from math import pi, prod, radians
 from pathlib import Path
 from types import MappingProxyType
@@ -33,8 +34,9 @@ from beaver_ftc.aircraft.schema import (
 )
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.files import data_root
+from beaver_ftc.documents.files import PACKAGE, data_root, digest_of_files
 from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of, validate
+from beaver_ftc.plugins import SERVICES, entries
 
 M_PER_FT = 0.3048
 KG_PER_LB = 0.45359237
@@ -397,12 +399,18 @@ class Aircraft:
 
 
 def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
-    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does.
+
+    An aircraft may lack a rudder, or ailerons: what leads the other of roll and yaw then leads both.
+    """
     index_by_axis = {
         axis: s
         for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
         if name in aircraft.primary
     }
+    lateral = index_by_axis.get(0, index_by_axis.get(2))
+    if lateral is not None:
+        index_by_axis = {0: lateral, 2: lateral} | index_by_axis
     for axis, name in enumerate(("roll", "pitch", "yaw")):
         if axis not in index_by_axis:
             raise BadInput(
@@ -434,7 +442,10 @@ IMPORTED = {
 }
 BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
-_FORMAT = 10  # of what is derived: files of another are derived again
+# What makes the copy of an aircraft, beside the code of the service `derive`.
+_TEMPLATES = "actuator.xml", "instrumented.xml"
+_CODE = ".py", ".yaml"
+_COPIES = "plant/instrumented.py", "plant/model_file.py"
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 
@@ -514,7 +525,12 @@ def kept_folder() -> Path:
 
 def first_line() -> str:
     """The first line of a file that was derived, by this way of deriving and of this JSBSim."""
-    return f"{DERIVED}: format {_FORMAT}, JSBSim {version('jsbsim')}.\n"
+    files = [*(_root() / name for name in _TEMPLATES), *(PACKAGE / name for name in _COPIES)]
+    service = entries(SERVICES).get("derive", "").partition(":")[0]
+    found = find_spec(service) if service else None
+    if found and found.origin:
+        files += sorted(path for path in Path(found.origin).parent.iterdir() if path.suffix in _CODE)
+    return f"{DERIVED}: version {digest_of_files(*files)}, JSBSim {version('jsbsim')}.\n"
 
 
 def is_derived(name: str) -> bool:

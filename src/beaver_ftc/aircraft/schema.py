@@ -557,7 +557,7 @@ class AircraftFile(Section):
     damage: cases of damage that a scenario can have, by name
     name: name of the aircraft
     description: description of the aircraft in one line
-    surfaces: three or more control surfaces, by name
+    surfaces: two or more control surfaces, by name
     signals: measured dimensionless signals that multiply terms
     mass: mass and inertia
     geometry: reference dimensions
@@ -574,7 +574,7 @@ class AircraftFile(Section):
     name: Name = entry(..., examples=["my-uav"])
     description: Text = entry("", examples=["DHC-2 Beaver"])
     jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, examples=["my-uav.xml"])
-    surfaces: dict[Name, SurfaceSection] = Field(min_length=3, max_length=MAX_SURFACES)
+    surfaces: dict[Name, SurfaceSection] = Field(min_length=2, max_length=MAX_SURFACES)
     groups: dict[Name, tuple[Name, ...]] = entry(
         ..., examples=[{"pitch": ["elevator", "flap"], "lateral": ["aileron", "rudder"]}]
     )

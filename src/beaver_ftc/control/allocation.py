@@ -30,7 +30,7 @@ from math import pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
+from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -226,13 +226,15 @@ def _stand_in(aircraft: Aircraft) -> int:
 
 
 def _is_general(aircraft: Aircraft) -> bool:
-    """Whether there are more surfaces than lead an axis or stand in for pitch's leader first."""
-    return aircraft.n > len(aircraft.primary) + min(len(aircraft.stand_ins), 1)
+    """Whether there are more surfaces than lead an axis or stand in for pitch's leader first, or one that
+    leads two axes."""
+    several = aircraft.n > len(aircraft.primary) + min(len(aircraft.stand_ins), 1)
+    return several or len(aircraft.primary) < len(AXES)
 
 
 def _authority(aircraft: Aircraft, layout: np.void) -> np.ndarray:
     """(3, n): what part of the authority about each axis is whose, of the surfaces that turn most about it;
-    where one leads each, it has all."""
+    where one leads each, or none turns most about it, the one that leads has all."""
     shares = np.zeros((3, aircraft.n))
     if not _is_general(aircraft):
         shares[range(3), layout["main"]] = 1.0
@@ -241,6 +243,8 @@ def _authority(aircraft: Aircraft, layout: np.void) -> np.ndarray:
         if axis != PITCH or not layout["is_backup"][s]:
             travel = aircraft.travel[surface]
             shares[axis, s] = abs(aircraft.effect[surface][axis]) * (travel.max_rad - travel.min_rad)
+    for axis, s in enumerate(layout["main"]):
+        shares[axis, s] = shares[axis, s] or float(not shares[axis].any())
     return shares / shares.sum(axis=1, keepdims=True)
 
 

@@ -13,19 +13,33 @@ if TYPE_CHECKING:
         AT_IDLE,
         ENGINE_SIGNALS,
         GEAR,
+        SURFACES,
+        View,
+        Views,
         actuator_system,
         others_of,
         seen_by_aerodynamics,
         surfaces_of,
+        unit_of,
+        usual_view,
+        view_property,
     )
     from beaver_ftc.plant.instrumented import DIFFERENCE as LEVER_DIFFERENCE
+    from beaver_ftc.plant.instrumented import LEVER as POWER_LEVER
+    from beaver_ftc.plant.instrumented import PREFIX as ACTUATED
     from beaver_ftc.plant.instrumented import SIGNALS as SIGNAL_PROPERTIES
     from beaver_ftc.plant.instrumented import instrument as instrument_model
     from beaver_ftc.plant.instrumented import is_told as is_known_to_jsbsim
     from beaver_ftc.plant.instrumented import source_of as source_of_jsbsim
     from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, SENSORS
-    from beaver_ftc.plant.model_file import check_model_has_no_side_effects, copy_of
-    from beaver_ftc.plant.trial import failure as failure_of_trial
+    from beaver_ftc.plant.model_file import (
+        check_model_has_no_side_effects,
+        copy_of,
+        left_out_of_copy,
+        where_files_lie,
+    )
+    from beaver_ftc.plant.trial import lacking as lacking_in_trial
+    from beaver_ftc.plant.trial import probe as probe_model
     from beaver_ftc.plant.trim import DELAY as ACTUATOR_DELAY
     from beaver_ftc.plant.trim import TrimPoint
     from beaver_ftc.plant.trim import trim as trim_plant

@@ -144,6 +144,9 @@ class UnknownProperty(SimulationFailed):
     """A property the aircraft does not have. JSBSim itself would create it and read back whatever was set."""
 
 
+_ABSENT = re.compile(r"The property ([^ ]+) does not exist")
+
+
 class _Errors(jsbsim.FGLogger):
     """Keeps JSBSim off the standard streams; remembers what it said about errors."""
 
@@ -224,18 +227,33 @@ def _not_flown(name: str, error: jsbsim.BaseError) -> SimulationFailed:
     return SimulationFailed(f"JSBSim cannot fly {name}: {' '.join(str(error).split())}")
 
 
-def bare(model: Path, absent: Iterable[str] = ()) -> jsbsim.FGFDMExec:
+def bare(model: Path, absent: list[str] | None = None) -> jsbsim.FGFDMExec:
     """A model in an executive of its own, initialised where it is: to be looked at, not flown.
 
-    absent: properties that nothing gives, at 0.
+    absent: properties that nothing gives, at 0; what else nothing gives is added, if a list is given.
     """
     fdm = _load(_Errors(), model)
-    for name in absent:
+    for name in absent or ():
         fdm[name] = 0.0
     fdm["ic/h-sl-ft"], fdm["ic/vc-kts"] = 5000.0, 100.0
     with translated(model):
-        fdm.run_ic()
+        giving(fdm, fdm.run_ic, absent)
     return fdm
+
+
+def giving(fdm: jsbsim.FGFDMExec, step: Callable[[], Any], absent: list[str] | None) -> None:
+    """Take a step of an executive; each property that it reads and nothing gives is at 0 if there is a list
+    to add its name to."""
+    while True:
+        try:
+            step()
+            return
+        except jsbsim.BaseError as error:
+            found = _ABSENT.search(str(error))
+            if absent is None or found is None or found[1] in absent:
+                raise
+            absent.append(found[1])
+            fdm[found[1]] = 0.0
 
 
 def _is_ours(model: Path) -> bool:

@@ -17,13 +17,14 @@ from beaver_ftc.aircraft.aircraft import FILE
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Location, Problem
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.files import cache_base
+from beaver_ftc.documents.files import cache_base, digest_of_files
 from beaver_ftc.documents.validation import ScenarioError, parse_document
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
 from beaver_ftc.plant.trial import failure
 
-_FORMAT = 4  # of what is checked: aircraft admitted by another are checked again
+# The checks: aircraft admitted by another version of them are checked again.
+_CHECKS = tuple(Path(__file__).with_name(name) for name in ("admission.py", "model_file.py", "trial.py"))
 
 
 @lru_cache(maxsize=32)
@@ -49,7 +50,7 @@ def admit(aircraft: Aircraft) -> None:
 
 def digest_of(folder: Path) -> str:
     """Of the files of an aircraft's folder, and of JSBSim's version."""
-    digest = hashlib.sha256(f"{_FORMAT} {version('jsbsim')}".encode())
+    digest = hashlib.sha256(f"{digest_of_files(*_CHECKS)} {version('jsbsim')}".encode())
     for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
         digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
     return digest.hexdigest()[:32]

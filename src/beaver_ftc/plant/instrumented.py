@@ -6,42 +6,29 @@ those of the aircraft's flight control; all else is the aircraft's own. The file
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from itertools import product
+from math import degrees, isfinite, nan
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.documents.files import data_root
-from beaver_ftc.plant.model_file import SYSTEMS, copy_of, files_of, package
+from beaver_ftc.plant.model_file import SYSTEMS, copy_of, file_of, files_of, package
 
 PREFIX = "actuated-"
-# What aerodynamics of JSBSim's aircraft call the deflection of each surface, and the sign and shape of it.
-_SEEN = {
-    "aileron": {
-        "fcs/left-aileron-pos-rad": "rad", "fcs/right-aileron-pos-rad": "opposite",
-        "fcs/aileron-pos-rad": "rad",
-        "fcs/left-aileron-pos-norm": "norm", "fcs/left-aileron-pos-deg": "deg",
-    },
-    "elevator": {
-        "fcs/elevator-pos-rad": "rad", "fcs/mag-elevator-pos-rad": "magnitude",
-        "fcs/elevator-pos-norm": "norm",
-        "fcs/elevator-pos-deg": "deg",
-    },
-    "rudder": {
-        "fcs/rudder-pos-rad": "rad", "fcs/mag-rudder-pos-rad": "magnitude", "fcs/rudder-pos-norm": "norm",
-        "fcs/rudder-pos-deg": "deg",
-    },
-}  # fmt: skip
-_SHAPES = {
-    "opposite": "<product> <value> -1 </value> {of} </product>",
-    "magnitude": "<abs> {of} </abs>",
-    "deg": "<product> <value> 57.29577951308232 </value> {of} </product>",
-    # of the travel as built: a scenario, and the search for trim, may move the stops
-    "norm": "<quotient> {of} <value> {whole!r} </value> </quotient>",
-}
+SURFACES = ("aileron", "elevator", "rudder")
+# What aerodynamics of JSBSim's aircraft call the deflection of a surface: of which side, in which unit.
+_NAMED = re.compile(r"fcs/(?:(left|right|mag)-)?(aileron|elevator|rudder)-pos-(rad|deg|norm)")
+_NAME = re.compile(r"/?[\w.-]+(\[\d+\])?(/[\w.-]+(\[\d+\])?)+")  # of a property; words may have a / as well
+_UNIT = re.compile(r"(rad|deg|norm)(?=[^a-z]*$)", re.IGNORECASE)
+# A number of the aerodynamics as a function of a deflection in rad: a factor, or points between which it is
+# a straight line, and beyond which it goes on as one.
+View = float | tuple[tuple[float, float], ...]
+Views = Mapping[str, Mapping[str, View]]  # of each surface, by what the aerodynamics call it
+_FARTHEST_RAD = 20.0  # the search for trim moves the stops to half of it
 # What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, and JSBSim
 # property. The aerodynamics compute them themselves, so that they are those of the same instant.
 SIGNALS = {
@@ -98,7 +85,7 @@ def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str =
 
 def engines_of(source: Path) -> int:
     """How many engines an aircraft has."""
-    return _engines(_parsed(source))
+    return _engines(_parsed(source), source)
 
 
 def _parsed(path: Path) -> Element:
@@ -161,14 +148,15 @@ def is_told(name: str) -> bool:
 
 
 def instrument(
-    source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = (),
-    gear_up: bool = False, apart: bool = False,
+    source: Path, folder: Path, travel_rad: Mapping[str, tuple[float, float]], absent: Iterable[str] = (),
+    gear_up: bool = False, apart: bool = False, views: Views | None = None,
 ) -> Path:  # fmt: skip
     """Write the instrumented copy of a model and what is beside it into an empty folder; returns its model.
 
     travel_rad: of each surface. absent: properties its files read that JSBSim alone does not give: 0 here.
     gear_up: its aerodynamics see a landing gear that is retracted, wherever its own flight control has it.
-    apart: the power lever of each engine has a difference of its own.
+    apart: the power lever of each engine has a difference of its own. views: what of each surface's
+    deflection the aerodynamics see, by what they call it; without, what these names usually mean.
 
     Raises BadInput where the failures cannot be put in, naming what is in the way.
     """
@@ -182,12 +170,18 @@ def instrument(
     aerodynamics = _aerodynamics(whole, source)
     if gear_up:
         absent = (*absent, RETRACTED)
-        for element in aerodynamics.iter("property"):
-            element.text = (element.text or "").replace(GEAR, RETRACTED)
-    _put_in(aerodynamics, folder, travel_rad)
-    _add_signals(aerodynamics, _engines(whole))
+        for element in aerodynamics.iter():
+            sign, name = _property_in(element.text)
+            if name == GEAR:
+                element.text = f" {sign}{RETRACTED} "
+    if views is None:
+        seen = surfaces_of(source)
+        views = {s: {name: usual_view(name, of) for name in seen.get(s, ())} for s, of in travel_rad.items()}
+    _put_in(aerodynamics, folder, travel_rad, views)
+    engines = _engines(whole, model)
+    _add_signals(aerodynamics, engines)
     _add_pitch_fault(aerodynamics, source.stem)
-    common = ElementTree.ElementTree(_common(_engines(whole), read, absent, apart))
+    common = ElementTree.ElementTree(_common(engines, read, absent, apart))
     common.write(folder / SYSTEMS / "ftc-common.xml", encoding="utf-8", xml_declaration=True)
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*travel_rad, "common")):
@@ -199,69 +193,127 @@ def instrument(
     return model
 
 
-def _engines(whole: Element) -> int:
-    propulsion = whole.find("propulsion")
+def _engines(whole: Element, source: Path) -> int:
+    propulsion = _section(whole, "propulsion", source)
     return 0 if propulsion is None else len(propulsion.findall("engine"))
 
 
 def _aerodynamics(whole: Element, source: Path) -> Element:
-    """The aerodynamics, read in from their own file if they are in one."""
-    found = whole.find("aerodynamics")
+    found = _section(whole, "aerodynamics", source)
     if found is None:
         raise BadInput(f"{source.stem}: has no aerodynamics, allowed: an aircraft that flies")
-    if found.get("file"):
-        named = (source.parent / str(found.get("file"))).with_suffix(".xml")
+    return found
+
+
+def _section(whole: Element, name: str, source: Path) -> Element | None:
+    """A section of a model, read in from its own file if it is in one."""
+    found = whole.find(name)
+    if found is not None and found.get("file"):
+        path = file_of(source, name, str(found.get("file")))
         place = list(whole).index(found)
-        whole[place] = found = _parsed(named)
+        whole[place] = found = _parsed(path)
     return found
 
 
 def seen_by_aerodynamics(source: Path) -> frozenset[str]:
     """Every property the aerodynamics of a model read."""
-    read = (element.text or "" for element in _aerodynamics(_parsed(source), source).iter())
-    return frozenset(text.strip().lstrip("-") for text in read if "/" in text)
+    read = (_property_in(element.text)[1] for element in _aerodynamics(_parsed(source), source).iter())
+    return frozenset(name for name in read if _NAME.fullmatch(name))
 
 
-def surfaces_of(source: Path) -> tuple[str, ...]:
-    """The surfaces whose deflection the aerodynamics of a model see."""
-    seen = seen_by_aerodynamics(source)
-    return tuple(surface for surface, known in _SEEN.items() if seen & set(known))
+def _property_in(text: str | None) -> tuple[str, str]:
+    """(sign, name) of the property that an element reads, if it reads one; `x[0]` is x."""
+    name = (text or "").strip()
+    return ("-", name[1:].strip()) if name.startswith("-") else ("", name.removesuffix("[0]"))
 
 
-def others_of(source: Path) -> tuple[str, ...]:
-    """What else the aerodynamics of a model see of its flight control, and its landing gear."""
-    ours = {name for known in _SEEN.values() for name in known}
-    seen = seen_by_aerodynamics(source) - ours
+def surfaces_of(source: Path, named: Mapping[str, Sequence[str]] | None = None) -> dict[str, tuple[str, ...]]:
+    """The surfaces whose deflection the aerodynamics of a model see, and what they call it; named: what they
+    call that of a surface, if not as JSBSim's own aircraft."""
+    seen, by_name = sorted(seen_by_aerodynamics(source)), named or {}
+    found = {}
+    for surface in SURFACES:
+        usual = [name for name in seen if (of := _NAMED.fullmatch(name)) and of[2] == surface]
+        if names := tuple(by_name.get(surface, usual)):
+            found[surface] = names
+    return found
+
+
+def others_of(source: Path, ours: Iterable[str]) -> tuple[str, ...]:
+    """What else the aerodynamics of a model see of its flight control, and its landing gear; ours: what they
+    call the deflections of surfaces."""
+    seen = seen_by_aerodynamics(source) - set(ours)
     return tuple(sorted(name for name in seen if name.startswith(("fcs/", "gear/"))))
 
 
-def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> None:
+def unit_of(name: str) -> float:
+    """How much of the unit that a name says a radian is; nan where it says a share of the travel."""
+    found = _UNIT.search(name)
+    return {"rad": 1.0, "deg": degrees(1.0), "norm": nan}[found[1].lower() if found else "rad"]
+
+
+def usual_view(name: str, travel_rad: tuple[float, float]) -> View:
+    """What the name of a deflection says of it: its sign, its unit, of which side."""
+    found, unit = _NAMED.fullmatch(name), unit_of(name)
+    # of the travel as built: a scenario, and the search for trim, may move the stops
+    size = unit if isfinite(unit) else 1.0 / travel_rad[1]
+    side, surface = (found[1], found[2]) if found else (None, "")
+    if side == "mag":
+        return tuple((rad, size * abs(rad)) for rad in (travel_rad[0], 0.0, travel_rad[1]))
+    return -size if side == "right" and surface == "aileron" else size
+
+
+def view_property(name: str, views: Views) -> str:
+    """What the aerodynamics of the copy see in place of a property."""
+    return next((_property(surface, name, of[name]) for surface, of in views.items() if name in of), name)
+
+
+def _put_in(
+    aerodynamics: Element, folder: Path, travel_rad: Mapping[str, tuple[float, float]], views: Views
+) -> None:
     """Let the aerodynamics see our deflections, and write the actuators."""
     for surface, travel in travel_rad.items():
-        shapes = set()
+        of_it, used = views[surface], set()
         for element in aerodynamics.iter():
-            text = (element.text or "").strip()
-            shape = _SEEN[surface].get(text.lstrip("-"))
-            if shape is not None:
-                shapes.add(shape)
-                element.text = f" {'-' if text.startswith('-') else ''}{_property(surface, shape)} "
+            sign, name = _property_in(element.text)
+            if name in of_it:
+                used.add(name)
+                element.text = f" {sign}{_property(surface, name, of_it[name])} "
         system = actuator_system(surface, *travel, prefix=PREFIX)
-        extra = "".join(_component(surface, shape, travel[1]) for shape in sorted(shapes - {"rad"}))
+        shown = (_component(surface, name, of_it[name]) for name in sorted(used) if of_it[name] != 1.0)
+        extra = "".join(shown)
         system = re.sub(r"(\s*</channel>)", lambda end: f"{extra}{end.group(1)}", system)  # noqa: B023
         (folder / SYSTEMS / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
 
 
-def _property(surface: str, shape: str) -> str:
-    """What the aerodynamics of the copy see."""
-    ending = "-effective-rad" if shape == "rad" else f"-effective-{shape}"
-    return f"fcs/{PREFIX}{surface}{ending}"
+def _property(surface: str, name: str, view: View) -> str:
+    """What the aerodynamics of the copy see in place of what they call a deflection."""
+    own = re.sub(r"[^\w-]", "-", name.removeprefix("fcs/"))
+    return f"fcs/{PREFIX}{surface}-effective-rad" if view == 1.0 else f"fcs/effective-{own}"
 
 
-def _component(surface: str, shape: str, whole: float) -> str:
-    of = f"<property> {_property(surface, 'rad')} </property>"
-    formula = _SHAPES[shape].format(of=of, whole=whole)
-    name = _property(surface, shape)
-    return f'\n    <fcs_function name="{name}"> <function> {formula} </function> </fcs_function>'
+def _component(surface: str, name: str, view: View) -> str:
+    of = f"<property> fcs/{PREFIX}{surface}-effective-rad </property>"
+    if isinstance(view, float):
+        formula = f"<product> <value> {view!r} </value> {of} </product>"
+    else:
+        rows = "\n".join(f"      {at!r} {value!r}" for at, value in _gone_on(view))
+        var = of.replace("<property>", '<independentVar lookup="row">').replace(
+            "</property>", "</independentVar>"
+        )
+        formula = f"<table> {var} <tableData>\n{rows}\n    </tableData> </table>"
+    shown = _property(surface, name, view)
+    return f'\n    <fcs_function name="{shown}"> <function> {formula} </function> </fcs_function>'
+
+
+def _gone_on(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Points, and one beyond either end on the straight line there."""
+
+    def beyond(at: float, end: tuple[float, float], inner: tuple[float, float]) -> tuple[float, float]:
+        return at, end[1] + (at - end[0]) * (end[1] - inner[1]) / (end[0] - inner[0])
+
+    first, last = beyond(-_FARTHEST_RAD, *points[:2]), beyond(_FARTHEST_RAD, *points[:-3:-1])
+    return first, *points, last
 
 
 def _add_signals(aerodynamics: Element, engines: int) -> None:

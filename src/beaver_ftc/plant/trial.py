@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 from time import process_time
 
@@ -24,14 +23,27 @@ _COMMAND = "import sys; from beaver_ftc.plant.trial import _alone; _alone(*sys.a
 _REFUSED = 2
 
 
-def failure(model: Path, absent: Iterable[str] = ()) -> str | None:
-    """Why a model cannot be loaded and flown, in words; None if it can.
+def failure(model: Path) -> str | None:
+    """Why a model cannot be loaded and flown, in words; None if it can."""
+    return _tried(model)[0]
 
-    absent: properties that nothing gives, at 0.
+
+def lacking(model: Path) -> list[str]:
+    """The properties that a model reads and nothing gives: with these at 0 it can be loaded and flown.
+
+    Raises SimulationFailed, with what JSBSim says, for one that cannot be.
     """
+    why, said = _tried(model, "giving")
+    if why is not None:
+        raise SimulationFailed(why)
+    return said.split()
+
+
+def _tried(model: Path, *how: str) -> tuple[str | None, str]:
+    """Why a model does not pass its trial, None if it does; and what the process of the trial has written."""
     above = str(Path(__file__).parents[2])  # the package itself, never what lies in the working directory
     paths = [above, *filter(None, [os.environ.get("PYTHONPATH")])]
-    command = [sys.executable, "-P", "-c", _COMMAND, str(model), *absent]
+    command = [sys.executable, "-P", "-c", _COMMAND, str(model), *how]
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
         around = os.environ | {
             "TMPDIR": here, "PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1"
@@ -42,12 +54,13 @@ def failure(model: Path, absent: Iterable[str] = ()) -> str | None:
                 stdin=subprocess.DEVNULL,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            return f"JSBSim does not start it within {LONGEST_S:g} s"
+            return f"JSBSim does not start it within {LONGEST_S:g} s", ""
+    said = run.stdout.decode(errors="replace").strip()
     if run.returncode == 0:
-        return None
+        return None, said
     if run.returncode == _REFUSED:
-        return run.stdout.decode(errors="replace").strip()
-    return _how_it_ended(run.returncode, run.stderr.decode(errors="replace"))
+        return said, said
+    return _how_it_ended(run.returncode, run.stderr.decode(errors="replace")), said
 
 
 def _how_it_ended(status: int, said: str) -> str:
@@ -62,25 +75,26 @@ def _how_it_ended(status: int, said: str) -> str:
     return f"{how}: {' '.join(last.removeprefix('what():').split())[:200]}" if last else how
 
 
-def _alone(model: str, *absent: str) -> None:
+def _alone(model: str, *how: str) -> None:
     """What the process of the trial does. It ends at once: what JSBSim has loaded may not be freed safely."""
     _limit()
+    absent: list[str] | None = [] if how else None
     try:
         probe(Path(model), absent)
     except BeaverFtcError as error:
         _end(_REFUSED, " ".join(str(error).split()))
     except MemoryError:
         _end(_REFUSED, f"JSBSim needs more than {MOST_BYTES / 2**30:g} GB of memory for it")
-    _end(0)
+    _end(0, "\n".join(absent or ()))
 
 
-def probe(model: Path, absent: Iterable[str] = ()) -> None:
+def probe(model: Path, absent: list[str] | None = None) -> None:
     """Load a model, start it and let it run for some frames, in this process.
 
     Raises SimulationFailed if it does not, or if loading or a frame takes long. absent: properties that
-    nothing gives.
+    nothing gives, at 0; what else nothing gives is added, if a list is given.
     """
-    from beaver_ftc.plant.adapter import bare, translated
+    from beaver_ftc.plant.adapter import bare, giving, translated
 
     began_s = process_time()
     fdm = bare(model, absent)
@@ -90,7 +104,7 @@ def probe(model: Path, absent: Iterable[str] = ()) -> None:
         raise SimulationFailed(f"{took}, more than {MOST_LOAD_S:g} s")
     with translated(model):
         for _ in range(FRAMES):
-            fdm.run()
+            giving(fdm, fdm.run, absent)
     frame_s = (process_time() - loaded_s) / FRAMES
     if frame_s > MOST_FRAME_S:
         took = f"a frame of JSBSim takes {1e3 * frame_s:.2g} ms of processor"

@@ -2,8 +2,9 @@
 
 Trim is steady straight flight with wings level, solved on the truth's own accelerations. The propeller's side
 force and moments are balanced by a little sideslip, aileron and rudder [FDC]. Unknowns: alpha, beta, theta
-and the surfaces that lead the axes. Equations: JSBSim's six body accelerations are zero, which absorbs
-everything the textbook leaves out (round rotating Earth, real gravity, standard atmosphere).
+and the surfaces that lead the axes; without a rudder, also a little bank. Equations: JSBSim's six body
+accelerations are zero, which absorbs everything the textbook leaves out (round rotating Earth, real gravity,
+standard atmosphere).
 
 A start of the truth costs nine JSBSim frames, Newton's method two dozen starts. So an aircraft without
 engines is brought near by Broyden's method: the Jacobian is found once, by differences, and then corrected
@@ -173,13 +174,14 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
     Returns the state, left in `truth`, and its accelerations.
     """
     together = truth.aircraft.together
-    names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in together))
-    x = np.array([getattr(state, name) for name in names])
+    unknowns = _unknowns(truth.aircraft)
+    names = (*unknowns, *(f"{surface}_rad" for surface in together))
+    x, n = np.array([getattr(state, name) for name in names]), len(unknowns)
 
     def state_at(x: Vector) -> FlightState:
-        flow, led = x[:3].tolist(), zip(x[3:].tolist(), together.values(), strict=True)
+        placed, led = x[:n].tolist(), zip(x[n:].tolist(), together.values(), strict=True)
         moved = {f"{name}_rad": share * rad for rad, of in led for name, share in of}
-        return replace(state, **dict(zip(_FLOW_UNKNOWNS, flow, strict=True)), **moved)
+        return replace(state, **dict(zip(unknowns, placed, strict=True)), **moved)
 
     def look(x: Vector) -> Vector:
         truth.start(state_at(x))
@@ -198,6 +200,11 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
         x = x + _shortened(_newton_step(_jacobian(look, x, here), here))
         here = look(x)
     raise _not_flown(state_at(x), _left_over(here), truth.aircraft)
+
+
+def _unknowns(aircraft: Aircraft) -> tuple[str, ...]:
+    """The angles that trim finds: what no surface turns about an axis, a little bank does."""
+    return _FLOW_UNKNOWNS if len(aircraft.together) >= len(AXES) else (*_FLOW_UNKNOWNS, "phi_rad")
 
 
 def _approach(look: Look, x: Vector) -> Vector:
@@ -237,19 +244,21 @@ def _looking(truth: Plant, state: FlightState) -> Look:
     """The six accelerations, m/s2 and rad/s2, as a function of the unknowns of a state at which the truth has
     been started: alpha, beta, theta, then the surfaces that lead."""
     fdm, speed_fps = truth.fdm, state.airspeed_mps * FT_PER_M
-    theta_place, *flow = (truth.input(name) for name in ("ic/theta-rad", *_RATES_AND_FLOW))
+    attitude = "ic/theta-rad", *["ic/phi-rad"] * ("phi_rad" in _unknowns(truth.aircraft))
+    turned, flow = ([truth.input(name) for name in of] for of in (attitude, _RATES_AND_FLOW))
     led = [(k, name, share) for k, of in enumerate(truth.aircraft.together.values()) for name, share in of]
     surfaces = [truth.input(truth.aircraft.surface[name].command) for _, name, _ in led]
-    puts = [node.set_double_value for node in (theta_place, *flow, *surfaces)]
+    puts = [node.set_double_value for node in (*turned, *flow, *surfaces)]
     gets = [truth.node(name).get_double_value for name, _ in ACCELERATIONS]
     factors = np.array([factor for _, factor in ACCELERATIONS])
 
     def look(x: Vector) -> Vector:
-        alpha, beta, theta, *deflections = x.tolist()
+        alpha, beta, *angles = x[: 2 + len(turned)].tolist()
+        deflections = x[2 + len(turned) :].tolist()
         along = speed_fps * cos(beta)
         flow_fps = along * cos(alpha), speed_fps * sin(beta), along * sin(alpha)
         moved = [share * deflections[k] for k, _, share in led]
-        for put, value in zip(puts, (theta, *flow_fps, *moved), strict=True):
+        for put, value in zip(puts, (*angles, *flow_fps, *moved), strict=True):
             put(value)
         if not fdm.run_ic():
             raise SimulationFailed("JSBSim cannot initialise the flight")
@@ -292,9 +301,10 @@ def _check_solution(solution: FlightState, travel: dict[str, Travel], aircraft: 
 
 
 def _climb_angle(state: FlightState) -> float:
-    """Flight-path angle with wings level: the velocity's vertical part over its length, rad."""
-    a, b, theta = state.alpha_rad, state.beta_rad, state.theta_rad
-    return asin(cos(b) * (cos(a) * sin(theta) - sin(a) * cos(theta)))
+    """Flight-path angle: the velocity's vertical part over its length, rad."""
+    a, b, theta, phi = state.alpha_rad, state.beta_rad, state.theta_rad, state.phi_rad
+    along = cos(b) * (cos(a) * sin(theta) - sin(a) * cos(phi) * cos(theta))
+    return asin(along - sin(b) * sin(phi) * cos(theta))
 
 
 DELAY = "actuators/delay-s"

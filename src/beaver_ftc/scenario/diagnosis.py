@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.design import Severity
-from beaver_ftc.documents.document import Conflict, Section, deny, entry, number, refuse
+from beaver_ftc.documents.document import Conflict, Location, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.plugins import DETECTORS, LAWS, refusal, wrong_options
+from beaver_ftc.plugins import DETECTORS, LAWS, needs_leaders, refusal, wrong_options
 from beaver_ftc.scenario.airframe import checked_aircraft, named
 from beaver_ftc.scenario.sensors import Sensors
 
@@ -42,6 +43,24 @@ def changes_refused(scenario: Any, aircraft: "Aircraft") -> Iterator[Conflict]:
         if why := pairs_refused(sensors, aircraft):
             where = ("changes", i, "declared_sensors")
             yield where, f"fdi.pairs is {why}, allowed: errors that do not vary, or fdi.pairs: false"
+
+
+def leaders_missed(scenario: Any, aircraft: "Aircraft") -> Iterator[Conflict]:
+    """Laws and schemes that need a surface for each axis, of an aircraft without a rudder or ailerons."""
+    if len(aircraft.primary) == len(AXES):
+        return
+    wanted: list[tuple[Location, str, str | None]]
+    wanted = [(("control",), "law", scenario.control.law), (("fdi",), "scheme", scenario.fdi.scheme)]
+    for i, change in enumerate(scenario.changes):
+        wanted += [(("changes", i), "law", change.law), (("changes", i), "scheme", change.scheme)]
+    for where, key, name in wanted:
+        group = LAWS if key == "law" else DETECTORS
+        if name is not None and needs_leaders(group, name):
+            has = f"{aircraft.name} has {', '.join(aircraft.surfaces)}"
+            yield (
+                (*where, key),
+                f"{name} needs a surface for each of roll, pitch and yaw, {has}, allowed: others",
+            )
 
 
 def _declared_later(scenario: Any) -> Iterator[tuple[int, Sensors]]:

@@ -64,7 +64,6 @@ from beaver_ftc.scenario.airframe import (
     Ratios,
     aircraft_called,
     checked_against,
-    checked_aircraft,
     default_initial,
     find_aircraft,
     folder_of,
@@ -80,6 +79,7 @@ from beaver_ftc.scenario.diagnosis import (
     Law,
     Scheme,
     changes_refused,
+    leaders_missed,
 )
 from beaver_ftc.scenario.faults import (
     MOST_FAULTS,
@@ -483,7 +483,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
     def _parts_fit_together(self) -> Self:
         flown = dict(self.autopilot or {})
         said = conflicts({**dict(self), "autopilot": flown, "expect": self.expect.model_dump()})
-        refuse([*said, *changes_refused(self, checked_aircraft())])
+        refuse([*said, *changes_refused(self, self.airframe), *leaders_missed(self, self.airframe)])
         return self
 
     def with_(self, changes: Mapping[str, Any]) -> Self:

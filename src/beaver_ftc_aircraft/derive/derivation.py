@@ -1,7 +1,6 @@
 """From an aircraft's name to a folder that flies: a JSBSim model that takes faults, and `aircraft.yaml`."""
 
 import json
-import re
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -40,13 +39,15 @@ from beaver_ftc.plant import (
     TrimPoint,
     check_model_has_no_side_effects,
     copy_of,
-    failure_of_trial,
     instrument_model,
     is_known_to_jsbsim,
+    lacking_in_trial,
+    left_out_of_copy,
+    probe_model,
     seen_by_aerodynamics,
     source_of_jsbsim,
-    surfaces_of,
     translated,
+    where_files_lie,
 )
 from beaver_ftc.plant import trim_plant as trim_at
 from beaver_ftc.studies.engine import Forks
@@ -77,6 +78,13 @@ from beaver_ftc_aircraft.derive.sample import (
     fly_about_all,
     sample_all,
 )
+from beaver_ftc_aircraft.derive.surfaces import (
+    DIFFERENT,
+    Difference,
+    Surfaces,
+    differences,
+    find_surfaces,
+)
 from beaver_ftc_aircraft.derive.thrust import LEAST_ARM_M, effectors_of, thrust_of
 
 SAMPLES, CHECKED = 6000, 8000
@@ -86,8 +94,6 @@ LOWEST_M, SPANS_ABOVE_GROUND = 100.0, 2.0  # of what is sampled
 BEYOND_M = 100.0  # sampled beyond the altitudes of the envelope: a flight at its end moves up and down
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
-_MOST_ABSENT = 20
-_ABSENT = re.compile(r"The property ([^ ]+) does not exist")
 _ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder with an aircraft.yaml"
 
 
@@ -108,6 +114,17 @@ class Source:
         return f"{FROM_JSBSIM}{self.name}" if self.target else self.name
 
 
+@dataclass(frozen=True)
+class Pair:
+    """A model and its copy. own: the model, with nothing that fails. surfaces: of both. along: what the
+    commands of surfaces move beside them in the model, and not in the copy."""
+
+    own: Path
+    copy: Path
+    surfaces: Surfaces
+    along: frozenset[str]
+
+
 def source_of(reference: str) -> Source:
     """What a reference means. Raises BadInput for what is no aircraft, or would act on the machine."""
     if reference.startswith(FROM_JSBSIM):
@@ -124,7 +141,7 @@ def source_of(reference: str) -> Source:
     if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
         path = path / f"{path.resolve().name}.xml"
     if path.suffix == ".xml" and path.is_file():
-        check_model_has_no_side_effects(path)
+        check_model_has_no_side_effects(path, copied=True)
         return Source(path.stem, path.resolve())
     raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
 
@@ -135,19 +152,22 @@ def try_out(source: Source) -> tuple[str, ...]:
     Returns the properties that its files read and nothing gives; most are FlightGear's. Raises
     SimulationFailed, with what JSBSim says, for a model that cannot be flown with these at 0 either.
     """
-    absent: list[str] = []
-    while (why := _failure(source, absent)) is not None:
-        found = _ABSENT.search(why)
-        if found is None or found[1] in absent or len(absent) == _MOST_ABSENT:
-            raise SimulationFailed(f"{source.says}: {why}")
-        absent.append(found[1])
-    return tuple(absent)
-
-
-def _failure(source: Source, absent: list[str]) -> str | None:
-    """Why the model does not fly with these properties at 0; None if it does."""
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:
-        return failure_of_trial(copy_of(source.model, Path(here) / source.name), absent)
+        try:
+            return tuple(lacking_in_trial(copy_of(source.model, Path(here) / source.name)))
+        except SimulationFailed as error:
+            raise SimulationFailed(f"{source.says}: {error}") from None
+
+
+def _own(source: Source, folder: Path) -> tuple[Path, tuple[str, ...]]:
+    """A copy in which nothing fails, and what nothing gives it: 0 there."""
+    absent = [name for name in try_out(source) if not is_known_to_jsbsim(name)]
+    while True:
+        known = tuple(absent)
+        own = instrument_model(source.model, folder / f"{len(known)}" / source.name, {}, known)
+        probe_model(own, absent)  # what the words of engines are taken from, an engine may not have
+        if len(absent) == len(known):
+            return own, known
 
 
 def derive(
@@ -165,18 +185,24 @@ def derive(
     """
     started_s, wanted, source = perf_counter(), outline.read_envelope(envelope), source_of(reference)
     target = _target(source, out)
-    notes: list[str] = []
+    notes, files = list[str](), dict[str, str]()
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / "new" / source.name
+        if source.folder is None:
+            files = where_files_lie(source.model)
+            notes += [f"{what} is left out of the copy" for what in left_out_of_copy(source.model)]
+            gathered = copy_of(source.model, Path(scratch) / "read" / source.name, layout=True)
+            source = replace(source, model=gathered)
         with translated(source.model):
-            data, plant, trim = _prepared(source, folder, wanted, notes, tell, engines)
+            (data, plant, trim), pair = _prepared(source, folder, wanted, notes, tell, engines)
             notes += outline.not_affine(plant, trim)
-            further = {} if source.folder else outline.further_surfaces(source.model, plant)
+            further = outline.further_surfaces(source.model, plant, pair.surfaces.names) if pair else {}
             if moving := outline.moved_by_itself(plant.aircraft, trim, tuple(further)):
                 raise BadInput(
                     f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
                     "aerodynamics depend on it, allowed: surfaces that move by command"
                 )
+            off = _compared(source, pair, data["envelope"]["airspeed_mps"], notes, tell) if pair else None
             if source.folder is None:
                 _set_envelope(data, trim, wanted)
             if wanted.altitude_m is not None or data["envelope"].get("altitude_m") is None:
@@ -188,7 +214,7 @@ def derive(
         aircraft = outline.aircraft_of(data, target)
         as_filed = read_aircraft(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
-        found = Derived(aircraft, trim, *made, tuple(notes), as_filed, further, took_s)
+        found = Derived(aircraft, trim, *made, tuple(notes), as_filed, further, took_s, files, off)
         twice = json.loads(json.dumps(data))  # what is there twice is written twice, not as an alias
         text = yaml.safe_dump(twice, sort_keys=False, default_flow_style=None, width=120)
         (folder / AIRCRAFT_FILE).write_text(first_line_of() + text, encoding="utf-8")
@@ -204,25 +230,25 @@ def _prepared(
     notes: list[str],
     tell: Tell,
     engines: bool = False,
-) -> outline.Level:
-    """An aircraft in level flight, instrumented if need be; engines: these as effectors."""
+) -> tuple[outline.Level, Pair | None]:
+    """An aircraft in level flight, and if it was instrumented, the model and the copy; engines: these as
+    effectors."""
     if source.folder is not None:
         if engines:
             raise BadInput(f"{source.says}: has a file, allowed: `effectors` in it, or a JSBSim model alone")
         tell("trim")
-        return outline.level_as_filed(source.folder, folder, wanted)
+        return outline.level_as_filed(source.folder, folder, wanted), None
     tell("instrument")
-    seen = surfaces_of(source.model)
-    if len(seen) < 3:
-        says = f"only on {', '.join(seen)}" if seen else "on no surface"
-        raise BadInput(f"{source.says}: its aerodynamics depend {says}, allowed: aileron, elevator, rudder")
-    absent = tuple(name for name in try_out(source) if not is_known_to_jsbsim(name))
+    own, absent = _own(source, folder.parent.parent / "own")
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
-    own = instrument_model(source.model, folder.parent.parent / "own", {}, absent)
-    travel = outline.travel_of(source.model, own, notes)
-    notes += outline.own_control(source.model, own)
-    model = instrument_model(source.model, folder, travel, absent, apart=engines)
+    named = {str(surface): names for surface, names in wanted.surfaces.items()}
+    surfaces = find_surfaces(source.model, own, named)
+    notes += surfaces.notes
+    said, along = outline.own_control(source.model, own, surfaces)
+    notes += said
+    travel, views = surfaces.travel, surfaces.views
+    model = instrument_model(source.model, folder, travel, absent, apart=engines, views=views)
     outlines = [outline.outline(source.name, model, travel, lift) for lift in outline.LIFT_COEFFICIENTS]
     for data in outlines:
         if wanted.altitude_m is not None:
@@ -235,11 +261,35 @@ def _prepared(
     sinks = level[2].gamma_rad <= -outline.LEVEL_RAD and level[1].n_engines
     if sinks and GEAR in seen_by_aerodynamics(source.model):
         shutil.rmtree(folder)
-        instrument_model(source.model, folder, travel, absent, gear_up=True, apart=engines)
+        instrument_model(source.model, folder, travel, absent, gear_up=True, apart=engines, views=views)
+        own = instrument_model(source.model, own.parent / "gear-up" / source.name, {}, absent, gear_up=True)
         said = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
         level = outline.level_flight(tried, folder, said)
     notes += said
-    return _with_engines(source, level, folder) if engines else level
+    pair = Pair(own, model, surfaces, frozenset(along))
+    return _with_engines(source, level, folder) if engines else level, pair
+
+
+def _compared(
+    source: Source, pair: Pair, airspeed_mps: tuple[float, float], notes: list[str], tell: Tell
+) -> Difference:
+    """Where the copy turns most otherwise than the model.
+
+    Raises BadInput, with the cause, where it would be another aircraft; a cause that is known is noted.
+    """
+    tell("compare")
+    found, noted = differences(pair.own, pair.copy, pair.surfaces, airspeed_mps), set[tuple[str, ...]]()
+    for off in found:
+        if not off.share <= DIFFERENT:
+            if not off.because or set(off.because) - pair.along:
+                raise BadInput(
+                    f"{source.says}: its copy would fly otherwise, off by {off}, allowed: aerodynamics that "
+                    "see its surfaces alone; `surfaces` in the file of --envelope may name more of them"
+                )
+            if off.because not in noted:
+                notes.append(f"its copy is off by {off}; `surfaces` in the file of --envelope may include it")
+            noted.add(off.because)
+    return max(found, key=lambda off: off.share)
 
 
 def _with_engines(source: Source, level: outline.Level, folder: Path) -> outline.Level:

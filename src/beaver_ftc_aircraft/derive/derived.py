@@ -4,7 +4,7 @@ The page has its terms, its error over the envelope, and what can be diagnosed.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import radians
 from typing import Any
 
@@ -14,6 +14,7 @@ from beaver_ftc.aircraft import AXES, MOMENTS, Aircraft, ErrorMapSection
 from beaver_ftc.design import N_Y, DesignFunctions, design_record
 from beaver_ftc.plant import TrimPoint
 from beaver_ftc.scenario import Bounds, measured_spans, plural, span_in_words
+from beaver_ftc_aircraft.derive.surfaces import Difference
 
 DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
 _NEAR = 1  # box and share of the travel of such a flight, as `fit` makes them
@@ -29,7 +30,9 @@ WHY_NOT_USED = (
 class Derived:
     """What came of it: the folder, the aircraft, its trim, the largest errors (3,) rad/s2 over the samples
     of the fit and over those it did not see, and what is to be known of it. as_filed: as its own file has it.
-    further: surfaces that are not used, by property, and where they stay. took_s: how long it took."""
+    further: surfaces that are not used, by property, and where they stay. took_s: how long it took. files:
+    what its model is made of beside itself, and the folder of each. off: where the copy turns most otherwise
+    than the model when its surfaces move, if it was copied from one."""
 
     aircraft: Aircraft
     trim: TrimPoint
@@ -39,6 +42,8 @@ class Derived:
     as_filed: Aircraft | None
     further: Mapping[str, float]
     took_s: float
+    files: Mapping[str, str] = field(default_factory=dict)
+    off: Difference | None = None
 
     @property
     def error_map(self) -> ErrorMapSection:
@@ -91,9 +96,24 @@ def page_of(made: Derived) -> str:
         f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m. Derived in {made.took_s:.1f} s.",
         "## What is to be known",
         "\n".join(f"- {note}" for note in made.notes) or "Nothing unusual was found.",
+        *_copied(made),
         *_diagnosed(made), *_not_used(made), *_errors(made), "## Terms", _terms(aircraft),
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
+
+
+def _copied(made: Derived) -> Iterator[str]:
+    """What it was copied from, and how far the copy is off it."""
+    if made.off:
+        yield "## The copy"
+        yield (
+            "In several states, the surfaces of the copy were moved from stop to stop in JSBSim, those of "
+            "the model by its own flight control. Their accelerations differ, as a share of what the whole "
+            f"travels do, by at most {made.off}."
+        )
+    if made.files:
+        yield "It is made of these files beside its model:"
+        yield _table(("file", "read from"), *((f"`{name}`", place) for name, place in made.files.items()))
 
 
 def _envelope(envelope: Mapping[str, Any]) -> str:
@@ -198,6 +218,8 @@ def document_of(made: Derived) -> dict[str, Any]:
         "smallest_certain_jam_deg": {name: DEFLECTION_DEG * loss for name, loss in losses.items()},
         "further_surfaces": dict(made.further),
         "notes": list(made.notes),
+        "files": dict(made.files),
+        "copy_off": {"share": round(made.off.share, 6), "where": str(made.off)} if made.off else None,
         "own_file": differences(made.as_filed, made.aircraft) if made.as_filed else None,
         "took_s": round(made.took_s, 2),
     }
@@ -221,6 +243,11 @@ def text_of(document: dict[str, Any]) -> str:
     if document["own_file"]:
         lines.append(f" {'coefficient':24}{'own file':>12}{'found':>12}")
         lines += [f"   {of['term']:22}{of['own']:12.5g}{of['found']:12.5g}" for of in document["own_file"]]
+    if document["copy_off"]:
+        lines.append(f" copy       off the model by at most {document['copy_off']['where']}")
+    if document["files"]:
+        read = ", ".join(f"{name} from {place}" for name, place in document["files"].items())
+        lines.append(f" files      {read}")
     lines += [f" note: {note}" for note in document["notes"]]
     if document["further_surfaces"]:
         lines.append(f" not used: {', '.join(document['further_surfaces'])}: {WHY_NOT_USED}")

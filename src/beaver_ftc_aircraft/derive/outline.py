@@ -6,16 +6,17 @@ file already keeps all that is in it but its moments: these are found again.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import degrees, isfinite
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
+from pydantic import BeforeValidator, Field
 
-from beaver_ftc.aircraft import AXES, KG_PER_SLUG, M_PER_FT, Aircraft, AircraftFile, Interval
+from beaver_ftc.aircraft import AXES, KG_PER_SLUG, M_PER_FT, Aircraft, AircraftFile, Interval, Property
 from beaver_ftc.aircraft import read_aircraft as read
 from beaver_ftc.documents import (
     BadInput,
@@ -23,32 +24,26 @@ from beaver_ftc.documents import (
     Number,
     Section,
     SimulationFailed,
+    entry,
     number,
     read_file,
 )
-from beaver_ftc.plant import FlightState, Plant, TrimPoint, bare, copy_of, others_of, surfaces_of, translated
+from beaver_ftc.plant import FlightState, Plant, TrimPoint, bare, copy_of, others_of
 from beaver_ftc.plant import trim_plant as trim
 from beaver_ftc.scenario import initial_of
+from beaver_ftc_aircraft.derive.engines import RATE_HZ, why_no_power
+from beaver_ftc_aircraft.derive.engines import run as run_engines
+from beaver_ftc_aircraft.derive.surfaces import Surfaces, Travel, moved_by, off_line, settled
 
 SLUG_FT2 = KG_PER_SLUG * M_PER_FT**2
 OUTLINE = Path(__file__).with_name("outline.yaml")
 DENSITY_KG_M3 = 1.058  # at the altitude there
 SPAN_OF_SPEED = (0.8, 1.25)
-LIKELY_TRAVEL_RAD = 0.35
-MOST_TRAVEL_RAD = 1.2
-POSITIONS = {
-    "aileron": "fcs/left-aileron-pos-rad",
-    "elevator": "fcs/elevator-pos-rad",
-    "rudder": "fcs/rudder-pos-rad",
-}
-_LEAST_TRAVEL_RAD = 0.02
-_FRAMES = 400  # in which its own flight control has moved a surface
 NOT_AFFINE = 0.02  # deviation from a straight line, as a share of what the whole travel does
 _MOVED_RAD, _RATE_RAD_S = 0.003, 0.1
 _POINTS, _OWN_FRAMES = 9, 300
 _AT_REST = 0.05  # as a share of where it is
 _SURFACE = re.compile(r"fcs/(?!.*(cmd|throttle|thrust|gear))")
-Travel = dict[str, tuple[float, float]]
 Data = dict[str, Any]  # of an aircraft's file
 Level = tuple[Data, Plant, TrimPoint]  # of an aircraft about to be sampled
 LIFT_COEFFICIENTS = (0.45, 0.3, 0.2, 0.12, 0.7)  # of the speeds to be tried
@@ -65,13 +60,23 @@ LB_PER_SLUG = 32.17405
 WIDE_SIDESLIP_RAD = 0.45
 
 
+Surface = Literal["aileron", "elevator", "rudder"]
+Properties = Annotated[
+    tuple[Property, ...], BeforeValidator(lambda given: [given] if isinstance(given, str) else given),
+    Field(min_length=1, max_length=8),
+]  # fmt: skip
+
+
 class EnvelopeFile(Section):
-    """Where to sample, if not about level flight."""
+    """Where to sample, if not about level flight; and what the model calls its surfaces."""
 
     airspeed_mps: Interval | None = None
     alpha_deg: Interval | None = None
     altitude_m: Number | None = number(None, unit="m", says="altitude", ge=0, le=15000)
     sideslip_deg: Number | None = number(None, unit="deg", says="sideslip to either side", gt=0, le=45)
+    surfaces: dict[Surface, Properties] = entry(
+        dict, "what the aerodynamics read of each surface, if not by JSBSim's usual names"
+    )
 
 
 def read_envelope(path: Path | None) -> EnvelopeFile:
@@ -79,42 +84,6 @@ def read_envelope(path: Path | None) -> EnvelopeFile:
     if path is None:
         return EnvelopeFile()
     return read_file(EnvelopeFile, path, 100_000, f"the keys {', '.join(EnvelopeFile.model_fields)}")
-
-
-def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:
-    """How far each surface goes when its own flight control is commanded from stop to stop, rad.
-
-    model: a copy that writes no files. What had to be supposed is added to the notes.
-    """
-    travel = {}
-    for surface in surfaces_of(source):
-        low, high = sorted(own_deflection(model, surface, command) for command in (-1.0, 1.0))
-        if not (isfinite(low) and isfinite(high) and low < -_LEAST_TRAVEL_RAD and high > _LEAST_TRAVEL_RAD):
-            low, high = -LIKELY_TRAVEL_RAD, LIKELY_TRAVEL_RAD
-            notes.append(
-                f"{surface}: its own flight control does not move it to both sides; {high:g} rad is supposed"
-            )
-        travel[surface] = round(max(low, -MOST_TRAVEL_RAD), 5), round(min(high, MOST_TRAVEL_RAD), 5)
-    return travel
-
-
-def own_deflection(model: Path, surface: str, command: float, rate_rad_s: float = 0.0) -> float:
-    """Where its own flight control puts a surface, rad, at a command (-1 to 1) and a rate about all axes."""
-    given = {f"ic/{axis}-rad_sec": rate_rad_s for axis in AXES} | {f"fcs/{surface}-cmd-norm": command}
-    return _settled(model, given, (POSITIONS[surface],))[0]
-
-
-def _settled(model: Path, given: Mapping[str, float], names: Sequence[str]) -> list[float]:
-    """These properties once its own flight control has had time to answer to what is given."""
-    fdm = bare(model)
-    with translated(model):
-        for name, value in given.items():
-            fdm[name] = value
-        for k in range(_FRAMES):
-            if k % 10 == 0:
-                fdm.run_ic()  # it flies nowhere meanwhile
-            fdm.run()
-    return [float(fdm[name]) for name in names]
 
 
 def outline(name: str, model: Path, travel: Travel, lift: float) -> Data:
@@ -127,12 +96,23 @@ def outline(name: str, model: Path, travel: Travel, lift: float) -> Data:
     data["description"], data["jsbsim"] = f"{name}, derived from its JSBSim model", model.name
     for surface, ends in travel.items():
         data["surfaces"][surface]["travel_rad"] = list(ends)
+    _leave_out(data, data["surfaces"].keys() - travel.keys())
     inertia = {f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * SLUG_FT2 for a in "xyz"}
     data["mass"] = {"mass_kg": mass_kg, **inertia, "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * SLUG_FT2}
     span_m, chord_m = fdm["metrics/bw-ft"] * M_PER_FT, fdm["metrics/cbarw-ft"] * M_PER_FT
     data["geometry"] = {"wing_area_m2": area, "span_m": span_m, "chord_m": chord_m}
     data["envelope"]["airspeed_mps"] = [speed_mps * share for share in SPAN_OF_SPEED]
     return data
+
+
+def _leave_out(data: Data, surfaces: Collection[str]) -> None:
+    """Take surfaces from a file."""
+    for surface in surfaces:
+        del data["surfaces"][surface]
+    groups = {name: [s for s in of if s not in surfaces] for name, of in data["groups"].items()}
+    data["groups"] = {name: of for name, of in groups.items() if of}
+    moments = {name: [t for t in of if t["surface"] not in surfaces] for name, of in data["moments"].items()}
+    data["moments"] = {name: of for name, of in moments.items() if of}
 
 
 def not_affine(plant: Plant, trim: FlightState) -> list[str]:
@@ -146,12 +126,10 @@ def not_affine(plant: Plant, trim: FlightState) -> list[str]:
             plant.hold(replace(trim, surfaces_rad={**trim.surfaces_rad, name: deflection_rad}))
             moved[k] = [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
         size = np.ptp(moved, axis=0)
-        axis = int(size.argmax())
-        if size[axis] == 0.0:
+        if size.max() == 0.0:
             notes.append(f"{name}: it turns nothing in trim: its faults cannot be seen")
             continue
-        off_line = moved[:, axis] - np.polyval(np.polyfit(at, moved[:, axis], 1), at)
-        share = float(np.ptp(off_line) / size[axis])
+        share = off_line(at, moved)
         if share > NOT_AFFINE:
             notes.append(
                 f"{name}: its moment is not proportional to its deflection, {share:.0%} off a straight line: "
@@ -161,9 +139,10 @@ def not_affine(plant: Plant, trim: FlightState) -> list[str]:
     return notes
 
 
-def further_surfaces(source: Path, plant: Plant) -> dict[str, float]:
-    """What else of its flight control its aerodynamics see, by property, and where it is in trim."""
-    names = [name for name in others_of(source) if _SURFACE.match(name)]
+def further_surfaces(source: Path, plant: Plant, ours: Collection[str]) -> dict[str, float]:
+    """What else of its flight control its aerodynamics see, by property, and where it is in trim; ours: what
+    they call the surfaces of its file."""
+    names = [name for name in others_of(source, ours) if _SURFACE.match(name)]
     return {name: round(plant.read(name), 4) for name in names if plant.has(name)}
 
 
@@ -183,27 +162,29 @@ def moved_by_itself(aircraft: Aircraft, trim: FlightState, names: Sequence[str])
     return [name for name, moves in zip(names, moving, strict=True) if moves]
 
 
-def own_control(source: Path, model: Path) -> list[str]:
-    """What its own flight control does that the copy leaves out; model: a copy that writes no files.
+def own_control(source: Path, model: Path, surfaces: Surfaces) -> tuple[list[str], set[str]]:
+    """What its own flight control does that the copy leaves out, in notes, and which properties it moves with
+    the command of a surface; model: a copy that writes no files.
 
     It moves surfaces with the rates, and with the command of a surface what else the aerodynamics see.
     """
-    notes, surfaces = [], surfaces_of(source)
-    for surface in surfaces:
-        moved = own_deflection(model, surface, 0.0, _RATE_RAD_S) - own_deflection(model, surface, 0.0)
-        if abs(moved) > _MOVED_RAD:
+    notes = []
+    for surface, of in surfaces.read.items():
+        names, per_unit = [name for name, _ in of], [size for _, size in of]
+        turning = {f"ic/{axis}-rad_sec": _RATE_RAD_S for axis in AXES}
+        still, moved = (settled(model, given, names) for given in ({}, turning))
+        by_rad = float(np.dot(per_unit, np.subtract(moved, still))) / len(names)
+        if abs(by_rad) > _MOVED_RAD:
             notes.append(
-                f"{surface}: its own flight control moves it {degrees(moved):.1f} deg at "
+                f"{surface}: its own flight control moves it {degrees(by_rad):.1f} deg at "
                 f"{degrees(_RATE_RAD_S):.1f} deg/s, command or not: the copy flies without"
             )
-    others = others_of(source)
-    still = np.round(_settled(model, {}, others), 6)
-    for surface in surfaces:
-        moved = np.round(_settled(model, {f"fcs/{surface}-cmd-norm": 1.0}, others), 6) != still
-        if moved.any():
-            along = ", ".join(np.array(others)[moved])
-            notes.append(f"{surface}: its command moves {along} too: in the copy it does not")
-    return notes
+    others, along = others_of(source, surfaces.names), set[str]()
+    for surface in surfaces.read:
+        if moved_too := moved_by(model, surface, others):
+            along |= set(moved_too)
+            notes.append(f"{surface}: its command moves {', '.join(moved_too)} too: in the copy it does not")
+    return notes, along
 
 
 def aircraft_of(data: Mapping[str, Any], folder: Path) -> Aircraft:
@@ -211,9 +192,9 @@ def aircraft_of(data: Mapping[str, Any], folder: Path) -> Aircraft:
     return Aircraft(AircraftFile.model_validate(data), folder)
 
 
-def plant_of(data: Mapping[str, Any], folder: Path) -> Plant:
+def plant_of(data: Mapping[str, Any], folder: Path, substeps: int = 1) -> Plant:
     """A plant of it."""
-    return Plant(100, aircraft=aircraft_of(data, folder))
+    return Plant(RATE_HZ, substeps, aircraft=aircraft_of(data, folder))
 
 
 def choose_start(data: Data, folder: Path) -> list[str]:
@@ -227,8 +208,14 @@ def choose_start(data: Data, folder: Path) -> list[str]:
         if share is not None and share > _LEAST_THRUST:
             return []
         settled |= {how: share} if share is not None else {}
-    data["engine"]["start"] = next(iter(settled), "off")
-    return ["its engines give no thrust when JSBSim starts them: it is flown gliding"]
+    # one that does not settle even if it is off is an electric motor: it runs as a pilot has it
+    data["engine"]["start"] = next(iter(settled), "run_up")
+    return [f"its engines do not carry it, {_why(data, folder)}: it is flown gliding"]
+
+
+def _why(data: Data, folder: Path) -> str:
+    """Why its engines give no more."""
+    return why_no_power(lambda substeps: plant_of(data, folder, substeps))
 
 
 def _steady_thrust(plant: Plant) -> float | None:
@@ -272,8 +259,14 @@ def level_flight(outlines: list[Data], folder: Path, notes: list[str]) -> Level:
         notes += choices
         if plant.n_engines and abs(point.gamma_rad) >= LEVEL_RAD:
             way, slope_deg = "climbs" if point.gamma_rad > 0.0 else "sinks", abs(degrees(point.gamma_rad))
-            notes.append(f"in trim it {way} at {slope_deg:.1f} deg: its power goes no further")
+            why = "" if choices else f": {_why(data, folder)}"
+            notes.append(f"in trim it {way} at {slope_deg:.1f} deg: its power goes no further{why}")
         return data, plant, point
+    plant = plant_of(outlines[0], folder)
+    if plant.n_engines and not run_engines(plant, 1.0).finite:
+        raise BadInput(
+            f"{outlines[0]['name']}: {_why(outlines[0], folder)}, allowed: engines that JSBSim can run"
+        )
     raise BadInput(f"{outlines[0]['name']}: {failed}")
 
 

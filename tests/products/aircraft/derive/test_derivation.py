@@ -14,6 +14,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc_aircraft.derive import derivation, outline
 from beaver_ftc_aircraft.derive.derivation import Source, source_of
 from beaver_ftc_aircraft.derive.sample import AGES_OF_WORST, EVERY_AGE, FRESH, Moves
+from beaver_ftc_aircraft.derive.surfaces import Surfaces
 from telling import numbers
 
 from .known import TRAINER
@@ -90,34 +91,21 @@ def test_only_what_was_derived_is_written_over(tmp_path):
         derivation._target(source, None)
 
 
-def test_what_a_model_lacks_is_given_until_it_flies(monkeypatch):
-    """One property after the other; a property that is given and still missed, or the 21st, is too much."""
-    lacking = [f"of/{i}" for i in range(20)]
-
-    def failure(source, absent):
-        left = [name for name in lacking if name not in absent]
-        return f"The property {left[0]} does not exist" if left else None
-
-    monkeypatch.setattr(derivation, "_failure", failure)
-    source = Source("mine", Path("mine.xml"))
-    assert derivation.try_out(source) == tuple(lacking)
-    lacking.append("of/20")
-    with pytest.raises(SimulationFailed, match=r"^mine: The property of/20 does not exist"):
-        derivation.try_out(source)
-    monkeypatch.setattr(derivation, "_failure", lambda source, absent: "The property of/0 does not exist")
-    with pytest.raises(SimulationFailed, match="of/0"):
-        derivation.try_out(source)
-
-
 def test_a_copy_of_the_model_is_put_on_trial(monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        derivation, "failure_of_trial", lambda model, absent: asked.append((model, absent)) or "no"
-    )
-    assert derivation._failure(Source("mine", TRAINER / "trainer.xml"), ["of/0"]) == "no"
-    ((model, absent),) = asked
-    assert (model.name, model.parent.name, absent) == ("trainer.xml", "mine", ["of/0"])
+    monkeypatch.setattr(derivation, "lacking_in_trial", lambda model: asked.append(model) or ["of/0", "of/1"])
+    source = Source("mine", TRAINER / "trainer.xml")
+    assert derivation.try_out(source) == ("of/0", "of/1")
+    (model,) = asked
+    assert (model.name, model.parent.name) == ("trainer.xml", "mine")
     assert model.parent != TRAINER
+
+    def fails(model):
+        raise SimulationFailed("no")
+
+    monkeypatch.setattr(derivation, "lacking_in_trial", fails)
+    with pytest.raises(SimulationFailed, match=r"^mine: no$"):
+        derivation.try_out(source)
 
 
 def test_the_envelope_is_about_trim_unless_somebody_says_where():
@@ -169,13 +157,11 @@ def test_where_to_sample_is_read_from_a_file(tmp_path):
 def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeypatch, tmp_path):
     """One speed that is wished for is tried alone; without, five."""
     tried = []
-    names = "surfaces_of", "instrument_model"
-    monkeypatch.setattr(derivation, names[0], lambda model: ["aileron", "elevator", "rudder"])
-    monkeypatch.setattr(derivation, names[1], lambda *of, **how: Path("copy.xml"))
-    monkeypatch.setattr(derivation, "is_known_to_jsbsim", lambda name: name == "of/told")
-    monkeypatch.setattr(derivation, "try_out", lambda source: ("of/told", "of/other"))
-    monkeypatch.setattr(outline, "travel_of", lambda *of: {})
-    monkeypatch.setattr(outline, "own_control", lambda *of: ["note of its control"])
+    surfaces = Surfaces({}, {}, {}, {}, ("note of a surface",))
+    monkeypatch.setattr(derivation, "instrument_model", lambda *of, **how: Path("copy.xml"))
+    monkeypatch.setattr(derivation, "_own", lambda source, folder: (folder / "own.xml", ("of/other",)))
+    monkeypatch.setattr(derivation, "find_surfaces", lambda source, own, named: surfaces)
+    monkeypatch.setattr(outline, "own_control", lambda *of: (["note of its control"], {"of/tab"}))
     monkeypatch.setattr(
         outline, "outline", lambda name, model, travel, lift: {"lift": lift, "start": {}, "envelope": {}}
     )
@@ -183,19 +169,17 @@ def test_a_wish_for_speed_and_altitude_is_in_every_outline_that_is_tried(monkeyp
     monkeypatch.setattr(outline, "level_flight", lambda of, folder, notes: tried.append(of) or level)
     source, folder, told = Source("mine", Path("mine.xml")), tmp_path / "new" / "mine", []
     notes = []
-    derivation._prepared(source, folder, outline.EnvelopeFile(), notes, told.append)
+    _, pair = derivation._prepared(source, folder, outline.EnvelopeFile(), notes, told.append)
+    assert pair == derivation.Pair(tmp_path / "own" / "own.xml", Path("copy.xml"), surfaces, {"of/tab"})
     wish = outline.EnvelopeFile(airspeed_mps=(42.0, 58.0), altitude_m=300.0)
     derivation._prepared(source, folder, wish, [], told.append)
     assert tried == [
         [{"lift": lift, "start": {}, "envelope": {}} for lift in (0.45, 0.3, 0.2, 0.12, 0.7)],
         [{"lift": 0.45, "start": {"altitude_m": 300.0}, "envelope": {"airspeed_mps": [42.0, 58.0]}}],
     ]
-    assert notes == ["JSBSim alone gives it no of/other: 0 in the copy", "note of its control"]
+    of_control = "note of a surface", "note of its control"
+    assert notes == ["JSBSim alone gives it no of/other: 0 in the copy", *of_control]
     assert told == ["instrument", "trim"] * 2
-    for seen, says in ((["aileron", "rudder"], "only on aileron, rudder"), ([], "on no surface")):
-        monkeypatch.setattr(derivation, names[0], lambda model, seen=seen: seen)
-        with pytest.raises(BadInput, match=f"^mine: its aerodynamics depend {says}, allowed: aileron"):
-            derivation._prepared(source, folder, wish, [], told.append)
 
 
 @pytest.mark.parametrize("regions", [1, 3])
@@ -396,8 +380,9 @@ def test_a_gear_that_its_power_does_not_carry_is_retracted_in_the_copy(
     copies, tried = [], []
     folder = tmp_path / "new" / "mine"
 
-    def instrument_model(model, into, travel, absent, gear_up=False, apart=False):
+    def instrument_model(model, into, travel, absent, gear_up=False, apart=False, views=None):
         assert not (into == folder and folder.exists())
+        assert (views == "views") is (into == folder)
         into.mkdir(parents=True, exist_ok=True)
         copies.append((into, travel, absent, gear_up, apart))
         return into / "mine.xml"
@@ -409,22 +394,24 @@ def test_a_gear_that_its_power_does_not_carry_is_retracted_in_the_copy(
 
     names = {"gear/gear-pos-norm"} if seen else {"gear/other"}
     for name, instead in (
-        ("surfaces_of", lambda model: ["aileron", "elevator", "rudder"]),
-        ("instrument_model", instrument_model), ("try_out", lambda source: ("of/lacking",)),
-        ("is_known_to_jsbsim", lambda name: False), ("seen_by_aerodynamics", lambda model: frozenset(names)),
+        ("find_surfaces", lambda source, own, named: Surfaces({}, {}, {"aileron": (-0.2, 0.3)}, "views")),
+        ("instrument_model", instrument_model),
+        ("_own", lambda source, into: (into / "x.xml", ("of/lacking",))),
+        ("seen_by_aerodynamics", lambda model: frozenset(names)),
         ("_with_engines", lambda source, level, into: ("with engines", level, into)),
     ):  # fmt: skip
         monkeypatch.setattr(derivation, name, instead)
-    monkeypatch.setattr(outline, "travel_of", lambda *of: {"aileron": (-0.2, 0.3)})
-    monkeypatch.setattr(outline, "own_control", lambda *of: [])
+    monkeypatch.setattr(outline, "own_control", lambda *of: ([], ()))
     monkeypatch.setattr(outline, "outline", lambda *of: {})
     monkeypatch.setattr(outline, "level_flight", level_flight)
     notes, source = [], Source("mine", Path("mine.xml"))
-    level = derivation._prepared(source, folder, outline.EnvelopeFile(), notes, str, engines)
+    level, pair = derivation._prepared(source, folder, outline.EnvelopeFile(), notes, str, engines)
     travel, absent = {"aileron": (-0.2, 0.3)}, ("of/lacking",)
     copy = (folder, travel, absent, False, engines)
-    again = [(folder, travel, absent, True, engines)] if retracted else []
-    assert copies == [(tmp_path / "own", {}, absent, False, False), copy, *again]
+    up = tmp_path / "own" / "gear-up" / "mine"
+    again = [(folder, travel, absent, True, engines), (up, {}, absent, True, False)] if retracted else []
+    assert copies == [copy, *again]
+    assert pair.own == (up / "mine.xml" if retracted else tmp_path / "own" / "x.xml")
     assert tried == [folder] * (1 + retracted)
     gear = ["its landing gear is retracted in the copy: with it, its power does not hold it level"]
     said = [*gear, "said at try 2"] if retracted else ["said at try 1"]

@@ -283,7 +283,7 @@ def test_other_stops_leave_a_deflection_its_moment(tmp_path):
         fdm["actuators/elevator/position-max-rad"] = stop
         fdm["fcs/actuated-elevator-cmd-rad"] = 0.15
         fdm.run_ic()
-        seen.append(fdm["fcs/actuated-elevator-effective-norm"])
+        seen.append(fdm["fcs/effective-elevator-pos-norm"])
     assert seen == pytest.approx([0.5, 0.5])
 
 
@@ -372,10 +372,12 @@ def test_what_cannot_be_derived_is_refused_in_a_line(tmp_path, quick):
 
 def test_what_jsbsim_cannot_fly_is_said_in_a_line(tmp_path):
     """Its model ends the process that loads it."""
-    model = "jsbsim:Short_S23: JSBSim cannot load Short_S23/Short_S23.xml"
-    with pytest.raises(SimulationFailed, match=f"^{model}: it needs the file hydrodynamics.xml, which "):
-        derive("jsbsim:Short_S23", tmp_path)
-    assert list(tmp_path.iterdir()) == []
+    text = (Path(__file__).parents[4] / "examples" / "own-aircraft" / "navion.xml").read_text()
+    (tmp_path / "navion.xml").write_text(text.replace("<propulsion/>", '<system file="hydrodynamics_"/>'))
+    says = r"^navion: JSBSim cannot load navion/navion.xml: it needs the file hydrodynamics_.xml, which "
+    with pytest.raises(SimulationFailed, match=says):
+        derive(str(tmp_path / "navion.xml"), tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["navion.xml"]
 
 
 def test_the_list_names_them():

@@ -17,7 +17,8 @@ DOCUMENT = {
     "smallest_certain_loss": {"aileron": 0.25, "elevator": 1.0, "rudder": 2.1},
     "own_file": [{"term": "Cm_alpha", "own": -0.6123456, "found": -0.59}],
     "notes": ["no flap", "no engine"], "further_surfaces": {"spoiler": "fcs/spoiler-pos-rad", "slat": "x"},
-    "took_s": 12.34,
+    "took_s": 12.34, "copy_off": {"share": 0.02, "where": "2.00% in roll"},
+    "files": {"Engines/motor.xml": "../../engine", "Systems/a.xml": "."},
 }  # fmt: skip
 
 
@@ -36,12 +37,15 @@ def test_a_derivation_as_text():
         "   rudder                   6.3 deg  none: a total one needs 6.3 deg",
         " coefficient                 own file       found",
         "   Cm_alpha                  -0.61235       -0.59",
+        " copy       off the model by at most 2.00% in roll",
+        " files      Engines/motor.xml from ../../engine, Systems/a.xml from .",
         " note: no flap",
         " note: no engine",
         f" not used: spoiler, slat: {WHY_NOT_USED}",
         " written in 12.3 s to out/glider, with a page on it, derived.md",
     ]
-    short = derived.text_of({**DOCUMENT, "own_file": None, "notes": [], "further_surfaces": {}}).splitlines()
+    none = {"own_file": None, "notes": [], "further_surfaces": {}, "copy_off": None, "files": {}}
+    short = derived.text_of({**DOCUMENT, **none}).splitlines()
     assert len(short) == 12
     assert short[-1].startswith(" written in")
 

@@ -46,19 +46,3 @@ def test_surfaces_go_where_their_own_flight_control_takes_them(found):
     throttle = found["engine"]["settings"]["throttle"]
     assert (throttle["default"], throttle["range"]) == (0.6, [0.0, 1.0])
     assert outline.outline("172x", Path("172x.xml"), TRAVEL, 0.5)["name"] == "a172x"
-
-
-ENDS = [
-    ((-0.3, 0.25), (-0.3, 0.25), 0), ((0.2, -0.4), (-0.4, 0.2), 0), ((-2.0, 1.9), (-1.2, 1.2), 0),
-    ((0.0, 0.0), (-0.35, 0.35), 1), ((-0.3, 0.02), (-0.35, 0.35), 1), ((-0.02, 0.3), (-0.35, 0.35), 1),
-    ((float("nan"), 0.3), (-0.35, 0.35), 1),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("ends", "travel", "noted"), ENDS)
-def test_travel_is_from_stop_to_stop_or_supposed_and_noted(ends, travel, noted, monkeypatch):
-    monkeypatch.setattr(outline, "surfaces_of", lambda source: ["elevator"])
-    monkeypatch.setattr(outline, "own_deflection", lambda model, surface, command: ends[command > 0])
-    notes = []
-    assert outline.travel_of(Path("a.xml"), Path("b.xml"), notes) == {"elevator": travel}
-    assert len(notes) == noted

@@ -107,27 +107,32 @@ def test_what_does_not_come_to_rest_moves_by_itself(monkeypatch):
 
 
 def test_what_its_own_control_does_beside_is_noted(monkeypatch):
-    surfaces, others = ["aileron", "elevator", "rudder"], ["fcs/flap", "fcs/slat", "fcs/tab"]
-    answer = {"aileron": 0.0031, "elevator": 0.0029, "rudder": -0.01}  # rad: 0.003 is too much
-    along = {"fcs/aileron-cmd-norm": [0.1, 0.2, 0.5], "fcs/rudder-cmd-norm": [0.1, 0.2000004, 0.3]}
-    monkeypatch.setattr(outline, "surfaces_of", lambda source: surfaces)
-    monkeypatch.setattr(outline, "others_of", lambda source: others)
-    monkeypatch.setattr(
-        outline, "own_deflection",
-        lambda model, surface, command, rate=0.0: 0.2 + answer[surface] * (rate == 0.1) + command,
-    )  # fmt: skip
+    """The rudder's deflection is the mean of two, the second of the other sign."""
+    others = ("fcs/flap", "fcs/slat", "fcs/tab")
+    turned = {"left": 0.0031, "elevator": 0.0029, "upper": -0.02, "lower": 0.01}  # rad: 0.003 is too much
+    read = {
+        "aileron": [("left", 1.0)],
+        "elevator": [("elevator", 1.0)],
+        "rudder": [("upper", 1.0), ("lower", -1.0)],
+    }
+    monkeypatch.setattr(outline, "others_of", lambda source, ours: others if ours == ("ours",) else ())
+    monkeypatch.setattr(outline, "moved_by", lambda model, of, names: [names[2]] if of == "aileron" else [])
 
     def settled(model, given, names):
-        assert names == others
-        return along.get(next((name for name, value in given.items() if value == 1.0), None), [0.1, 0.2, 0.3])
+        assert given in ({}, {f"ic/{axis}-rad_sec": 0.1 for axis in "pqr"})
+        return [0.2 + turned[name] * bool(given) for name in names]
 
-    monkeypatch.setattr(outline, "_settled", settled)
+    monkeypatch.setattr(outline, "settled", settled)
+    surfaces = SimpleNamespace(read=read, names=("ours",))
     ends = "at 5.7 deg/s, command or not: the copy flies without"
-    assert outline.own_control(Path("a.xml"), Path("b.xml")) == [
-        f"aileron: its own flight control moves it 0.2 deg {ends}",
-        f"rudder: its own flight control moves it -0.6 deg {ends}",
-        "aileron: its command moves fcs/tab too: in the copy it does not",
-    ]
+    assert outline.own_control(Path("a.xml"), Path("b.xml"), surfaces) == (
+        [
+            f"aileron: its own flight control moves it 0.2 deg {ends}",
+            f"rudder: its own flight control moves it -0.9 deg {ends}",
+            "aileron: its command moves fcs/tab too: in the copy it does not",
+        ],
+        {"fcs/tab"},
+    )
 
 
 def test_other_surfaces_are_those_of_flight_control_that_nobody_commands_with(monkeypatch):
@@ -139,9 +144,12 @@ def test_other_surfaces_are_those_of_flight_control_that_nobody_commands_with(mo
         "fcs/slat",
         "fcs/x",
     ]
-    monkeypatch.setattr(outline, "others_of", lambda source: names)
+    monkeypatch.setattr(outline, "others_of", lambda source, ours: names if ours == ["of/it"] else ())
     plant = Bench({"fcs/flap-pos-deg": lambda bench: 12.34567, "fcs/slat": lambda bench: 0.0})
-    assert outline.further_surfaces(Path("a.xml"), plant) == {"fcs/flap-pos-deg": 12.3457, "fcs/slat": 0.0}
+    assert outline.further_surfaces(Path("a.xml"), plant, ["of/it"]) == {
+        "fcs/flap-pos-deg": 12.3457,
+        "fcs/slat": 0.0,
+    }
 
 
 WEIGHT = outline.LB_PER_SLUG * 70.0
@@ -186,7 +194,7 @@ def test_thrust_of_what_jsbsim_cannot_fly_is_none(monkeypatch):
 STARTS = [
     ({"steady": 0.02}, "steady", 0), ({"steady": 0.01, "run_up": 0.011}, "run_up", 0),
     ({"steady": None, "run_up": 0.0, "off": 0.0}, "run_up", 1), ({"steady": 0.0}, "steady", 1),
-    ({}, "off", 1), ({"off": 0.3}, "off", 0),
+    ({}, "run_up", 1), ({"off": 0.3}, "off", 0),
 ]  # fmt: skip
 
 
@@ -194,14 +202,15 @@ STARTS = [
 def test_engines_are_started_as_they_come_to_run(shares, start, notes, monkeypatch):
     data = {"engine": {}}
 
-    def plant_of(data, folder):
+    def plant_of(data, folder, substeps=1):
         return SimpleNamespace(n_engines=1, how=data["engine"].get("start"))
 
     monkeypatch.setattr(outline, "plant_of", plant_of)
     monkeypatch.setattr(outline, "_steady_thrust", lambda plant: shares.get(plant.how))
+    monkeypatch.setattr(outline, "why_no_power", lambda plant_of: f"because of {plant_of(1).how}")
     said = outline.choose_start(data, Path())
     assert (data["engine"]["start"], len(said)) == (start, notes)
-    assert not said or said[0].endswith("it is flown gliding")
+    assert said == [f"its engines do not carry it, because of {start}: it is flown gliding"] * notes
     monkeypatch.setattr(outline, "plant_of", lambda data, folder: SimpleNamespace(n_engines=0))
     assert outline.choose_start(data, Path()) == ["it has no engine: trim is a glide"]
 
@@ -259,15 +268,25 @@ def test_the_first_speed_that_trims_is_taken(gammas, engines, notes, monkeypatch
     assert [line.partition(":")[0] for line in said] == ["before", *notes]
 
 
-def test_that_no_speed_trims_is_said_with_the_reason_of_the_first(monkeypatch):
+@pytest.mark.parametrize(
+    ("engines", "finite", "says"),
+    [
+        (0, False, r"^one: not one$"),
+        (1, True, r"^one: not one$"),
+        (2, False, r"^one: a propeller, allowed: engines"),
+    ],
+)
+def test_that_no_speed_trims_is_said_with_the_reason_of_the_first(engines, finite, says, monkeypatch):
     def level_trim(plant, data):
         raise (BadInput if data["name"] == "one" else SimulationFailed)(f"not {data['name']}")
 
     monkeypatch.setattr(outline, "level_trim", level_trim)
     monkeypatch.setattr(outline, "choose_start", lambda data, folder: ["chosen"])
-    monkeypatch.setattr(outline, "plant_of", lambda data, folder: None)
+    monkeypatch.setattr(outline, "plant_of", lambda data, folder: SimpleNamespace(n_engines=engines))
+    monkeypatch.setattr(outline, "run_engines", lambda plant, lever: SimpleNamespace(finite=finite))
+    monkeypatch.setattr(outline, "why_no_power", lambda plant_of: "a propeller")
     notes = []
-    with pytest.raises(BadInput, match=r"^one: not one$"):
+    with pytest.raises(BadInput, match=says):
         outline.level_flight([{"name": "one"}, {"name": "two"}], Path(), notes)
     assert notes == []
 
@@ -281,29 +300,3 @@ def test_terms_have_the_names_of_an_aircrafts_own_file():
     assert [term["name"] for term in found["Cm"]] == ["Cm_de", "Cm_new", "Cm_alpha2"]
     assert [term["name"] for term in found["Cl"]] == ["Cl_new"]
     assert outline.usual_start(beaver) == {"airspeed_mps": 45.0, "altitude_m": 1828.8}
-
-
-def test_its_own_flight_control_is_asked_where_it_puts_a_surface_once_it_has_settled(monkeypatch):
-    """400 frames from what is given, flying nowhere: initialised again before every tenth."""
-    done = []
-
-    class Executive(dict):
-        def run_ic(self):
-            done.append("initialised")
-
-        def run(self):
-            done.append("run")
-            self["fcs/elevator-pos-rad"] = 0.3 * self["fcs/elevator-cmd-norm"] - 2.0 * self["ic/q-rad_sec"]
-            self["fcs/left-aileron-pos-rad"] = self["ic/p-rad_sec"] + 0.1 * self["fcs/aileron-cmd-norm"]
-            self["fcs/rudder-pos-rad"] = self["ic/r-rad_sec"] * self["fcs/rudder-cmd-norm"]
-
-    asked = []
-    usual = {f"fcs/{name}-cmd-norm": 0.0 for name in ("aileron", "elevator", "rudder")}
-    monkeypatch.setattr(outline, "bare", lambda model: asked.append(model) or Executive(usual))
-    model = Path("m.xml")
-    assert outline.own_deflection(model, "elevator", -0.5) == pytest.approx(-0.15)
-    assert done == (["initialised"] + ["run"] * 10) * 40
-    assert outline.own_deflection(model, "elevator", 0.5, 0.1) == pytest.approx(0.15 - 0.2)
-    assert outline.own_deflection(model, "aileron", 1.0, 0.1) == pytest.approx(0.2)
-    assert outline.own_deflection(model, "rudder", 0.5, 0.3) == pytest.approx(0.15)
-    assert asked == [model] * 4

@@ -1,0 +1,311 @@
+"""Other authors' aircraft as a user has them: where their files lie, what their engines lack, wings alone."""
+
+import re
+
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant import instrumented
+from beaver_ftc.plant.adapter import bare
+from beaver_ftc.plant.model_file import package
+from beaver_ftc.scenario.schema import load_text
+from beaver_ftc_aircraft.derive import derivation, outline
+from beaver_ftc_aircraft.derive.derivation import source_of
+from beaver_ftc_aircraft.derive.derived import document_of, page_of, text_of
+
+from . import foreign
+
+MOTOR = '<electric_engine name="motor"> <power unit="WATTS"> {} </power> </electric_engine>'
+PROPELLER = package() / "engine" / "prop_75in2f.xml"
+
+
+@pytest.fixture
+def prepared(tmp_path, monkeypatch):
+    """What comes of a model up to where it is sampled, its notes, and how to prepare one."""
+
+    def ends(*of):
+        raise StopIteration
+
+    monkeypatch.setattr(derivation, "_derived", ends)
+    compared = derivation._compared
+
+    def prepare(path, envelope=None):
+        seen = {}
+
+        def keep(source, pair, airspeed_mps, notes, tell):
+            seen.update(pair=pair, notes=notes, off=compared(source, pair, airspeed_mps, notes, tell))
+            seen["power_hp"] = of_full_power(pair.copy)
+            return seen["off"]
+
+        monkeypatch.setattr(derivation, "_compared", keep)
+        with pytest.raises(StopIteration):
+            derivation.derive(str(path), tmp_path / "out", envelope)
+        return seen
+
+    return prepare
+
+
+def of_full_power(model):
+    fdm = bare(model)
+    if fdm.get_propulsion().get_num_engines() == 0:
+        return None
+    fdm["fcs/actuated-throttle-norm"] = 1.0
+    for _ in range(3):
+        fdm.run()
+    return fdm["propulsion/engine/power-hp"]
+
+
+PLACES = {
+    "beside aircraft/": ("my_motor", {"engine/my_motor.xml": 14000}, 14000),
+    "of the package's name": ("electric147kW", {"engine/electric147kW.xml": 14000}, 14000),
+    "named like the model": ("navion", {"aircraft/navion/Engines/navion.xml": 14000}, 14000),
+    "its own before the shared": (
+        "m", {"engine/m.xml": 9000, "aircraft/navion/Engines/m.xml": 14000}, 14000,
+    ),
+    "none beside the model itself": ("electric147kW", {"aircraft/navion/electric147kW.xml": 14000}, 147000),
+    "of the package": ("electric147kW", {}, 147000),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PLACES)
+@pytest.mark.parametrize("apart", [False, True])
+def test_the_authors_engine_is_the_one_that_runs(case, apart, tmp_path, prepared):
+    """Where JSBSim looks, in its order; apart: the propulsion is in a file of its own."""
+    engine, motors, watts = PLACES[case]
+    for place, power in motors.items():
+        file = tmp_path / place
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(MOTOR.format(power))
+    text = foreign.powered(engine)
+    if apart:
+        section = re.search(r"<propulsion>.*</propulsion>", text, re.S).group(0)
+        text = text.replace(section, '<propulsion file="Propulsion"/>')
+        (tmp_path / "aircraft" / "navion").mkdir(parents=True, exist_ok=True)
+        (tmp_path / "aircraft" / "navion" / "Propulsion.xml").write_text(section)
+    path = foreign.write(tmp_path / "aircraft", text)
+    assert prepared(path.parent)["power_hp"] == pytest.approx(watts / 745.7, rel=1e-3)
+
+
+def test_a_file_of_the_layout_does_not_leave_it(tmp_path):
+    path = foreign.write(tmp_path / "mine" / "aircraft", foreign.powered("my_motor"))
+    (tmp_path / "elsewhere.xml").write_text(MOTOR.format(1000))
+    (tmp_path / "mine" / "engine").mkdir()
+    (tmp_path / "mine" / "engine" / "my_motor.xml").symlink_to(tmp_path / "elsewhere.xml")
+    with pytest.raises(BadInput, match=r"my_motor.xml:1: is a link out of the folder"):
+        source_of(str(path))
+
+
+ACTING = '<output name="{}" type="CSV" rate="10"/> <input port="1137"/>'
+
+
+def test_what_writes_or_listens_is_left_out_of_the_copy_and_said(tmp_path, prepared):
+    text = foreign.NAVION.replace("</fdm_config>", f"\n{ACTING.format(tmp_path / 'log.csv')}</fdm_config>")
+    found = prepared(foreign.write(tmp_path, text))
+    copied = found["pair"].own.read_text() if found["pair"].own.is_file() else ""
+    assert "<output name" not in copied
+    line = text[: text.index("<output name")].count("\n") + 1
+    where = f"of navion.xml, line {line} is left out of the copy"
+    assert [note for note in found["notes"] if "left out" in note] == [
+        f'<output name="{tmp_path}/log.csv" type="CSV" rate="10"> {where}',
+        f'<input port="1137"> {where}',
+    ]
+    assert not (tmp_path / "log.csv").exists()
+    child = text.replace("</fdm_config>", '<child name="drone"/></fdm_config>')
+    with pytest.raises(BadInput, match='<child name="drone"> loads another aircraft'):
+        source_of(str(foreign.write(tmp_path, child)))
+
+
+def law(value, output):
+    """A channel of the author's own that holds a property."""
+    held = f"<function> <value> {value} </value> </function> <output> {output} </output>"
+    return f'<channel name="law"> <fcs_function name="fcs/law"> {held} </fcs_function> </channel>'
+
+
+TINY = """<propeller name="tiny"> <ixx> 0.001 </ixx> <diameter unit="IN"> 10 </diameter>
+  <numblades> 2 </numblades>
+  <table name="C_THRUST" type="internal"> <tableData> 0 0.0123
+  1.2 -0.0011 </tableData> </table>
+  <table name="C_POWER" type="internal"> <tableData> 0 0.0082
+  1.2 -0.0007 </tableData> </table> </propeller>"""
+HELD = (
+    "its own flight control holds fcs/throttle-pos-norm[0] at {}, wherever its lever fcs/throttle-cmd-norm is"
+)
+REASONS = {
+    "empty tanks": (
+        foreign.powered("eng_io320", fuel=0),
+        r"its engines do not carry it, its tanks are empty; full, they let its engines give \d{4} N, 1\d\.",
+    ),
+    "a throttle of its own, closed": (
+        foreign.controlled(foreign.powered(), law(0, "fcs/throttle-pos-norm")),
+        re.escape(f"its engines do not carry it, {HELD.format(0)}: it is flown gliding"),
+    ),
+    "a lever of its own": (
+        foreign.controlled(foreign.powered(), law(0.05, "fcs/throttle-cmd-norm")),
+        re.escape(HELD.format(0.05)),
+    ),
+    "a throttle of its own, open": (
+        foreign.controlled(foreign.powered(), law(0.3, "fcs/throttle-pos-norm")),
+        re.escape(f"its power goes no further: {HELD.format(0.3)}"),
+    ),
+    "a weak engine": (
+        foreign.powered("weak"),
+        r"its engines do not carry it, at full power its engines give \d+ N, \d\.\d% of its weight, at 57",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REASONS)
+def test_why_engines_do_not_carry_it_is_found_and_said(case, tmp_path, prepared):
+    text, says = REASONS[case]
+    path = foreign.write(tmp_path, text)
+    (path.parent / "Engines").mkdir()
+    (path.parent / "Engines" / "weak.xml").write_text(MOTOR.format(14000))
+    notes = prepared(path)["notes"]
+    assert any(re.search(says, note) for note in notes), notes
+
+
+def test_a_propeller_that_diverges_is_named(tmp_path, prepared):
+    text = re.sub(r"<tank .*</tank>", "", foreign.powered("motor", "tiny"), flags=re.S)
+    for name, value in (
+        ("wingarea", 4.2),
+        ("wingspan", 5.9),
+        ("chord", 0.72),
+        ("ixx", 0.037),
+        ("iyy", 0.0125),
+        ("izz", 0.095),
+        ("emptywt", 4.4),
+    ):
+        text = re.sub(rf"(<{name} [^>]*>)[^<]*", rf"\g<1> {value} ", text, count=1)
+    path = foreign.write(tmp_path, text)
+    (path.parent / "Engines").mkdir()
+    (path.parent / "Engines" / "motor.xml").write_text(MOTOR.format(370))
+    (path.parent / "Engines" / "tiny.xml").write_text(TINY)
+    says = (
+        r"^navion: in frames of 10 ms the speed and the moment of its propeller are no finite numbers, in "
+        r"frames of 0.1 ms they are: its <ixx> is too small for the power of its engine, allowed: engines "
+    )
+    with pytest.raises(BadInput, match=says):
+        derivation.derive(str(path), tmp_path / "out")
+
+
+GEAR = {
+    "property": "<product> <property> gear/gear-pos-norm </property> <value> 0.35 </value> </product>",
+    "p": "<product> <p> gear/gear-pos-norm[0] </p> <v> 0.35 </v> </product>",
+    "table": """<table> <independentVar lookup="row"> gear/gear-pos-norm </independentVar>
+      <tableData> 0 0
+      1 0.35 </tableData> </table>""",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", GEAR)
+def test_a_gear_is_retracted_however_it_is_read(how, tmp_path, prepared):
+    drag = f"""<axis name="DRAG"> <function name="aero/gear"> <product> <property> aero/qbar-psf </property>
+      <property> metrics/Sw-sqft </property> {GEAR[how]} </product> </function>"""
+    found = prepared(foreign.write(tmp_path, foreign.powered().replace('<axis name="DRAG">', drag)))
+    assert [note for note in found["notes"] if "gear" in note or "sinks" in note] == [
+        "its landing gear is retracted in the copy: with it, its power does not hold it level"
+    ]
+    assert found["off"].share < 1e-3
+
+
+@pytest.mark.parametrize("n", [1, 21, 60])
+def test_properties_of_flightgear_in_any_number_are_0(n, tmp_path, prepared):
+    names = [f"/controls/lamp/state-{i}" for i in range(n)]
+    lamps = "".join(f"<property> {name} </property>" for name in names)
+    sums = f"<function> <sum> {lamps} <value> 0 </value> </sum> </function>"
+    channel = f'<channel name="lamps"> <fcs_function name="fcs/lamps"> {sums} </fcs_function> </channel>'
+    found = prepared(foreign.write(tmp_path, foreign.controlled(foreign.NAVION, channel)))
+    assert found["notes"][0] == f"JSBSim alone gives it no {', '.join(names)}: 0 in the copy"
+
+
+TOLD = {
+    "a glider's lever": (foreign.NAVION, "/controls/engines/engine/throttle"),
+    "the lever of an engine it has not": (foreign.powered(), "/controls/engines/engine[3]/throttle"),
+    "the manifold pressure of a motor": (foreign.powered(), "/engines/engine/mp-inhg"),
+}
+
+
+@pytest.mark.parametrize("case", TOLD)
+def test_what_flightgear_tells_of_an_engine_that_has_it_not_is_0(case, tmp_path, prepared):
+    text, name = TOLD[case]
+    reads = f"<function> <property> {name} </property> </function>"
+    channel = f'<channel name="lever"> <fcs_function name="fcs/lever"> {reads} </fcs_function> </channel>'
+    notes = prepared(foreign.write(tmp_path, foreign.controlled(text, channel)))["notes"]
+    assert re.match(r"JSBSim alone gives it no .*: 0 in the copy$", notes[0])
+
+
+@pytest.fixture(scope="module")
+def wing(tmp_path_factory):
+    """An aircraft without a rudder, derived from few states."""
+    folder = tmp_path_factory.mktemp("wing")
+    path = foreign.write(folder, foreign.powered(text=foreign.wing()), "wing")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(derivation, "SAMPLES", 300)
+        patched.setattr(derivation, "CHECKED", 400)
+        return derivation.derive(str(path), folder / "out"), folder / "out"
+
+
+def test_a_wing_without_a_rudder_is_an_aircraft(wing):
+    made, folder = wing
+    assert made.aircraft.surfaces == ("aileron", "elevator")
+    assert "it has no rudder: its command moves nothing that its aerodynamics read" in made.notes
+    assert 0.0 < abs(made.trim.phi_rad) < 0.05  # what its propeller turns it, a little bank holds
+    assert max(map(abs, made.trim.residual)) < 1e-8
+    text = "name: w\naircraft: ./wing\nduration_s: 14\nreference: {p: [{doublet: {amplitude_deg_s: 4, start_s: 2, width_s: 2}}]}\n"  # noqa: E501
+    healthy = fly(load_text(text, folder=folder))
+    assert (healthy.detection_time_s, healthy.departure) == (None, None)
+    for surface in made.aircraft.surfaces:
+        loss = {"actuator": surface, "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 8}
+        faulty = fly(load_text(text, folder=folder).with_({"faults": [loss]}))
+        assert (faulty.isolated, faulty.departure) == (surface, None)
+
+
+@pytest.mark.parametrize(
+    ("key", "name"), [("control.law", "indi"), ("control.law", "lqr"), ("fdi.scheme", "multiple-models")]
+)
+def test_laws_and_schemes_that_need_a_surface_for_each_axis_say_so(key, name, wing):
+    _, folder = wing
+    section, _, word = key.partition(".")
+    text = f"name: w\naircraft: ./wing\n{section}: {{{word}: {name}}}\n"
+    says = f"{key}: {name} needs a surface for each of roll, pitch and yaw, wing has aileron, elevator"
+    with pytest.raises(BadInput, match=says):
+        load_text(text, folder=folder)
+    changed = f"name: w\naircraft: ./wing\nchanges: [{{at_s: 3, {word}: {name}}}]\n"
+    with pytest.raises(BadInput, match=rf"changes\[0\].{word}: {name} needs a surface for each"):
+        load_text(changed, folder=folder)
+
+
+def test_where_files_come_from_is_in_all_that_is_said(wing):
+    made, _ = wing
+    files = {f"Engines/{name}.xml": "the jsbsim package" for name in ("electric147kW", "prop_75in2f")}
+    document = document_of(made)
+    assert document["files"] == files
+    assert document["copy_off"] == {"share": 0.0, "where": "0.01%"}
+    assert " files      Engines/electric147kW.xml from the jsbsim package, Engines/prop" in text_of(document)
+    assert "| `Engines/electric147kW.xml` | the jsbsim package |" in page_of(made)
+
+
+def test_a_map_of_surfaces_is_read_from_the_envelope_file(tmp_path, prepared):
+    file = tmp_path / "envelope.yaml"
+    file.write_text(
+        "surfaces: {aileron: fcs/posAil_rad, elevator: [fcs/posElev_rad], rudder: fcs/posRud_rad}\n"
+    )
+    path = foreign.write(tmp_path, foreign.renamed())
+    assert prepared(path, file)["off"].share < 1e-3
+    assert outline.read_envelope(file).surfaces["aileron"] == ("fcs/posAil_rad",)
+    for wrong, says in (("flap: fcs/x", "flap"), ("aileron: []", "aileron"), ("aileron: ../x y", "aileron")):
+        file.write_text(f"surfaces: {{{wrong}}}\n")
+        with pytest.raises(BadInput, match=says):
+            outline.read_envelope(file)
+
+
+def test_engines_in_a_file_of_their_own_are_counted(tmp_path):
+    path = foreign.write(tmp_path, foreign.NAVION.replace("<propulsion/>", '<propulsion file="P"/>'))
+    (path.parent / "P.xml").write_text(
+        re.search(r"<propulsion>.*</propulsion>", foreign.powered(), re.S).group(0)
+    )
+    assert instrumented.engines_of(path) == 1
+    (path.parent / "P.xml").unlink()
+    with pytest.raises(BadInput, match=r"navion.xml: needs P for its propulsion, which is not there"):
+        instrumented.engines_of(path)

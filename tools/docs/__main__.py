@@ -3,6 +3,7 @@
 python -m tools.docs [PAGE ...]    write every cheap block, number and picture again
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
+python -m tools.docs cells PAGE    print the tables of a page as JSON, for numbers in the prose beside them
 python -m tools.docs screens       take the pictures of report and live page again, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
 python -m tools.docs prose         print how often each page breaks a rule of prose.py, as prose.yaml has it
@@ -22,6 +23,7 @@ def main() -> int:
     first = sys.argv[1] if len(sys.argv) > 1 else ""
     printers = {
         "table": _table,
+        "cells": _cells,
         "constants": _constants,
         "properties": _properties,
         "reference": _reference,
@@ -90,6 +92,13 @@ def _table(name: str = "") -> str:
     from tools.docs.tables import table
 
     return table(name)
+
+
+def _cells(name: str = "") -> str:
+    from tools.docs.cells import cells
+    from tools.docs.pages import chosen
+
+    return json.dumps(cells(chosen([name])[0].read_text(encoding="utf-8")), indent=1)
 
 
 def _constants() -> str:

@@ -75,6 +75,11 @@ TABLE = (
         r"\1 --no-report && \1\2 --no-report && python worst-so-far.py",
     ),
     Exempt(r"python worst-so-far\.py", "reads a search: runs with the replay of its worst flight"),
+    Exempt(
+        r"python (closeup|residual)\.py",
+        "draws a flight: after the run that the page shows before it",
+        r"beaver-ftc run elevator-partial-loss --no-report && python \1.py",
+    ),
     Exempt(r"\. \.venv/bin/activate", "in a checkout, after make demo has made the environment"),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),

@@ -45,7 +45,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tools.docs", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("pages", nargs="*", metavar="PAGE", help="theory, theory.md; all without any")
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help="detection, detection.md; all without any")
     parser.add_argument("--check", action="store_true", help="write nothing, print what differs")
     parser.add_argument("--dear", action="store_true", help="fly what takes long as well")
     parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")

@@ -19,27 +19,11 @@ public function, class and record, for readers who write Python. [Python](refere
 use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
 READING = """## How to read an entry
 
-- **Heading.** The name without `beaver_ftc.` in front. A name without a dot needs no further import: for the
-  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write
-  `from beaver_ftc.results.model import Fault`.
-- **Signature.** The value after `=` is the default of an argument. `= ...` means that the default is
-  computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The text
-  below the signature explains the types.
-- **Arguments and fields.** Each item of a list has the name, the shape if it is an array, the unit, and the
-  meaning.
-- **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
-  each surface, in the order of the aircraft file. `(3, surfaces)` has three rows, and one column for each
-  surface. The letters n and m stand for other sizes.
-- **Units.** If a name ends in a unit, its value has this unit, for example `altitude_m`. Otherwise the text
-  states the unit.
-- **Methods.** The methods of a class follow the class. Each heading has the name of the class in front. Call
-  the method of an object instead: for the heading `Flight.plot` write `flight.plot(...)`.
-- **Errors.** The text after "Raises" names the exceptions of the package. [Errors](#errors) explains the two
-  base classes.
-
-The records of a flight have the fields of `metrics.json`. The table of a sweep has these fields as columns
-with dotted names: the column `isolation.withdrawn` is the field `withdrawn` of `Isolation`.
-[Columns](reference/columns.md) lists all of these columns."""
+The heading is the name without `beaver_ftc.` in front. The value after `=` is the default of an argument, and
+arguments after `*` must be given by name. This page has the first sentence of each entry. The whole text, with
+arguments, fields, shapes, units and errors, is in the docstring: the web site shows it below the same headings, and
+Python prints it by `help(bf.fly)`. The records of a flight have the fields of `metrics.json`;
+[columns](reference/columns.md) lists them with their units."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
@@ -117,7 +101,7 @@ SAYS = {
 
 
 def page() -> str:
-    """The page, for a terminal or a reader of Markdown."""
+    """The page for a terminal or a reader of Markdown: signatures, and the first words of each docstring."""
     return _joined(_described)
 
 
@@ -174,7 +158,7 @@ def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
     own = vars(what) if name.startswith(RECORDS) else None
     yield f"### {name}"
     yield f"```python\n{_signature(name.rpartition('.')[2], what)}\n```"
-    yield _text(what)
+    yield _first(what)
     if inspect.isclass(what):
         for member, of in inspect.getmembers(what, inspect.isfunction):
             shown = member in members if members else not member.startswith("_")
@@ -185,9 +169,7 @@ def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
                 and of.__module__.startswith("beaver_ftc")
             ):
                 called = f"{name.rpartition('.')[2]}.{member}"
-                yield f"**{called}**"
-                yield f"```python\n{_signature(called, of)}\n```"
-                yield _text(of)
+                yield f"`{_one_line(_signature(called, of))}`: {_first(of)}"
 
 
 def _signature(name: str, what: Any) -> str:
@@ -229,5 +211,10 @@ def _arguments(inside: str) -> list[str]:
     return found
 
 
-def _text(what: Any) -> str:
-    return inspect.getdoc(what) or ""
+def _one_line(signature: str) -> str:
+    return re.sub(r"\(\s+", "(", re.sub(r",?\s+\)", ")", " ".join(signature.split())))
+
+
+def _first(what: Any) -> str:
+    """The first paragraph of the docstring."""
+    return (inspect.getdoc(what) or "").partition("\n\n")[0]

@@ -17,7 +17,8 @@ PARSER: Any = typer.main.get_command(app)
 
 _SAYS = """Which options does each command have, and which exit status? This page lists every command of
 `beaver-ftc` for readers who already know the command. If you do not know it, begin with [which command answers my
-question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints the text of one command.
+question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints more about one command:
+what it computes, and which files it writes.
 
 ## How to read an entry
 
@@ -95,7 +96,7 @@ def _described(
     """What it does, how it is called, its options, its examples."""
     context = command.make_context(called, [], resilient_parsing=True)
     yield f"```text\n{' '.join([called, *command.collect_usage_pieces(context)])}\n```"
-    yield "\n\n".join(_in_html(" ".join(part.split())) for part in command.help.split("\n\n"))
+    yield _in_html(command.help.split("\n\n")[0])
     own = [row for row in rows if row not in shared]
     if own:
         yield markdown_table(_HEAD, own)

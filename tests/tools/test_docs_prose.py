@@ -20,7 +20,7 @@ KEEPS = {
 BREAKS = {
     "caption": (f"The travel follows.\n\n{TABLE}", "caption", 3),
     "second table": (f"*Table 1. Travel.*\n\n{TABLE}\n{TABLE}", "caption", 7),
-    "symbol": (r"The angle $\xi_1$ is small.", "symbol", 1),
+    "symbol": (r"The angle $\Lambda_1$ is small.", "symbol", 1),
     "symbol on a line of its own": ("It holds:\n\n$$x\n= \\Xi$$\n", "symbol", 3),
     "verb": ("It moves. Largest error of the worst signal.", "verb", 1),
     "verb in an item": ("- it moves.\n- the largest error of the worst signal.\n", "verb", 2),

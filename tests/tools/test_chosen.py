@@ -14,12 +14,12 @@ from tools.docs.tables.chosen import (
     ORIGINS,
     RATIO_DRAWS,
     TUNED_DRAWS,
-    _said,
-    choices,
     _constants,
     _flights,
-    draws_of,
     _others,
+    _said,
+    choices,
+    draws_of,
     not_chosen_constants,
 )
 

@@ -20,7 +20,9 @@ def cells(text: str) -> dict[str, list[dict[str, str | int | float]]]:
         number = caption[1] if caption else number
         if number and number not in found and _RULE.fullmatch(line.strip()):
             names = [_name(head) for head in _row(lines[at - 1])]
-            found[number] = [dict(zip(names, map(_value, row), strict=True)) for row in _rows(lines[at + 1 :])]
+            found[number] = [
+                dict(zip(names, map(_value, row), strict=True)) for row in _rows(lines[at + 1 :])
+            ]
     return found
 
 

@@ -76,8 +76,8 @@ values are those of [TM88].
 _EXAMPLE = "aero/coefficient/CX_dfa"
 _NEXT = """## Next
 
-The [data sheet](results/validation.md#data-sheet-of-the-beaver) has mass, travel and trim of the Beaver. [Other
-tools](reference/python.md#other-tools) shows how to fly the model in plain JSBSim."""
+The [data sheet](results/validation.md#data-sheet-of-the-beaver) has mass, travel and trim of the Beaver.
+[Other tools](reference/python.md#other-tools) shows how to fly the model in plain JSBSim."""
 
 
 def as_markdown() -> str:

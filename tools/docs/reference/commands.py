@@ -16,21 +16,21 @@ PARSER: Any = typer.main.get_command(app)
 
 
 _SAYS = """Which options does each command have, and which exit status? This page lists every command of
-`beaver-ftc` for readers who already know the command. If you do not know it, begin with [which command answers my
-question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints more about one command:
-what it computes, and which files it writes.
+`beaver-ftc` for readers who already know the command. If you do not know it, begin with [which command
+answers my question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints more
+about one command: what it computes, and which files it writes.
 
 ## How to read an entry
 
-- **Usage line.** A word in capitals stands for a value that you give. `{X}` is required, and `[X]` can be left
-  out. Several values are allowed if `...` follows the word.
+- **Usage line.** A word in capitals stands for a value that you give. `{X}` is required, and `[X]` can be
+  left out. Several values are allowed if `...` follows the word.
 - **Options.** The kind of a value is in `<...>`; `list` means that the option can be given several times. In
   brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
 - **Results.** [Columns](reference/columns.md) lists the columns of the tables that commands write."""
 _NEXT = """## Next
 
-[Assert in CI](how-to/ci.md) uses the exit statuses. [Columns](reference/columns.md) has the columns of the tables
-that commands write."""
+[Assert in CI](how-to/ci.md) uses the exit statuses. [Columns](reference/columns.md) has the columns of the
+tables that commands write."""
 _SHARED = 3  # so many commands with the same option share its row
 _SHARED_SAYS = """## Options of several commands
 
@@ -127,8 +127,8 @@ _NOTES = """*Table 3. Commands that can end with status 1, and the reason.*
 |`mechanisms`|a false alarm of a worst-case detector has no reason|
 |`separate`|a doublet was flown, and both candidates remain|
 
-After Ctrl-C, a command ends with status 130. Only `sitl` ends with status 1: it writes the results of the flight
-until Ctrl-C, with the verdict INTERRUPTED."""
+After Ctrl-C, a command ends with status 130. Only `sitl` ends with status 1: it writes the results of the
+flight until Ctrl-C, with the verdict INTERRUPTED."""
 
 
 def statuses() -> str:

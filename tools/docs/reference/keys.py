@@ -48,8 +48,8 @@ def page(name: str) -> str:
     return _with_sources(
         "\n\n".join(
             [
-                f"# {kind.title}", f"{kind.says} {_READ}", _whole_file(name), _contents(sections, headings), *parts,
-                *captioned,
+                f"# {kind.title}", f"{kind.says} {_READ}", _whole_file(name), _contents(sections, headings),
+                *parts, *captioned,
                 f"## Next\n\n{kind.next}",
             ]
         )
@@ -150,7 +150,9 @@ def _section(group: tuple[str, list[Section]], number: int, links: Mapping[str, 
 def _member(section: Section, unit: str) -> str:
     says = " ".join(section.says.split())
     path = section.places[0].path
-    elsewhere = f" Also: {found}." if not unit and path[0] == "expect" and (found := _elsewhere(section)) else ""
+    elsewhere = (
+        f" Also: {found}." if not unit and path[0] == "expect" and (found := _elsewhere(section)) else ""
+    )
     ends = f" UNIT is `{unit}`." if unit else ""
     return f'- <a id="{_anchor(section.title)}"></a>{_in_family(section)}: {says}{ends}{elsewhere}'
 
@@ -163,7 +165,9 @@ def _unit_in_names(members: list[Section]) -> dict[str, str]:
     for section in members:
         names = [key.name for key in section.keys if key.name.startswith(_IN_UNITS)]
         if names:
-            found[section.title] = names[0].removeprefix(next(one for one in _IN_UNITS if names[0].startswith(one)))
+            found[section.title] = names[0].removeprefix(
+                next(one for one in _IN_UNITS if names[0].startswith(one))
+            )
     return found
 
 
@@ -199,7 +203,9 @@ def _of_all(rows: list[tuple[str, tuple[str, ...]]], every: list[str]) -> tuple[
         for name, row in rows:
             names.setdefault(row[column], []).append(name)
         several = len(names) > 1
-        cells.append("; ".join(f"{text or '-'} ({', '.join(of)})" if several else text for text, of in names.items()))
+        cells.append(
+            "; ".join(f"{text or '-'} ({', '.join(of)})" if several else text for text, of in names.items())
+        )
     members = [name for name, _ in rows]
     others = [name for name in every if name not in members]
     most = f"all but {', '.join(others)}" if others else "all"
@@ -541,7 +547,7 @@ KINDS = {
         f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
         "This sweep flies 50 losses of the elevator. The size of the loss and the airspeed are random. At "
         "least 90 % of the losses must be detected, and half of the losses must be detected within 0.2 s.",
-        "[Results of a sweep](how-to/sweeps.md#what-a-sweep-writes) has the files and statistics that a sweep writes.",
+        "[Results of a sweep](how-to/sweeps.md#what-a-sweep-writes) has the files and statistics of a sweep.",
     ),
     "plan-keys": Kind(
         plan_json_schema,

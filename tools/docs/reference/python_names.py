@@ -17,10 +17,10 @@ public function, class and record, for readers who write Python. [Python](refere
 use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
 READING = """## How to read an entry
 
-The name stands without `beaver_ftc.` in front. Arguments after `*` must be given by name. This page has the first
-sentence of each entry. The whole text, with types, defaults, fields, shapes, units and errors, is in the docstring:
-the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a flight have the fields of
-`metrics.json`; [columns](reference/columns.md) lists them with their units."""
+The name stands without `beaver_ftc.` in front. Arguments after `*` must be given by name. This page has
+the first sentence of each entry. The whole text, with types, defaults, fields, shapes, units and errors, is
+in the docstring: the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a flight
+have the fields of `metrics.json`; [columns](reference/columns.md) lists them with their units."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""

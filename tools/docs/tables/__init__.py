@@ -2,8 +2,8 @@
 
 `python -m tools.docs table NAME` prints what the function of that name returns (a `-` of NAME is a `_`). It
 calls the package's public names or its commands; no number is typed in. What it draws it saves below
-`images/`, which becomes `docs/images/`, and returns the line that shows it: `![...](images/name.png)`. A table that
-few readers need it saves as CSV in the same way, by `aside`.
+`images/`, which becomes `docs/images/`, and returns the line that shows it: `![...](images/name.png)`. A
+table that few readers need it saves as CSV in the same way, by `aside`.
 """
 
 import ast

@@ -42,6 +42,7 @@ NO_SCHEME = "none"
 SHARES = (1.0, 0.92, 0.75, 0.5, 0.42)  # of which a table has intervals
 _RATIO = "Tracking error divided by the oracle's in the same flight, median; below 1: better than the oracle"
 _RATIO_90 = "Tracking error divided by the oracle's, not exceeded in 90 % of the flights"
+_SHARES = "Wilson 95 % intervals of the shares in Tables 2 and 3, %"
 _LOWER, _UPPER = "Lower 95 % limit of the median {}", "Upper 95 % limit of the median {}"
 ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
 PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
@@ -121,7 +122,7 @@ def _tables(document: Document) -> str:
         _block(6, _RATIO, laws, "ratio_median", _ratio, more=False),
         _block(7, _RATIO_90, laws, "ratio_90", _ratio, more=False),
         "\n".join([
-            aside("benchmark-shares", "Wilson 95 % intervals of the shares in Tables 2 and 3, %", _rates(faulted)),
+            aside("benchmark-shares", _SHARES, _rates(faulted)),
             aside("benchmark-delays", _UPPER.format("delay of Table 4, s"),
                   _limit_of(schemes, "delay_median_high_s", _seconds)),
             aside("benchmark-ratios-low", _LOWER.format("ratio of Table 6"),
@@ -155,9 +156,7 @@ def _alone(lines: list[Document]) -> Document:
     return next(row for row in lines if (row["scheme"], row["law"]) == (NO_SCHEME, LAW))
 
 
-def _block(
-    number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool
-) -> str:
+def _block(number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool) -> str:
     """A caption and a table of one number a cell. more: whether more is better."""
     ours = _ours(rows)
 

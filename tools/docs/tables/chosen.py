@@ -38,7 +38,11 @@ FLIGHT_HEAD = (
 def chosen_asides() -> str:
     """How many groups of constants there are, and their tables as CSV."""
     links = [
-        aside("chosen-constants", "C1: constants that flights chose, and the command that chose each", _constants()),
+        aside(
+            "chosen-constants",
+            "C1: constants that flights chose, with the command of each",
+            _constants(),
+        ),
         aside("chosen-flights", "C2: flights that chose them, beside those of the results", _flights()),
         aside("chosen-not", "C3: other constants of the diagnosis of logs, each with its origin", _others()),
     ]

@@ -19,8 +19,8 @@ READING = """## How to read an entry
 
 The name stands without `beaver_ftc.` in front. Arguments after `*` must be given by name. This page has
 the first sentence of each entry. The whole text, with types, defaults, fields, shapes, units and errors, is
-in the docstring: the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a flight
-have the fields of `metrics.json`; [columns](reference/columns.md) lists them with their units."""
+in the docstring: the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a
+flight have the fields of `metrics.json`; [columns](reference/columns.md) lists them with their units."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""

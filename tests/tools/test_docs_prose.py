@@ -72,3 +72,9 @@ def test_forms_of_a_verb_are_verbs():
         assert prose._is_verb(verb), verb
     for word in ("surface", "error", "fin", "in"):
         assert not prose._is_verb(word), word
+
+
+def test_numbers_of_results_are_printed():
+    text = "It detects 75 % of them. It detects <!--=own 1.share-->75<!--/--> % of them." + NEXT
+    assert [(kind, line) for kind, line, _ in prose.faults("docs/results/page.md", text)] == [("number", 1)]
+    assert list(prose.faults("docs/how-to/page.md", text)) == []

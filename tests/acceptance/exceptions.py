@@ -76,10 +76,11 @@ TABLE = (
     ),
     Exempt(r"python worst-so-far\.py", "reads a search: runs with the replay of its worst flight"),
     Exempt(
-        r"python (closeup|residual)\.py",
-        "draws a flight: after the run that the page shows before it",
-        r"beaver-ftc run elevator-partial-loss --no-report && python \1.py",
+        r"(beaver-ftc run elevator-partial-loss --figures pdf,svg)",
+        "the scripts after it draw its flight: with them",
+        r"\1 && python closeup.py && python residual.py",
     ),
+    Exempt(r"python (closeup|residual)\.py", "draws a flight: runs with the command before it"),
     Exempt(r"\. \.venv/bin/activate", "in a checkout, after make demo has made the environment"),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
@@ -92,7 +93,6 @@ TABLE = (
     ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"beaver-ftc run left-wing-tip-lost\.yaml", "flies the GTM, which is made from NASA's data"),
-    Exempt(r"git clone .*", "needs the network"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",

@@ -53,7 +53,7 @@ def us_a_frame(n: int, rng: np.random.Generator) -> tuple[float, float]:
         layout = control["layout"]
         layout["low"], layout["high"], layout["stand_in"] = -0.4, 0.4, -1
         layout["authority"][:, 0] = 1.0
-        control["surfaces"]["output"]["effectiveness"], prediction["frame_share_per_instant"] = 1.0, 1.0
+        control["surfaces"]["output"]["effectiveness"], prediction["w"] = 1.0, 1.0
         prediction["actuators"]["step"] = RATE_RAD_S * DT_S
         begun = time.perf_counter()
         systems = allocate_all(control, prediction, demands, G, failed) / FRAMES

@@ -150,7 +150,7 @@ def bounds_in(given: Document) -> np.ndarray:
 
     def watch(loop: Loop) -> Callable[[], None]:
         error_map = loop.frames["fdi"]["bound"]["error_map"]
-        loop.after_frame = lambda: there.append(error_map["error_bound_now"][0].copy())
+        loop.after_frame = lambda: there.append(error_map["e_now"][0].copy())
         return lambda: None
 
     fly(load_text(json.dumps(given)), watch=watch)

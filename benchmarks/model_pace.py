@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc import load
-from beaver_ftc.diagnosis.detection.statistical import UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL
+from beaver_ftc.diagnosis.detection.statistical import BOUNDS_PER_TRAVEL
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Recorder
@@ -49,7 +49,7 @@ def flown(scenario: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         status = fly_frame(frames, references, log)
-        bound.append(np.where(error_map["is_outside_all_boxes"][0], np.nan, error_map["error_bound_now"][0]))
+        bound.append(np.where(error_map["outside"][0], np.nan, error_map["e_now"][0]))
         return status
 
     loop.fly_frame = fly_and_note
@@ -68,9 +68,7 @@ def row_of(name: str, flights: int, seed: int) -> list[str]:
     for k in range(flights):
         error, bound, places = flown(scenario(name, seed + k))
         change = np.abs(np.diff(error, axis=0)) / bound[1:]
-        moved = UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * np.abs(np.diff(places, axis=0)).max(
-            axis=1, keepdims=True
-        )
+        moved = BOUNDS_PER_TRAVEL * np.abs(np.diff(places, axis=0)).max(axis=1, keepdims=True)
         left = (change - moved) / DT_S
         found = np.abs(error) / bound, change, np.minimum(change, moved), left
         largest = np.fmax(largest, [np.nanmax(of_it, initial=0.0) for of_it in found])

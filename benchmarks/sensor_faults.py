@@ -97,7 +97,7 @@ def fly(words: dict[str, Any], last: bool = False) -> tuple[str, bool]:
     said = sensor_monitor_finding(frame["fdi"]["sensor_monitor"], float(frame["t"]))
     lost = bool(frame["departed"])
     if frame["fdi"]["verdict"]["isolated_estimator"] >= 0 or (
-        frame["fdi"]["sensor_monitor"]["output"]["surface_was_isolated_at_alarm"] and not last
+        frame["fdi"]["sensor_monitor"]["output"]["had_surface"] and not last
     ):
         return "surface", lost
     if said is None:

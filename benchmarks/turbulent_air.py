@@ -105,7 +105,7 @@ class Watched:
 
     def __init__(self, loop: Loop) -> None:
         self._statistical = loop.frames["fdi"]["statistical"][0]
-        self._level = float(self._statistical["test_config"]["alarm_level"])
+        self._level = float(self._statistical["test"]["alarm_level"])
         self._views = self._statistical["views"][: int(self._statistical["n_views"])]
         self.largest = dict.fromkeys(TESTS, 0.0)
 
@@ -114,24 +114,18 @@ class Watched:
         if self._statistical["alarm"]["detected_at_s"] >= 0.0 and max(self.largest.values()) > 1.0:
             return
         for block in self._statistical["block"]:
-            tried = block["hypothesis"][: int(block["n_hypotheses"])]
-            tried = tried[tried["raises_alarm"] == 1]
+            tried = block["hypothesis"][: int(block["n_h"])]
+            tried = tried[tried["alarms"] == 1]
             losses = tried["kind"] == LOSS
             for test, of_it in (("loss", tried["score"][losses]), ("step", tried["score"][~losses])):
                 self._note(test, of_it.max(initial=0.0))
-        own = (self._views["orthogonal_to_surface"] == AXIS_VIEW) & (
-            self._views["uses_inertial_flow_angle"] == 0
-        )
-        self._note("tone of an axis", self._views["tone_tests"]["score"][own].max(initial=0.0))
+        own = (self._views["nulled"] == AXIS_VIEW) & (self._views["by_inertia"] == 0)
+        self._note("tone of an axis", self._views["tones"]["score"][own].max(initial=0.0))
         self._note("force", self._forces())
 
     def _forces(self) -> float:
         """What the views that may raise an alarm by a force show, whatever clears them of a vane's error."""
-        held = [
-            view["decaying_peak_score"]
-            for view in self._views
-            if view["orthogonal_to_surface"] >= 0 and uses_force(view)
-        ]
+        held = [view["peak"] for view in self._views if view["nulled"] >= 0 and uses_force(view)]
         return float(max(held, default=0.0))
 
     def _note(self, test: str, score: float) -> None:

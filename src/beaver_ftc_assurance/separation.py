@@ -256,7 +256,7 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
         return
     for s, kind in _left(tape):
         actuator = tape.last.diagnosis.surface_fault_types[s].actuator
-        low, high = RELATIONS[kind].theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
+        low, high = RELATIONS[kind].theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
         if low < high:
             low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
         if low <= high:

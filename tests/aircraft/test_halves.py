@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
-from beaver_ftc.diagnosis.isolation import list_isolation_estimators
+from beaver_ftc.diagnosis.isolation import list_estimators
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from samples import samples
@@ -80,7 +80,7 @@ def test_the_truth_flies_as_the_whole(halves):
 
 def test_the_published_class_has_both_ailerons_and_no_stand_in(halves):
     assert halves.stand_ins == ("flap_left", "flap_right")
-    assert {name for name, _, _ in list_isolation_estimators("published", halves)} == {
+    assert {name for name, _, _ in list_estimators("published", halves)} == {
         "aileron_left", "aileron_right", "elevator", "rudder",
     }  # fmt: skip
 

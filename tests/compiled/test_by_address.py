@@ -140,14 +140,14 @@ def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
     done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
     published, diagnoses_all_types = (set(line.split()) for line in done.stdout.splitlines()[-2:])
     steps_of_losses = (
-        "skip_begin_at_alarm_for_losses",
-        "skip_record_commands_for_losses",
-        "isolate_loss_by_worst_case",
+        "skip_begin",
+        "skip_commands",
+        "loss_by_worst_case",
     )
     steps_of_types = (
-        "begin_fault_type_isolation_at_alarm",
-        "record_surface_commands",
-        "isolate_fault_type_by_worst_case",
+        "begin_types",
+        "record_orders",
+        "type_by_worst_case",
     )
     of_class = [
         {f"adaptive_estimators.{step}" for step in steps} for steps in (steps_of_losses, steps_of_types)

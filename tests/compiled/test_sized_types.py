@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from beaver_ftc import compiled
 from beaver_ftc.compiled import direct, kernel, plain, record, sized, target
 from beaver_ftc.compiled.records import LINE_BYTES, Room, shape_of
-from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, BlockCapacity, StatisticalRecordSize
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, BlockCapacity, StatisticalSize
 from beaver_ftc.loop.assembly import frame_dtype, taken
 
 of_known = pytest.mark.skipif(
@@ -220,13 +220,11 @@ def begins(array):
 @pytest.mark.parametrize("n", [3, 17])
 def test_what_fills_several_lines_of_the_cache_begins_with_one(n):
     """In a flight's memory, of whatever size; what is smaller stands close, without a gap before it."""
-    frames = taken(
-        (3,), frame_dtype(n, StatisticalRecordSize(BlockCapacity(9, 5), BlockCapacity(7, 6), 2, 3))
-    )
+    frames = taken((3,), frame_dtype(n, StatisticalSize(BlockCapacity(9, 5), BlockCapacity(7, 6), 2, 3)))
     for frame in frames:
         for block in frame["fdi"]["statistical"]["block"]:
-            assert begins(block["onset_tests"]) % LINE_BYTES == 0
-            assert begins(block["regressor_correlation"]) % LINE_BYTES == 0
+            assert begins(block["tests"]) % LINE_BYTES == 0
+            assert begins(block["R"]) % LINE_BYTES == 0
     close = record(k=int, few=Room(3), other=Room(5))
     assert [close.fields[name][1] for name in close.names] == [0, 8, 32]
     assert close.itemsize == 72
@@ -248,10 +246,8 @@ def test_records_that_change_in_size_stand_in_a_row():
 def test_flights_of_all_sizes_have_one_type():
     """Surfaces, terms of the model, boxes of its error map, delays: none makes another."""
     kind_of = target.kind_of
-    large = StatisticalRecordSize(BlockCapacity(105, 62), BlockCapacity(108, 21), 47, 20)
-    sizes = [
-        (n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_RECORD_SIZE, large) for line in (512, 9000)
-    ]
+    large = StatisticalSize(BlockCapacity(105, 62), BlockCapacity(108, 21), 47, 20)
+    sizes = [(n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_SIZE, large) for line in (512, 9000)]
     assert {kind_of(frame_dtype(*of), 1) for of in sizes} == {kind_of(frame_dtype(4), 1)}
 
 

@@ -47,7 +47,7 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
     control["layout"]["low"], control["layout"]["high"] = -most, 0.8 * most
     law.compile_into(control["compiled_rivals"])
     frame_means = SimpleNamespace(Gu=np.zeros((3, 4)))
-    frame = SimpleNamespace(G=G, frame_means=frame_means), SimpleNamespace(x=None)
+    frame = SimpleNamespace(G=G, means=frame_means), SimpleNamespace(x=None)
     stops = 0
     for k in range(40):
         x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))

@@ -114,7 +114,7 @@ def test_the_mode_that_the_diagnosis_asks_for(
     (
         verdict["detected"],
         verdict["isolated_estimator"],
-        verdict["accommodated_surface"],
+        verdict["target"],
         verdict["accommodation_mode"],
     ) = (
         1,
@@ -165,7 +165,7 @@ def compensated(law, detected=1, lead=-1, accommodation_mode=-1):
     fdi, prediction, measured = frame["fdi"], frame["prediction"], frame["measured"]
     prediction["design"], measured["y"][:5] = design_record()[0], (0.2, 0.0, 45.0, 1000.0, 0.3)
     fdi["verdict"]["detected"], fdi["fdae"]["network"]["output"] = detected, (0.1, 0.2, 0.3)
-    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = lead, accommodation_mode
+    fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"] = lead, accommodation_mode
     expected = unanticipated_pitch(prediction["design"], measured["y"], 0.5)
     return accommodated(frame)["unknown"].tolist(), float(expected)
 

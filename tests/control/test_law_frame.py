@@ -120,14 +120,14 @@ def test_what_is_done_about_each_kind_of_fault(measure):
         measure
     ]
     fdi["types"]["surface"]["accommodation"]["mode"], surface["accommodation"]["mode"] = -1, measure
-    surface["feasible_sets"]["excluded"] = [other != kind for other in range(N_TYPES)]
-    surface["feasible_sets"]["low"][kind], surface["feasible_sets"]["high"][kind] = 0.1, 0.2
+    surface["sets"]["excluded"] = [other != kind for other in range(N_TYPES)]
+    surface["sets"]["low"][kind], surface["sets"]["high"][kind] = 0.1, 0.2
     (
-        surface["last_observation"]["healthy_position"],
-        surface["last_observation"]["position_low"],
-        surface["last_observation"]["position_high"],
+        surface["last"]["u"],
+        surface["last"]["lo"],
+        surface["last"]["hi"],
     ) = 0.05, 0.3, 0.34
-    loss = fdi["layout"]["loss_estimator"][RUDDER]
+    loss = fdi["layout"]["loss"][RUDDER]
     fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     surfaces = accommodated(frame)
     target = {SCALE_COMMAND: 0.7, GIVE_UP: 0.0}.get(measure, 1.0)
@@ -154,8 +154,8 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     frame = new_frame(name)
     fdi = frame["fdi"]
     types, fdi["config"]["diagnoses_all_types"] = fdi["types"], diagnoses_all_types
-    types["config"]["slowest_half_cycle_frames"], types["surface"]["evidence"]["n_anomalous_frames"] = 4, 0
-    types["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR] = evidence
+    types["config"]["half_frames"], types["surface"]["evidence"]["n_anomalous"] = 4, 0
+    types["surface"]["evidence"]["n_anomalous"][ELEVATOR] = evidence
     fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, isolated
     frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
     commanded(frame)
@@ -165,7 +165,7 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["alarm_authority"] = known, WORST_CASE_DETECTOR
+    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
     fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
     fdi["bank"]["output"]["threshold"] = 0.1
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score

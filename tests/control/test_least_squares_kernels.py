@@ -105,7 +105,7 @@ def beaver_law(left=1.0):
     control["surfaces"]["output"]["effectiveness"] = (1.0, left, 1.0, 1.0)
     control["axes"]["G"] = G * control["surfaces"]["output"]["effectiveness"]
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
-    prediction["frame_share_per_instant"], prediction["actuators"]["step"] = 1.0, np.inf
+    prediction["w"], prediction["actuators"]["step"] = 1.0, np.inf
     return control, prediction
 
 

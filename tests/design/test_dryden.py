@@ -12,7 +12,7 @@ from beaver_ftc.design import (
     altitude_of,
     rotation_lengths,
     standard_air,
-    standard_air_density,
+    standard_density,
 )
 
 
@@ -44,8 +44,8 @@ def test_the_air_turns_as_the_slope_of_its_gusts_along_the_path(span_m):
 def test_standard_air_is_that_of_the_tables_up_to_20_km(altitude_m, hpa, celsius, kg_m3):
     """[ISA] has pressure, temperature and density by altitude."""
     assert standard_air(altitude_m) == (pytest.approx(hpa, rel=2e-4), pytest.approx(celsius))
-    assert standard_air_density(altitude_m) == pytest.approx(kg_m3, rel=2e-4)
-    assert altitude_of(standard_air_density(altitude_m)) == pytest.approx(altitude_m, abs=1e-6)
+    assert standard_density(altitude_m) == pytest.approx(kg_m3, rel=2e-4)
+    assert altitude_of(standard_density(altitude_m)) == pytest.approx(altitude_m, abs=1e-6)
 
 
 SEVERE = {"none": (0.0, 0.0), "light": (7.4, 2.53), "moderate": (10.6, 5.06), "severe": (23.6, 7.6)}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.model import engine_power_kw, measured_slipstream, power_error_kw, slipstream
-from beaver_ftc.diagnosis.bounds import slipstream_error_bound
+from beaver_ftc.diagnosis.bounds import slipstream_bound
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import load
 
@@ -40,7 +40,7 @@ def test_no_admitted_error_of_the_readings_is_beyond_the_bound(grade):
         y = np.zeros(8)
         y[2:5] = reading[2], reading[3], measured_slipstream(*reading)
         error = abs(y[4] - measured_slipstream(*true))
-        largest = max(largest, error / slipstream_error_bound(declared_errors, y))
+        largest = max(largest, error / slipstream_bound(declared_errors, y))
     assert 0.3 < largest <= 1.0
 
 

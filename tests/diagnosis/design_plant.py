@@ -9,9 +9,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_uncertainty_bound_now
-from beaver_ftc.diagnosis.detection.filters import update_max_residual_ratio_by_filter
-from beaver_ftc.diagnosis.model_prediction import evaluate_bound_and_frame_means, evaluate_design_model
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_bound
+from beaver_ftc.diagnosis.detection.filters import keep_bank_peak
+from beaver_ftc.diagnosis.model_prediction import evaluate_design, evaluate_frame
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
@@ -24,21 +24,21 @@ SURFACES = ("aileron", "elevator", "rudder")
 def evaluate_prediction(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
-    evaluate_design_model(frame.prediction, frame.measured)
-    fill_uncertainty_bound_now(frame.fdi.bound, frame.prediction.design, frame.measured, frame.prediction.u)
+    evaluate_design(frame.prediction, frame.measured)
+    fill_bound(frame.fdi.bound, frame.prediction.design, frame.measured, frame.prediction.u)
 
 
 @kernel
 def evaluate(frames):
     """What the design model makes of the frame that ends at this instant."""
     frame = frames[0]
-    evaluate_bound_and_frame_means(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+    evaluate_frame(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
 
 
 @kernel
 def note(frames):
     """How close the residuals have come to their thresholds."""
-    update_max_residual_ratio_by_filter(frames[0].fdi.bank)
+    keep_bank_peak(frames[0].fdi.bank)
 
 
 def conclude(frames):
@@ -134,7 +134,7 @@ class DesignPlant:
         f, G = prediction["f"].copy(), prediction["G"].copy()
         phi = self.effect(G)
         frame["accounts"]["guarantee"]["phi"] = phi
-        bound = np.maximum(self.fdi["bound"]["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)
+        bound = np.maximum(self.fdi["bound"]["eta_now"] - ROUNDING_RAD_S2, 0.0)
         conclude(self.frames)
         eta = np.clip(uncertainty(self, bound, phi), -bound, bound)
         self.innovations.append(phi + eta)
@@ -159,7 +159,7 @@ class DesignPlant:
 
     def position_excluded(self, surface):
         """Whether the estimator of a surface that may be anywhere has been excluded."""
-        return self.excluded(int(self.fdi["layout"]["position_estimator"][surface]))
+        return self.excluded(int(self.fdi["layout"]["position"][surface]))
 
 
 def _random(plant, bound, phi):

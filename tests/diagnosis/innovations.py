@@ -16,10 +16,10 @@ from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    N_ONSET_SLOTS,
-    N_ONSET_TESTS_PER_GROUP,
-    SUPPORTING_CORRELATION_SIGN_BY_KIND,
-    USUAL_MAX_HYPOTHESES_PER_BLOCK,
+    N_GROUP_TESTS,
+    N_SLOTS,
+    SIGN_OF_KIND,
+    USUAL_HYPOTHESES,
     BlockCapacity,
     block_dtype,
 )
@@ -46,34 +46,30 @@ def misread(y, place, error, power_error_kw_per_density_ratio=0.0):
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
-    block = np.zeros(1, block_dtype(BlockCapacity(105, USUAL_MAX_HYPOTHESES_PER_BLOCK))).view(np.recarray)[0]
-    block["n_axes"], block["axes"][:n], block["drift_decay_factor"] = n, range(n), keep
-    block["drift_intensity"][:n, :n] = drift
-    block["gyro_noise_variance"][:n], block["model_noise_variance"][:n] = np.square(noise), np.square(jitter)
-    block["P_xx"][:n, :n] = np.diag(block["gyro_noise_variance"][:n])
+    block = np.zeros(1, block_dtype(BlockCapacity(105, USUAL_HYPOTHESES))).view(np.recarray)[0]
+    block["n"], block["axes"][:n], block["a"] = n, range(n), keep
+    block["Q_d"][:n, :n] = drift
+    block["R_y"][:n], block["Q_x"][:n] = np.square(noise), np.square(jitter)
+    block["P_xx"][:n, :n] = np.diag(block["R_y"][:n])
     block["P_dd"][:n, :n] = prior**2 * np.eye(n)
     return block
 
 
 def with_hypotheses(block, *kinds, tolerance=()):
     """The same with hypotheses of these kinds, and regressors of these tolerances."""
-    block["n_hypotheses"], block["n_regressors"] = len(kinds), len(tolerance)
-    block["regressor_tolerance"][: len(tolerance)] = tolerance
+    block["n_h"], block["n_Z"] = len(kinds), len(tolerance)
+    block["tol"][: len(tolerance)] = tolerance
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
-        group, lane = divmod(h * N_ONSET_SLOTS, N_ONSET_TESTS_PER_GROUP)
-        block["onset_tests"]["supporting_correlation_sign"][group, lane : lane + N_ONSET_SLOTS] = (
-            SUPPORTING_CORRELATION_SIGN_BY_KIND[kind]
-        )
+        group, lane = divmod(h * N_SLOTS, N_GROUP_TESTS)
+        block["tests"]["supporting_correlation_sign"][group, lane : lane + N_SLOTS] = SIGN_OF_KIND[kind]
     return block
 
 
 def onset_tests_of(block, name):
     """What the onset tests keep under a name, a copy, (..., tests)."""
     return np.concatenate(
-        list(
-            block["regressor_correlation"] if name == "regressor_correlation" else block["onset_tests"][name]
-        ),
+        list(block["R"] if name == "R" else block["tests"][name]),
         axis=-1,
     )
 
@@ -81,32 +77,30 @@ def onset_tests_of(block, name):
 def by_onset(block, name):
     """What the onset tests keep under a name, a copy, (..., slots, hypotheses)."""
     kept = onset_tests_of(block, name)
-    return kept.reshape(*kept.shape[:-1], -1, N_ONSET_SLOTS).swapaxes(-1, -2)
+    return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
 
 
 def covariance(block, frames, dt):
     """Of the stacked innovations (frames n,), frame by frame, from the model's very definition."""
-    n = int(block["n_axes"])
+    n = int(block["n"])
     k = np.arange(frames)
-    kept = block["drift_decay_factor"] ** (k[:, None] - k[None, :] - 1) * (
-        k[None, :] < k[:, None]
-    )  # of v[column] in d[row]
-    walk = np.kron(dt * kept @ kept.T, block["drift_intensity"][:n, :n])
-    constant = np.kron(block["drift_decay_factor"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
+    kept = block["a"] ** (k[:, None] - k[None, :] - 1) * (k[None, :] < k[:, None])  # of v[column] in d[row]
+    walk = np.kron(dt * kept @ kept.T, block["Q_d"][:n, :n])
+    constant = np.kron(block["a"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
     difference = (2.0 * np.eye(frames) - np.eye(frames, k=1) - np.eye(frames, k=-1)) / dt**2
-    gyros = np.kron(difference, np.diag(block["gyro_noise_variance"][:n]))
-    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["model_noise_variance"][:n]))
+    gyros = np.kron(difference, np.diag(block["R_y"][:n]))
+    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["Q_x"][:n]))
 
 
 def drawn(block, frames, dt, rng, start=0.0):
     """Innovations (frames, n) rad/s2; start: standard deviation of the drift as they begin."""
-    n = int(block["n_axes"])
-    root = np.linalg.cholesky(block["drift_intensity"][:n, :n] + 1e-300 * np.eye(n))
+    n = int(block["n"])
+    root = np.linalg.cholesky(block["Q_d"][:n, :n] + 1e-300 * np.eye(n))
     steps = np.sqrt(dt) * rng.standard_normal((frames, n)) @ root.T
     steps[0] = start * rng.standard_normal(n)
-    gyros = np.sqrt(block["gyro_noise_variance"][:n]) * rng.standard_normal((frames + 1, n))
-    white = np.sqrt(block["model_noise_variance"][:n]) * rng.standard_normal((frames, n))
-    drifts = lfilter([1.0], [1.0, -float(block["drift_decay_factor"])], steps, axis=0)
+    gyros = np.sqrt(block["R_y"][:n]) * rng.standard_normal((frames + 1, n))
+    white = np.sqrt(block["Q_x"][:n]) * rng.standard_normal((frames, n))
+    drifts = lfilter([1.0], [1.0, -float(block["a"])], steps, axis=0)
     return drifts + white + np.diff(gyros, axis=0) / dt
 
 
@@ -114,16 +108,12 @@ class PlainKalman:
     """The textbook filter of 2n states, rates and drifts, on measured rates."""
 
     def __init__(self, block, dt):
-        n = self.n = int(block["n_axes"])
-        self.F = np.block(
-            [[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["drift_decay_factor"] * np.eye(n)]]
-        )
+        n = self.n = int(block["n"])
+        self.F = np.block([[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["a"] * np.eye(n)]])
         self.H = np.hstack([np.eye(n), np.zeros((n, n))])
         self.P = block_diag(block["P_xx"][:n, :n], block["P_dd"][:n, :n])
-        self.Q = block_diag(
-            dt**2 * np.diag(block["model_noise_variance"][:n]), dt * block["drift_intensity"][:n, :n]
-        )
-        self.R = np.diag(block["gyro_noise_variance"][:n])
+        self.Q = block_diag(dt**2 * np.diag(block["Q_x"][:n]), dt * block["Q_d"][:n, :n])
+        self.R = np.diag(block["R_y"][:n])
         self.x = np.zeros(2 * n)
 
     def step(self, z):
@@ -143,8 +133,8 @@ def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
         likelihood.advance_covariance(block, dt)
-        block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.advance_whitening_filter(block, block.state, block.frame_innovation, dt, out[k])
+        block.nu[: block.n] = innovations[k]
+        likelihood.whiten_step(block, block.state, block.nu, dt, out[k])
 
 
 @kernel
@@ -152,17 +142,13 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regr
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
-            likelihood.reset_onset_slot(block, likelihood.onset_slot_restarting_at_frame(first + k))
+            likelihood.reset_slot(block, likelihood.restarting_slot(first + k))
         likelihood.advance_covariance(block, dt)
-        block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.advance_whitening_filter(
-            block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
-        )
-        for j in range(block.n_regressors):
-            likelihood.advance_whitening_filter(
-                block, block.regressor_filter_state[j], regressors[k, j], dt, block.regressor_response[j]
-            )
-        for h in range(block.n_hypotheses):
+        block.nu[: block.n] = innovations[k]
+        likelihood.whiten_step(block, block.state, block.nu, dt, block.g)
+        for j in range(block.n_Z):
+            likelihood.whiten_step(block, block.x_Z[j], regressors[k, j], dt, block.g_Z[j])
+        for h in range(block.n_h):
             block.hypothesis[h].signature[:] = signatures[k, h]
         likelihood.accumulate_evidence(block, uses_regressors, dt, keep)
         likelihood.evaluate_hypotheses(block)
@@ -174,13 +160,11 @@ def bounded_all(block, d, signatures, onset, dt):
     bounded = np.full(3, 0.02)
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
-        block.frame_innovation[: block.n_axes] = d[k]
-        likelihood.advance_whitening_filter(
-            block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
-        )
-        for h in range(block.n_hypotheses):
-            block.hypothesis[h].signature[: block.n_axes] = signatures[k, h]
-        likelihood.fill_uncertainty_response_bounds(block, bounded, dt)
+        block.nu[: block.n] = d[k]
+        likelihood.whiten_step(block, block.state, block.nu, dt, block.g)
+        for h in range(block.n_h):
+            block.hypothesis[h].signature[: block.n] = signatures[k, h]
+        likelihood.bound_responses(block, bounded, dt)
         if k >= onset:
             likelihood.accumulate_evidence(block, False, dt, 1.0)
 
@@ -195,9 +179,7 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical.configure_statistical_detector(
-            self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz
-        )
+        statistical.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
         Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
         self.frame = 0
@@ -210,8 +192,8 @@ class Detector:
         """Healthy ones (frames, 3), as declared."""
         out = np.empty((frames, 3))
         for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
-            out[:, block["axes"][: block["n_axes"]]] = drawn(
-                block, frames, self.dt, rng, likelihood.PRIOR_DRIFT_STD_RAD_S2
+            out[:, block["axes"][: block["n"]]] = drawn(
+                block, frames, self.dt, rng, likelihood.DRIFT_PRIOR_RAD_S2
             )
         return out
 
@@ -227,17 +209,17 @@ class Detector:
 def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
-        blocks, alarm, tests = detector.block, detector.alarm, detector.test_config
+        blocks, alarm, tests = detector.block, detector.alarm, detector.test
         fill_block_signatures(blocks, Gu[k], cubic[k])
-        bounded, still = detector.noise.uncertainty_bound, detector.gust
+        bounded, still = detector.noise.eta, detector.gust
         statistical.update_blocks(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
         views = detector.views[: detector.n_views]
         statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
-        scores[k] = alarm.score_over_alarm_level
-        if renew and alarm.score_over_alarm_level > 1.0:
-            for slot in range(N_ONSET_SLOTS):
+        scores[k] = alarm.ratio
+        if renew and alarm.ratio > 1.0:
+            for slot in range(N_SLOTS):
                 for b in range(detector.block.size):
-                    likelihood.reset_onset_slot(blocks[b], slot)
+                    likelihood.reset_slot(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):
@@ -253,5 +235,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = bounds.flow_angle_in_level_axes_noise_std(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return bounds.angular_acceleration_by_gust_noise_std(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    flow = bounds.flow_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
+    return bounds.gust_noise(flow, design, *LEVEL_FLIGHT[1:], span_m)

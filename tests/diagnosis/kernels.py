@@ -12,13 +12,13 @@ DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 
 def new_fdi():
     fdi = np.zeros(1, fdi_dtype(4)).view(np.recarray)[0]
-    fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["decay_factor"][:3] = (
+    fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["a"][:3] = (
         DT,
         3,
         np.exp(-POLES * DT),
     )
     fdi["types"]["config"]["dt"] = DT
-    fdi["isolation"]["config"]["forgetting_factor"], fdi["isolation"]["config"]["filter_decay"] = (
+    fdi["isolation"]["config"]["forget"], fdi["isolation"]["config"]["a"] = (
         0.98,
         np.exp(-np.array([3.0, 4.0, 5.0]) * DT),
     )
@@ -40,12 +40,12 @@ def fill(record, **values):
 
 # Short names of fields, for cases that say a few of them.
 SHORT = {
-    "whole": "frame_shows_single_instant", "length": "frames_per_block", "thresholds": "threshold_kind",
-    "memory": "uses_reach_test", "shared": "shares_theta_across_axes", "membership": "narrows_theta_sets",
-    "forgetting": "forgetting_factor", "instants": "n_substeps",
+    "whole": "single_instant", "length": "frames_per_block", "thresholds": "mu_kind",
+    "memory": "reach", "shared": "shared", "membership": "narrows",
+    "forgetting": "forget", "instants": "n_substeps",
 }  # fmt: skip
 WHERE = {
-    **dict.fromkeys(("enabled", "alarm_authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
+    **dict.fromkeys(("enabled", "authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
     **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
     **dict.fromkeys(("eta_bar", "noise"), "bound"),
 }
@@ -63,36 +63,36 @@ def put(fdi, **values):
 
 # Fields of a surface's records by one name each, for cases that say a few of them.
 _ACTUATOR = {
-    **{name: name for name in ("travel_low", "travel_high", "reachable_low", "reachable_high")},
-    "min_runaway_rate": "min_runaway_rate",
-    "approach": "approach_share_per_substep", "step": "max_motion_per_substep",
-    "slowest_step": "min_rate_limited_motion_per_substep",
+    **{name: name for name in ("stop_lo", "stop_hi", "reach_lo", "reach_hi")},
+    "runaway": "runaway",
+    "approach": "approach_share", "step": "step",
+    "slowest_step": "slow_step",
 }  # fmt: skip
 _OBSERVED = {
-    "command": "healthy_position", "low": "position_low", "high": "position_high",
-    **{name: name for name in ("is_anomalous", "weighted_mean_error_per_position_range",
-    "stop_can_hide_deflection")},
+    "command": "u", "low": "lo", "high": "hi",
+    **{name: name for name in ("anomalous", "kappa",
+    "hides")},
 }  # fmt: skip
 _EVIDENCE = (
-    "n_rest_frames",
-    "n_anomalous_frames_since_stop_could_hide",
-    "first_anomalous_frame",
-    "first_anomalous_position_low",
-    "first_anomalous_position_high",
+    "n_rest",
+    "n_unhidden",
+    "k_first",
+    "first_lo",
+    "first_hi",
 )
 OF_SURFACE = {
     **{name: ("actuator", field) for name, field in _ACTUATOR.items()},
-    **{name: ("last_observation", field) for name, field in _OBSERVED.items()},
-    **{f"{name}_then": ("judged_observation", field) for name, field in _OBSERVED.items()},
+    **{name: ("last", field) for name, field in _OBSERVED.items()},
+    **{f"{name}_then": ("judged", field) for name, field in _OBSERVED.items()},
     **{
-        f"{name}_before": ("earlier_observation", _OBSERVED[name]) for name in ("low", "high", "is_anomalous")
+        f"{name}_before": ("earlier", _OBSERVED[name]) for name in ("low", "high", "anomalous")
     },
-    "evidence": ("evidence", "n_anomalous_frames"),
+    "evidence": ("evidence", "n_anomalous"),
     **{name: ("evidence", name) for name in _EVIDENCE},
-    "n_frames_without_sign_of_fault": ("accommodation", "n_frames_without_sign_of_fault"),
-    "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "can_be_at_fault_basis"),
+    "n_silent": ("accommodation", "n_silent"),
+    "in_question": ("status", "may_be_sole"), "standing": ("status", "basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
-    "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),
+    "type": ("status", "fault_type"), "type_at_s": ("status", "typed_at_s"),
 }  # fmt: skip
 
 
@@ -111,32 +111,33 @@ def of(surface, *names):
 def of_stages(fdi, kernel):
     """What the arguments of kernels are called, of the stages of one diagnosis."""
     types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
-    later = "deflection" in kernel.__name__
-    return {
-        "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
-        **dict.fromkeys(("pair", "pair_record"), types["pair"]),
-        **dict.fromkeys(("conclusion", "surface_conclusion", "previous_conclusion"), fdi["verdict"]),
-        "layout": fdi["layout"],
-        "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
-        **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
-        **dict.fromkeys(
-            ("shared", "shared_by_axes", "axes_share_theta"),
-            fdi["isolation"]["config"]["shares_theta_across_axes"],
-        ),
-        **dict.fromkeys(("abrupt", "fault_is_declared_constant"), fdi["config"]["abrupt"]),
-        "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
-        "n_substeps": fdi["config"]["n_substeps"],
-        **dict.fromkeys(("bank", "filter_bank", "detection_filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
-        **dict.fromkeys(("innovation", "innovation_by_axis"), fdi["bank"]["output"]["innovation"]),
-        **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
-        **dict.fromkeys(
-            ("innovation_bound", "innovation_bound_by_axis"), fdi["bound"]["frame_innovation_bound"]
-        ),
-        **dict.fromkeys(("noise", "changing_gyro_error_bound"), fdi["bound"]["changing_gyro_error_bound"]),
-        "dt": fdi["config"]["dt"],
-        **dict.fromkeys(("statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),
-        **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
-    }  # fmt: skip
+    later = "range" in kernel.__name__
+    first = types["frame_index"]
+    values = {
+        ("c", "cfg", "config"): types["config"] if whole else fdi["config"],
+        ("types",): types,
+        ("surfs",): types["surface"],
+        ("pair",): types["pair"],
+        ("conclusion", "done", "found", "past"): fdi["verdict"],
+        ("layout",): fdi["layout"],
+        ("iso", "isolation"): fdi["isolation"],
+        ("est", "fies", "estimators"): fdi["isolation"]["estimator"],
+        ("bound",): fdi["bound"],
+        ("shared",): fdi["isolation"]["config"]["shared"],
+        ("abrupt",): fdi["config"]["abrupt"],
+        ("all_types",): fdi["config"]["diagnoses_all_types"],
+        ("n_substeps",): fdi["config"]["n_substeps"],
+        ("bank",): fdi["bank"],
+        ("fdae",): fdi["fdae"],
+        ("nu", "innovation"): fdi["bank"]["output"]["innovation"],
+        ("detected",): fdi["verdict"]["detected"],
+        ("nu_max",): fdi["bound"]["nu_max"],
+        ("noise", "n", "n_gyro"): fdi["bound"]["n_gyro"],
+        ("dt",): fdi["config"]["dt"],
+        ("alarm",): fdi["statistical"]["alarm"],
+        ("k",) if whole else (): first if later else first - 1,
+    }
+    return {name: value for names, value in values.items() for name in names}
 
 
 def on(kernel, fdi, *given):
@@ -158,7 +159,7 @@ def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):
     fdi["isolation"]["config"]["n_estimators"] = max(int(fdi["isolation"]["config"]["n_estimators"]), 1)
     fie = fdi["isolation"]["estimator"][0]
     fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = kind, surface, low, high
-    fie["feasible_theta_min"], fie["feasible_theta_max"] = low, high
+    fie["set_lo"], fie["set_hi"] = low, high
     return fie
 
 

@@ -28,58 +28,52 @@ class Statistical:
 
     @staticmethod
     def score(record, t, known=True):
-        tests, blocks, views = record["test_config"], record["block"], views_of(record)
+        tests, blocks, views = record["test"], record["block"], views_of(record)
         statistical.update_alarm(
             record["alarm"], tests, blocks, views, record["forces"], record["gust"], t, known
         )
 
     @staticmethod
     def record(record, row):
-        tests, blocks, views = record["test_config"], record["block"], views_of(record)
-        statistical.write_alarm_scores_to_log_row(tests, blocks, views, record["forces"], record["gust"], row)
+        tests, blocks, views = record["test"], record["block"], views_of(record)
+        statistical.write_scores(tests, blocks, views, record["forces"], record["gust"], row)
 
     @staticmethod
-    def filter_innovation_after_known_faults(record, surprise, dt):
-        statistical.filter_innovation_after_known_faults(record["block"], record["gust"], surprise, dt)
+    def filter_known(record, surprise, dt):
+        statistical.filter_known(record["block"], record["gust"], surprise, dt)
 
     @staticmethod
     def unknown_acceleration(record, out):
-        statistical.fill_statistical_unmodelled_acceleration(record["block"], record["gust"], out)
+        statistical.fill_unmodelled(record["block"], record["gust"], out)
 
     @staticmethod
     def drifts(record, fdi, design, x, y):
         noise, blocks, air = record["noise"], record["block"], record["gust"]
-        statistical.fill_uncertainty_bound_drift_and_noise(
-            noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"]
-        )
+        statistical.fill_noise(noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"])
 
     @staticmethod
     def prepare(record, fdi, design, x, y, u):
-        parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
-        statistical.prepare_tests_of_next_frame(
-            *parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"]
-        )
+        parts = (record[name] for name in ("test", "noise", "block", "gust"))
+        statistical.prepare_tests(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
 
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):
-        parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
-        statistical.add_instant_to_gust_and_regressors(
-            *parts, fdi["bound"], design, _measured(x, y, attitude), u, dt
-        )
+        parts = (record[name] for name in ("test", "noise", "block", "gust"))
+        statistical.add_test_instant(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
 
     @staticmethod
     def shows(fdi, surface):
-        tests, blocks = fdi["statistical"]["test_config"], fdi["statistical"]["block"]
+        tests, blocks = fdi["statistical"]["test"], fdi["statistical"]["block"]
         return statistical.confirms_loss(
-            tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_estimator"], surface
+            tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss"], surface
         )
 
     @staticmethod
     def excludes(fdi, surface, ends):
         tests, blocks, loss_estimator = (
-            fdi["statistical"]["test_config"],
+            fdi["statistical"]["test"],
             fdi["statistical"]["block"],
-            fdi["layout"]["loss_estimator"],
+            fdi["layout"]["loss"],
         )
         return statistical.excludes_loss(
             tests,
@@ -97,30 +91,28 @@ class Across:
 
     @staticmethod
     def part(fdi, view, innovation, i):
-        parts = (fdi["statistical"][name] for name in ("forces", "gust", "inertial_gust"))
-        return parity.innovation_component_for_view(view, *parts, innovation, i)
+        parts = (fdi["statistical"][name] for name in ("forces", "gust", "vaneless"))
+        return parity.view_innovation(view, *parts, innovation, i)
 
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return parity.set_view_direction_and_return_leak_share(
-            view, record["forces"], record["gust"], fdi["bound"], G
-        )
+        return parity.turn_view(view, record["forces"], record["gust"], fdi["bound"], G)
 
     @staticmethod
-    def subtracts_gust_estimate(record, view):
-        return parity.subtracts_gust_estimate(view, record["gust"])
+    def subtracts_gust(record, view):
+        return parity.subtracts_gust(view, record["gust"])
 
     @staticmethod
     def blur(view, record, V):
-        parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.set_view_noise_drift_and_bound(view, *parts, V)
+        parts = (record[name] for name in ("noise", "block", "forces", "gust", "vaneless"))
+        parity.fill_view_noise(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
-        view["column_leak_share"] = share
-        parts = (fdi["statistical"][name] for name in ("block", "forces", "gust", "inertial_gust"))
-        parity.fill_view_regressors(view, *parts, innovation)
+        view["leak"] = share
+        along = sum(g * Across.part(fdi, view, innovation, i) for i, g in enumerate(view["col"]) if g)
+        parity.fill_view_regressors(view, fdi["statistical"]["block"], fdi["statistical"]["forces"], along)
 
     @staticmethod
     def sign(fdi, view, Gu):
@@ -129,48 +121,40 @@ class Across:
     @staticmethod
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
-        views, tests = views_of(record), record["test_config"]
-        parity.set_view_use_directions_signatures(views, record["forces"], record["gust"], bound, G, Gu)
-        parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.fill_view_innovations_noise_regressors(
-            views, int(tests["uses_regressors"]), *parts, innovation, y[2]
-        )
-        parity.update_view_tests(
-            views, tests, record["tone_test_config"], y, fdi["config"]["dt"], frame, latched
-        )
+        views, tests = views_of(record), record["test"]
+        parity.turn_views(views, record["forces"], record["gust"], bound, G, Gu)
+        parts = (record[name] for name in ("noise", "block", "forces", "gust", "vaneless"))
+        parity.project_innovation(views, int(tests["regress"]), *parts, innovation, y[2])
+        parity.update_views(views, tests, record["tone_test_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
-    def can_surface_fault_change_view(fdi, view, s, column):
-        return parity.can_surface_fault_change_view(view, fdi["statistical"]["forces"], s, column)
+    def changes_view(fdi, view, s, column):
+        return parity.changes_view(view, fdi["statistical"]["forces"], s, column)
 
     @staticmethod
     def shown(record, view):
-        return parity.score_confirmed_without_vane(
-            view, views_of(record), record["test_config"], record["forces"], record["gust"]
+        return parity.confirmed_score(
+            view, views_of(record), record["test"], record["forces"], record["gust"]
         )
 
     @staticmethod
     def alarm(record, view):
         return parity.view_alarm_score(
-            view, views_of(record), record["test_config"], record["forces"], record["gust"]
+            view, views_of(record), record["test"], record["forces"], record["gust"]
         )
 
     @staticmethod
     def excludes(fdi, s):
         record, column = (
             fdi["statistical"],
-            fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][
-                fdi["layout"]["position_estimator"][s]
-            ],
+            fdi["isolation"]["estimator"]["effect"]["regressor"][fdi["layout"]["position"][s]],
         )
         views = views_of(record)
-        return parity.views_exclude_surface(
-            views, record["test_config"], record["forces"], record["gust"], s, column
-        )
+        return parity.views_exclude(views, record["test"], record["forces"], record["gust"], s, column)
 
 
 def put(record, **fields):
     """Write loose numbers where they belong: tests, noise, alarm."""
     for name, value in fields.items():
-        (part,) = [part for part in ("test_config", "noise", "alarm") if name in record[part].dtype.names]
+        (part,) = [part for part in ("test", "noise", "alarm") if name in record[part].dtype.names]
         record[part][name] = value

@@ -9,11 +9,9 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
-from beaver_ftc.diagnosis.monitors import redundancy
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
-Q, V = np.array([0.9, 0.1, -0.2, 0.3]), np.array([40.0, 2.0, -3.0])
 
 
 def design():
@@ -24,10 +22,7 @@ FILL = {
     "free response": ((3,), lambda out: model.both_responses(design(), X, Y, out, np.full((3, 4), 9.0))),
     "control effectiveness": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
-    "level axes": ((3, 3), lambda out: gusts.fill_level_to_body_rotation(0.3, 0.2, out)),
-    "quaternion": ((4,), lambda out: redundancy.fill_quaternion(0.3, 0.2, 0.1, out)),
-    "turned": ((4,), lambda out: redundancy.fill_advanced_quaternion(Q, X, 0.02, out)),
-    "turned back": ((3,), lambda out: redundancy.fill_vector_in_turned_axes(X, 0.02, V, out)),
+    "level axes": ((3, 3), lambda out: gusts.fill_rotation(0.3, 0.2, out)),
 }
 
 
@@ -47,36 +42,34 @@ def test_the_drift_of_the_detectors_blocks(moving):
     for before in (0.0, 9.0):
         fdi = new_fdi()
         record = fdi["statistical"]
-        record["gust"]["output"]["accounts_for_gusts"], record["noise"]["deflection_error_effect_bound"] = (
+        record["gust"]["output"]["gusty"], record["noise"]["eta_u"] = (
             moving,
             0.01,
         )
         (
             record["gust"]["output"]["rate_damping"],
-            record["gust"]["memory"]["gust_rotation_intensity_per_airspeed"],
-            record["gust"]["memory"]["unmeasured_intensity_share"],
+            record["gust"]["memory"]["Q"],
+            record["gust"]["memory"]["share"],
         ) = np.eye(3), 1e-3, 0.5
-        record["gust"]["output"]["gust_axes_in_body"] = np.arange(9.0).reshape(3, 3)
+        record["gust"]["output"]["C"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
-            block["n_axes"], block["axes"][: len(axes)], block["gust_drift_intensity_factor"] = (
+            block["n"], block["axes"][: len(axes)], block["Q_scale"] = (
                 len(axes),
                 axes,
                 1.0,
             )
-        record["noise"]["uncertainty_bound"] = record["block"]["drift_intensity"] = record["block"][
-            "model_noise_variance"
-        ] = before
-        fdi["bound"]["constant_error_bound"] = 0.02
+        record["noise"]["eta"] = record["block"]["Q_d"] = record["block"]["Q_x"] = before
+        fdi["bound"]["const"] = 0.02
         Statistical.drifts(record, fdi, design(), X, Y)
         found.append(
             [
-                record["noise"]["uncertainty_bound"].tolist(),
-                record["block"]["drift_intensity"][0, 0, 0].tolist(),
+                record["noise"]["eta"].tolist(),
+                record["block"]["Q_d"][0, 0, 0].tolist(),
             ]
         )
         found[-1] += [
-            record["block"]["drift_intensity"][1].tolist(),
-            record["block"]["model_noise_variance"][1].tolist(),
+            record["block"]["Q_d"][1].tolist(),
+            record["block"]["Q_x"][1].tolist(),
         ]
     assert found[0] == found[1]
 
@@ -85,20 +78,18 @@ def test_the_gusts_effect():
     found, filled = (
         [],
         (
-            "specific_force",
-            "air_rotation_in_body_axes",
-            "angular_acceleration_by_gust",
-            "angular_acceleration_by_coarse_gust",
+            "f",
+            "w_body",
+            "acc",
+            "acc_coarse",
             "rate_damping",
         ),
     )
     for before in (0.0, 9.0):
         record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-        fill(
-            record, wing_span=14.0, gust_axes_in_body=np.eye(3), air_rotation_in_level_axes=(0.0, 0.02, -0.03)
-        )
+        fill(record, span=14.0, C=np.eye(3), w=(0.0, 0.02, -0.03))
         fill(record, **dict.fromkeys((*filled, "scratch"), before))
-        gusts.fill_gust_effect_and_specific_force(record, design(), X, Y, U)
+        gusts.fill_gust_effect(record, design(), X, Y, U)
         found.append([holder(record, name)[name].tolist() for name in filled])
     assert found[0] == found[1]
 

@@ -7,9 +7,9 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.bounds import (
-    acceleration_per_air_rotation,
-    declared_errors_for_plugin,
+    air_rotation_slopes,
     model_error_std,
+    plugin_errors,
 )
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -69,7 +69,7 @@ def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
 
 
 def declared(design, **bounds):
-    return declared_errors_for_plugin(declared_in(Bounds.model_validate(bounds), AIRCRAFT), design, Y, U)
+    return plugin_errors(declared_in(Bounds.model_validate(bounds), AIRCRAFT), design, Y, U)
 
 
 def test_of_an_air_datum_noise_bias_and_rounding_count(design):
@@ -100,7 +100,7 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
 
 def test_a_tolerance_is_a_share_of_each_coefficient(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = declared_errors_for_plugin(declared_in(bounds, AIRCRAFT), design, Y, U)
+    told = plugin_errors(declared_in(bounds, AIRCRAFT), design, Y, U)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 
@@ -131,4 +131,4 @@ def test_rotating_air_shows_by_a_central_difference():
         def f(self, x, y):
             return A @ x + x**2 + 1e6 * x**3
 
-    assert acceleration_per_air_rotation(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)
+    assert air_rotation_slopes(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds import (
-    detection_poles_for_delays,
-    fill_acceleration_error_bound_per_rad,
-    fill_magnitudes_and_add_declared_bound,
-    max_inertia_coefficient_errors,
+    add_declared_bound,
+    fill_eG,
+    inertia_bounds,
+    poles_for_delays,
 )
-from beaver_ftc.diagnosis.detection.filters import advance_gyro_error_bound
+from beaver_ftc.diagnosis.detection.filters import advance_gyro
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -46,9 +46,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
-    fill_magnitudes_and_add_declared_bound(
-        frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, out
-    )
+    add_declared_bound(frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, out)
     return out
 
 
@@ -114,7 +112,7 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
     change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
     there, nominal = (np.array(inertia_coefficients(m)) for m in (replace(MASS, **change), MASS))
-    assert (np.abs(there - nominal) <= max_inertia_coefficient_errors(tolerance, MASS) * (1 + 1e-12)).all()
+    assert (np.abs(there - nominal) <= inertia_bounds(tolerance, MASS) * (1 + 1e-12)).all()
 
 
 @settings(max_examples=samples(100), deadline=None)
@@ -127,7 +125,7 @@ def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames)
         eps, filtered = 0.0, nbar[0]
         for k in range(frames):
             eps = a * eps + n[k + 1] - n[k]
-            filtered = advance_gyro_error_bound(filtered, nbar[k], a)
+            filtered = advance_gyro(filtered, nbar[k], a)
         assert abs(eps) <= filtered + nbar[-1] + 1e-12
     assert abs(eps) == pytest.approx(filtered + nbar[-1], rel=1e-9)
 
@@ -140,12 +138,10 @@ def test_poles_for_noise_give_the_greatest_excess():
     def smallest_fault(pole, delay_s):
         return (nbar * pole + eta) / (1 - np.exp(-pole * delay_s))
 
-    for delay_s, pole in zip(
-        (0.1, 0.5, 2.0), detection_poles_for_delays(SensorErrors(sensors), eta), strict=True
-    ):
+    for delay_s, pole in zip((0.1, 0.5, 2.0), poles_for_delays(SensorErrors(sensors), eta), strict=True):
         least = min(smallest_fault(other, delay_s) for other in np.geomspace(0.05, 200, 4000))
         assert smallest_fault(pole, delay_s) == pytest.approx(least, rel=1e-5)
-    assert detection_poles_for_delays(SensorErrors(Sensors()), eta) == ()
+    assert poles_for_delays(SensorErrors(Sensors()), eta) == ()
 
 
 def test_errors_that_have_no_bound_cannot_be_declared():
@@ -167,14 +163,10 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
     frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
-    fill_magnitudes_and_add_declared_bound(
+    add_declared_bound(
         frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, np.zeros(3)
     )
-    fill_acceleration_error_bound_per_rad(
-        frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], surface
-    )
+    fill_eG(frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], surface)
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
-    assert frame["fdi"]["bound"]["declared_errors"]["acceleration_error_bound_per_rad"][
-        :, surface
-    ] == pytest.approx(rise, abs=1e-9)
+    assert frame["fdi"]["bound"]["declared_errors"]["eG"][:, surface] == pytest.approx(rise, abs=1e-9)
     assert rise.max() > 0.1

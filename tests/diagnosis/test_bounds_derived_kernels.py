@@ -27,21 +27,17 @@ def records(seed=0, gust=0.02, deflection=0.004):
     rng = np.random.default_rng(seed)
     frame = configure_design(Scenario.model_validate({"name": "x"}), TRAVEL_RAD).view(np.recarray)[0]
     declared_errors, design = frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"]
-    declared_errors["coefficient_tolerance"][: len(AIRCRAFT.moments)] = rng.uniform(
-        0.001, 0.05, len(AIRCRAFT.moments)
-    )
-    declared_errors["inertia_coefficient_tolerance"] = rng.uniform(0.001, 0.1, 12)
-    declared_errors["signal_error_bound_at_zero"] = rng.uniform(0.001, 0.01, 7) * [1, 1, 1, 1, 1, 100, 2000]
-    declared_errors["signal_error_bound_per_unit"] = rng.uniform(0.001, 0.02, 7)
-    declared_errors["air_rotation_bound"], declared_errors["deflection_error_bound"] = gust, deflection
+    declared_errors["dC"][: len(AIRCRAFT.moments)] = rng.uniform(0.001, 0.05, len(AIRCRAFT.moments))
+    declared_errors["dI"] = rng.uniform(0.001, 0.1, 12)
+    declared_errors["e0"] = rng.uniform(0.001, 0.01, 7) * [1, 1, 1, 1, 1, 100, 2000]
+    declared_errors["e1"] = rng.uniform(0.001, 0.02, 7)
+    declared_errors["wg"], declared_errors["du"] = gust, deflection
     return declared_errors, design
 
 
 def furthest(declared_errors, i, reading):
     """The largest truth that reads so: |reading - truth| <= offset + slope |truth|."""
-    return (abs(reading) + declared_errors["signal_error_bound_at_zero"][i]) / (
-        1.0 - declared_errors["signal_error_bound_per_unit"][i]
-    )
+    return (abs(reading) + declared_errors["e0"][i]) / (1.0 - declared_errors["e1"][i])
 
 
 def by_terms(declared_errors, design, u):
@@ -58,7 +54,7 @@ def by_terms(declared_errors, design, u):
     slowest = 2.0 * Y[2] - furthest(declared_errors, 5, Y[2])
     for i, name in enumerate(("ph", "qh", "rh")):
         near[name] = LENGTHS[name] * abs(X[i]) / Y[2]
-        far[name] = LENGTHS[name] * (largest_x[i] + declared_errors["air_rotation_bound"][i]) / slowest
+        far[name] = LENGTHS[name] * (largest_x[i] + declared_errors["wg"][i]) / slowest
     pressure, far_pressure = Y[3], furthest(declared_errors, 6, Y[3])
     moments = {"Cl": [0.0, 0.0], "Cm": [0.0, 0.0], "Cn": [0.0, 0.0]}
     per_rad = {name: np.zeros((4, 2)) for name in moments}
@@ -67,18 +63,18 @@ def by_terms(declared_errors, design, u):
             AIRCRAFT.geometry.chord_m if term.coefficient == "Cm" else AIRCRAFT.geometry.span_m
         )
         size = pressure * arm * abs(term.value) * prod(near[s] ** p for s, p in term.of)
-        larger = far_pressure * arm * (abs(term.value) + declared_errors["coefficient_tolerance"][k])
+        larger = far_pressure * arm * (abs(term.value) + declared_errors["dC"][k])
         larger *= prod(far[s] ** p for s, p in term.of)
         if term.surface is not None:
             s = AIRCRAFT.surfaces.index(term.surface)
             per_rad[term.coefficient][s] += size, larger
-            size, larger = size * abs(u[s]), larger * (abs(u[s]) + declared_errors["deflection_error_bound"])
+            size, larger = size * abs(u[s]), larger * (abs(u[s]) + declared_errors["du"])
         moments[term.coefficient][0] += size
         moments[term.coefficient][1] += larger
 
     def slack(name, near, far):
         value = abs(design[name])
-        return (value + declared_errors["inertia_coefficient_tolerance"][order[name]]) * far - value * near
+        return (value + declared_errors["dI"][order[name]]) * far - value * near
 
     def rates(name, i, j):
         return slack(name, abs(X[i] * X[j]), largest_x[i] * largest_x[j])
@@ -100,37 +96,37 @@ def by_terms(declared_errors, design, u):
 def test_the_bound_is_the_sum_of_what_each_product_can_grow_by(seed):
     declared_errors, design = records(seed)
     out = np.array([0.1, 0.2, 0.3])
-    bounds.fill_magnitudes_and_add_declared_bound(declared_errors, design, X, Y, U, out)
+    bounds.add_declared_bound(declared_errors, design, X, Y, U, out)
     bound, slopes = by_terms(declared_errors, design, U)
     assert out == pytest.approx(bound + np.array([0.1, 0.2, 0.3]), rel=1e-9)
     for s in range(4):
-        bounds.fill_acceleration_error_bound_per_rad(declared_errors, design, s)
-    assert declared_errors["acceleration_error_bound_per_rad"] == pytest.approx(slopes, rel=1e-9)
+        bounds.fill_eG(declared_errors, design, s)
+    assert declared_errors["eG"] == pytest.approx(slopes, rel=1e-9)
     assert slopes.max() > 0.01
 
 
 def test_the_airspeed_reckoned_with_is_a_tenth_of_the_reading_at_least():
     declared_errors, _ = records()
-    declared_errors["signal_error_bound_at_zero"][5] = 43.0
-    bounds.fill_signal_magnitudes(declared_errors, X, Y, U)
-    assert declared_errors["magnitude_bound_y"][2] == pytest.approx(4.4)
+    declared_errors["e0"][5] = 43.0
+    bounds.fill_magnitudes(declared_errors, X, Y, U)
+    assert declared_errors["yw"][2] == pytest.approx(4.4)
 
 
 def test_an_error_is_what_the_truth_may_be_off_and_of_a_gyro_what_changes():
     declared_errors, _ = records()
     (
-        declared_errors["signal_error_bound_at_zero"][1],
-        declared_errors["signal_error_bound_per_unit"][1],
-        declared_errors["constant_gyro_error_bound"][1],
+        declared_errors["e0"][1],
+        declared_errors["e1"][1],
+        declared_errors["steady"][1],
     ) = (
         0.03,
         0.1,
         0.01,
     )
     truth = (0.2 + 0.03) / 0.9
-    assert bounds.reading_error_bound(declared_errors, 1, -0.2) == pytest.approx(truth - 0.2)
+    assert bounds.reading_bound(declared_errors, 1, -0.2) == pytest.approx(truth - 0.2)
     # what is steady drops out; slope times the true rate and the rest of the offset may change
-    assert bounds.changing_gyro_error_bound(declared_errors, 1, -0.2) == pytest.approx(0.02 + 0.1 * truth)
+    assert bounds.n_gyro(declared_errors, 1, -0.2) == pytest.approx(0.02 + 0.1 * truth)
 
 
 @pytest.mark.parametrize("dpt", [0.4, 0.05])
@@ -141,9 +137,9 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
     y = Y.copy()
     y[4] = dpt
     (
-        declared_errors["has_engine_instrument_errors"],
-        declared_errors["power_error_kw_by_instruments"],
-        declared_errors["power_error_kw_per_density_ratio"],
+        declared_errors["engine"],
+        declared_errors["kw0"],
+        declared_errors["kw1"],
     ) = (
         engine,
         2.0,
@@ -160,31 +156,31 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
     more_kw = 2.0 + 150.0 * thinner
     power_kw = abs(dpt - DPT_0) * y[3] * y[2] / KW_TO_DPT
     there = KW_TO_DPT * (power_kw + more_kw) / (y[3] * (1.0 - pressure) * slowest)
-    assert bounds.slipstream_error_bound(declared_errors, y) == pytest.approx(there - abs(dpt - DPT_0))
-    bounds.fill_signal_magnitudes(declared_errors, X, y, U)
+    assert bounds.slipstream_bound(declared_errors, y) == pytest.approx(there - abs(dpt - DPT_0))
+    bounds.fill_magnitudes(declared_errors, X, y, U)
     off = there - abs(dpt - DPT_0) if engine else 0.0
-    assert declared_errors["magnitude_bound_y"][4] == pytest.approx(dpt + off)
-    assert declared_errors["magnitude_y"][4] == dpt
+    assert declared_errors["yw"][4] == pytest.approx(dpt + off)
+    assert declared_errors["ya"][4] == dpt
 
 
 def test_errors_as_large_as_the_reading_leave_a_tenth_of_it():
     declared_errors, _ = records()
-    declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
+    declared_errors["kw0"], declared_errors["kw1"] = (
         2.0,
         0.0,
     )
-    declared_errors["signal_error_bound_per_unit"], declared_errors["signal_error_bound_at_zero"] = (
+    declared_errors["e1"], declared_errors["e0"] = (
         0.0,
         (0, 0, 0, 0, 0, 2.0 * Y[2], 2.0 * Y[3]),
     )
     stretch = 1.0 / (0.1 * 0.1)
     expected = stretch * KW_TO_DPT * 2.0 / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)
-    assert bounds.slipstream_error_bound(declared_errors, Y) == pytest.approx(expected)
-    declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
+    assert bounds.slipstream_bound(declared_errors, Y) == pytest.approx(expected)
+    declared_errors["kw0"], declared_errors["kw1"] = (
         0.0,
         1.0,
     )
     denser = (1.0 + 2.0) / 0.1**2 - 1.0
     ratio = 2.0 * Y[3] / Y[2] ** 2 / SEA_LEVEL_DENSITY_KG_M3
     expected = stretch * KW_TO_DPT * denser * ratio / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)
-    assert bounds.slipstream_error_bound(declared_errors, Y) == pytest.approx(expected)
+    assert bounds.slipstream_bound(declared_errors, Y) == pytest.approx(expected)

@@ -33,19 +33,16 @@ def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
     missed, bounds = np.array(flown.innovations[:-1]), np.array(flown.bounds[:-1]) + ROUNDING_RAD_S2
     assert not fdi["verdict"]["detected"]
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(missed[-1])
-    keeps = fdi["bank"]["config"]["decay_factor"][:n]
+    keeps = fdi["bank"]["config"]["a"][:n]
     assert fdi["bank"]["output"]["residual"][:n] == pytest.approx(summed(keeps, missed))
     assert fdi["bank"]["output"]["threshold"][:n] == pytest.approx(summed(keeps, bounds))
     for i in range(3):
-        keep = fdi["fdae"]["config"]["decay_factor"][i]
+        keep = fdi["fdae"]["config"]["a"][i]
         assert fdi["fdae"]["output"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
         assert fdi["fdae"]["output"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["isolation"]["estimator"]["xhat"].any()
-    assert (
-        (fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:n] > 0.0)
-        & (fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:n] < 1.0)
-    ).all()
+    assert ((fdi["bank"]["output"]["peak"][:n] > 0.0) & (fdi["bank"]["output"]["peak"][:n] < 1.0)).all()
 
 
 @pytest.mark.parametrize("surface", [AILERON, ELEVATOR, RUDDER])
@@ -62,14 +59,14 @@ def test_an_alarm_is_of_the_frame_in_which_a_residual_leaves_its_bound(surface):
     first = int(np.flatnonzero(np.any(seen, axis=1))[0])
     assert first > AT
     assert flown.detected_at_s == pytest.approx(first / RATE_HZ)
-    assert flown.fdi["verdict"]["detected_axis"] == int(np.flatnonzero(seen[first])[0])
+    assert flown.fdi["verdict"]["axis"] == int(np.flatnonzero(seen[first])[0])
     assert seen[first][axis] or surface != ELEVATOR
     # Every estimator starts there, with no residual and all of its set.
     fie = flown.fdi["isolation"]["estimator"][surface]
     assert fie["xhat"] == pytest.approx(flown.frame["measured"]["x"])
     assert not fie["excluded"]
-    assert fie["theta_variance"] == pytest.approx([1.0 / 12.0] * 3)
-    assert not fie["filtered_regressor"].any()
+    assert fie["P"] == pytest.approx([1.0 / 12.0] * 3)
+    assert not fie["Om"].any()
 
 
 def loss_flown(surface, kind=exactly, frames=60, **fdi):
@@ -80,10 +77,10 @@ def loss_flown(surface, kind=exactly, frames=60, **fdi):
         fie, verdict = flown.fdi["isolation"]["estimator"][surface], flown.fdi["verdict"]
         assert not fie["excluded"]
         if verdict["detected"]:
-            asked = fie["ignored_axes"] == 0
+            asked = fie["skip"] == 0
             room = 1e-12
-            assert (fie["lower_threshold"] - room <= fie["residual"])[asked].all()
-            assert (fie["residual"] <= fie["upper_threshold"] + room)[asked].all()
+            assert (fie["mu_lo"] - room <= fie["residual"])[asked].all()
+            assert (fie["residual"] <= fie["mu_hi"] + room)[asked].all()
             assert (fie["theta_min"] <= fie["theta"]).all()
             assert (fie["theta"] <= fie["theta_max"]).all()
     return flown
@@ -115,8 +112,8 @@ def test_an_estimator_filters_what_its_fault_does_not_explain():
         if verdict["detected"]:
             alarm = round(float(verdict["detected_at_s"]) * RATE_HZ)
             moments = np.array(flown.innovations[alarm:k]).reshape(-1, 3) / THETA
-            omega = summed(flown.fdi["isolation"]["config"]["filter_decay"][ELEVATOR], moments)
-            assert fie["filtered_regressor"] == pytest.approx(omega, abs=1e-15)
+            omega = summed(flown.fdi["isolation"]["config"]["a"][ELEVATOR], moments)
+            assert fie["Om"] == pytest.approx(omega, abs=1e-15)
             assert fie["residual"] == pytest.approx(omega * (THETA - fie["theta"]), abs=1e-12)
             steps.append(np.abs(fie["residual"]).max())
     assert len(steps) > 40
@@ -137,10 +134,7 @@ def test_what_is_known_of_a_fault_is_expected_from_the_alarm_on(known, whole_cla
         if flown.fdi["verdict"]["detected"] and known:
             control["surfaces"]["output"]["effectiveness"][ELEVATOR] = 0.0 if whole_class else 1.0 + THETA
             control["surfaces"]["output"]["offset"][ELEVATOR] = stuck_at if whole_class else 0.0
-    left = (
-        flown.frame["prediction"]["acceleration_with_known_faults"]
-        - flown.frame["prediction"]["frame_means"]["predicted_acceleration"]
-    )
+    left = flown.frame["prediction"]["F_known"] - flown.frame["prediction"]["means"]["F"]
     phi = np.array(flown.innovations[-2])
     assert np.abs(phi).max() > 0.05
     assert left == pytest.approx(phi if known else 0.0 * phi, abs=1e-12)
@@ -165,7 +159,7 @@ def test_of_faults_of_every_kind_the_true_position_is_never_excluded(name, surfa
         assert not flown.position_excluded(surface)
     verdict = flown.fdi["verdict"]
     assert verdict["detected"]
-    assert verdict["accommodated_surface"] in (-1, surface)
+    assert verdict["target"] in (-1, surface)
     named = int(verdict["isolated_estimator"])
     assert named == -1 or flown.fdi["isolation"]["estimator"]["surface"][named] == surface
     if name != "oscillation" or surface != RUDDER:

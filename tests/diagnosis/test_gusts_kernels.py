@@ -23,12 +23,12 @@ Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 def new_air(**fields):
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
     (
-        record["config"]["wing_span"],
+        record["config"]["span"],
         record["config"]["gravity"],
-        record["output"]["accounts_for_gusts"],
-        record["output"]["is_gust_measured"],
+        record["output"]["gusty"],
+        record["output"]["measured"],
     ) = SPAN, GRAVITY, 1, 1
-    record["config"]["turbulence_scale_length"], record["config"]["rolling_gust_correlation_length"] = (
+    record["config"]["L_gust"], record["config"]["L_roll"] = (
         SCALE,
         ROLLING,
     )
@@ -78,67 +78,59 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
     """Whatever aircraft and heading do: each lag keeps its share, and the change of the air's velocity, seen
     from the level axes of now, is added."""
     flight, record = Flight(seed), new_air()
-    gusts.start_gust_estimate(record, *flight.reading())
+    gusts.start_gust(record, *flight.reading())
     pitching = yawing = 0.0
     for _ in range(6):
-        wind, axes_then = flight.wind, record["output"]["gust_axes_in_body"].copy()
+        wind, axes_then = flight.wind, record["output"]["C"].copy()
         psi_then = flight.attitude[2]
-        record["memory"]["specific_force"] = flight.step()
+        record["memory"]["f"] = flight.step()
         y, attitude = flight.reading()
-        gusts.advance_gust_estimate(record, y, attitude, DT)
+        gusts.advance_gust(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
         yawing = np.exp(-DT / tau_r) * yawing + change[1] / (y[2] * tau_r)
-        assert record["memory"]["air_rotation_in_level_axes"] == pytest.approx([0.0, pitching, yawing])
+        assert record["memory"]["w"] == pytest.approx([0.0, pitching, yawing])
         # The axes of the gusts: level, along the heading of the instant before.
         axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
-        assert record["output"]["gust_axes_in_body"] == pytest.approx(axes)
-        assert record["memory"]["gust_axes_rate"] == pytest.approx((axes - axes_then) / DT)
+        assert record["output"]["C"] == pytest.approx(axes)
+        assert record["memory"]["C_dot"] == pytest.approx((axes - axes_then) / DT)
 
 
 @pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
 def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(turn_rad, swings):
     flight, record = Flight(1, 0.0, 0.0), new_air()
-    gusts.start_gust_estimate(record, *flight.reading())
+    gusts.start_gust(record, *flight.reading())
     flight.attitude[1] = 0.0
     for _ in range(3):
-        record["memory"]["specific_force"] = flight.step()
+        record["memory"]["f"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
-        gusts.advance_gust_estimate(record, y, attitude, DT)
+        gusts.advance_gust(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
-    assert (
-        not 0.8 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
-        < walk
-        < 1.3 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
-    )
-    assert (
-        bool(record["memory"]["has_fast_axes_turn"])
-        == swings
-        == (walk > gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN)
-    )
+    assert not 0.8 * gusts.FAST_TURN_SHARE < walk < 1.3 * gusts.FAST_TURN_SHARE
+    assert bool(record["memory"]["turns_fast"]) == swings == (walk > gusts.FAST_TURN_SHARE)
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
-    record = new_air(gust_axes_in_body=np.eye(3))
-    most = np.sqrt(2.0 * gusts.MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN) * 45.0 / ROLLING
-    record["memory"]["gust_axes_rate"] = np.eye(3)
-    record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
-    record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT
-    gusts.fill_axes_rate_and_fast_turn(record, DT, 45.0)
-    assert record["memory"]["gust_axes_rate"][1, 2] == pytest.approx(-share * most)
-    assert record["memory"]["has_fast_axes_turn"] == (share > 1.0)
+    record = new_air(C=np.eye(3))
+    most = np.sqrt(2.0 * gusts.FAST_TURN_SHARE) * 45.0 / ROLLING
+    record["memory"]["C_dot"] = np.eye(3)
+    record["memory"]["C_dot"][1, 2] = share * most * DT
+    record["memory"]["C_dot"][0, 0] += 0.5 * most * DT
+    gusts.fill_axes_rate(record, DT, 45.0)
+    assert record["memory"]["C_dot"][1, 2] == pytest.approx(-share * most)
+    assert record["memory"]["turns_fast"] == (share > 1.0)
 
 
 def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     """One fast turn: for that instant and the next nothing is added, and what is lost then decays."""
     record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
     level = np.zeros(3)
-    gusts.start_gust_estimate(record, y, level)
-    record["memory"]["specific_force"], record["memory"]["air_rotation_in_level_axes"] = (
+    gusts.start_gust(record, y, level)
+    record["memory"]["f"], record["memory"]["w"] = (
         (0.0, 0.0, -GRAVITY),
         (0.0, 0.0, 0.05),
     )
@@ -151,18 +143,16 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**3, lag),
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
-        gusts.advance_gust_estimate(record, y, np.array(attitude), DT)
-        assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(gust)
-        assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(turning)
-        record["memory"]["specific_force"] = 0.0, 0.0, -GRAVITY
+        gusts.advance_gust(record, y, np.array(attitude), DT)
+        assert record["memory"]["w"][2] == pytest.approx(gust)
+        assert record["memory"]["turn_past"] == pytest.approx(turning)
+        record["memory"]["f"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
-    gusts.advance_gust_estimate(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["memory"]["unmeasured_yawing_share_by_turn_now"] == pytest.approx(0.25)
-    assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(max(lag**3, 0.25))
+    gusts.advance_gust(record, y, np.array([0, 0, turn + part]), DT)
+    assert record["memory"]["turn_now"] == pytest.approx(0.25)
+    assert record["memory"]["turn_past"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
-    assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(
-        0.05 * lag**5 - aside / (45.0 * tau_r)
-    )
+    assert record["memory"]["w"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -178,59 +168,57 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
             [0.0, 0.0, -GRAVITY]
         )  # nothing accelerates
 
-    y, record["memory"]["specific_force"] = look(then, 1)
-    gusts.start_gust_estimate(record, y, then)
-    record["memory"]["air_rotation_in_level_axes"][2] = 0.05
+    y, record["memory"]["f"] = look(then, 1)
+    gusts.start_gust(record, y, then)
+    record["memory"]["w"][2] = 0.05
     if late:  # the wind turns a step after the heading
         y, force = look(over, [-1, -1, 1])
-        gusts.advance_gust_estimate(record, y, over, DT)
-        record["memory"]["specific_force"] = force
-    gusts.advance_gust_estimate(record, look(over, 1)[0], over, DT)
-    assert abs(record["memory"]["air_rotation_in_level_axes"][2]) <= 0.05
-    unseen, record["memory"]["unmeasured_intensity_share"] = (
-        np.array(record["memory"]["unmeasured_intensity_share"]),
+        gusts.advance_gust(record, y, over, DT)
+        record["memory"]["f"] = force
+    gusts.advance_gust(record, look(over, 1)[0], over, DT)
+    assert abs(record["memory"]["w"][2]) <= 0.05
+    unseen, record["memory"]["share"] = (
+        np.array(record["memory"]["share"]),
         np.ones(3),
     )
-    record["output"]["rate_damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["gust_axes_in_body"].T
-    everything = gusts.unmeasured_gust_drift_intensity(record, 45.0, 2, 2)
-    record["memory"]["unmeasured_intensity_share"] = unseen
-    assert gusts.unmeasured_gust_drift_intensity(record, 45.0, 2, 2) == pytest.approx(everything)
+    record["output"]["rate_damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["C"].T
+    everything = gusts.unmeasured_drift(record, 45.0, 2, 2)
+    record["memory"]["share"] = unseen
+    assert gusts.unmeasured_drift(record, 45.0, 2, 2) == pytest.approx(everything)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_level_axes_are_a_rotation(seed):
     phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)
     turn, body = np.full((3, 3), 9.0), np.random.default_rng(seed + 10).normal(size=3)
-    gusts.fill_level_to_body_rotation(phi, theta, turn)
+    gusts.fill_rotation(phi, theta, turn)
     of_level = to_earth((phi, theta, 0.0))
     assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
-    assert [gusts.component_in_level_axes(turn, body, i) for i in range(3)] == pytest.approx(
-        of_level.apply(body)
-    )
+    assert [gusts.level_component(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
 
 
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(
-        has_acceleration_before=1,
-        unmeasured_yawing_share_by_turn_now=0.4,
-        unmeasured_yawing_share_by_past_turns=0.3,
-        air_rotation_in_level_axes=(0.1, 0.2, 0.3),
+        has_prev=1,
+        turn_now=0.4,
+        turn_past=0.3,
+        w=(0.1, 0.2, 0.3),
     )
-    gusts.start_gust_estimate(record, *flight.reading())
+    gusts.start_gust(record, *flight.reading())
     assert (
-        record["memory"]["has_acceleration_before"],
-        record["memory"]["unmeasured_yawing_share_by_turn_now"],
-        record["memory"]["unmeasured_yawing_share_by_past_turns"],
+        record["memory"]["has_prev"],
+        record["memory"]["turn_now"],
+        record["memory"]["turn_past"],
     ) == (
         0,
         0.0,
         0.0,
     )
-    assert not record["memory"]["air_rotation_in_level_axes"].any()
-    assert record["output"]["gust_axes_in_body"] == pytest.approx(record["memory"]["level_to_body"])
+    assert not record["memory"]["w"].any()
+    assert record["output"]["C"] == pytest.approx(record["memory"]["T"])
     through = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.velocity - flight.wind)
-    assert record["memory"]["air_relative_velocity"] == pytest.approx(through)
+    assert record["memory"]["v"] == pytest.approx(through)
 
 
 def without_inertia(design):
@@ -244,13 +232,13 @@ def without_inertia(design):
 def test_what_a_gust_does_is_what_the_opposite_rates_would():
     """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
     design = design_record().view(np.recarray)
-    record = new_air(wing_area_per_mass=0.01)
-    fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
-    record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
-    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
+    record = new_air(S_m=0.01)
+    fill_table(record["memory"]["table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    gusts.start_gust(record, Y, np.array([0.3, 0.2, 1.0]))
+    record["memory"]["w"] = 0.0, 0.02, -0.03
+    gusts.fill_gust_effect(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
-    assert record["memory"]["air_rotation_in_body_axes"] == pytest.approx(rotation)
+    assert record["memory"]["w_body"] == pytest.approx(rotation)
 
     def acceleration(x):
         f, G = np.zeros(3), np.zeros((3, 4))
@@ -259,34 +247,34 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
 
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
-    assert record["output"]["angular_acceleration_by_gust"] == pytest.approx(expected, rel=1e-6)
-    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
-    gusts.begin_gust_sums_with_instant(record, 45.0, 0.01)
-    record["output"]["angular_acceleration_by_gust"] = 0.0
-    assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(expected, rel=1e-6)
+    assert record["output"]["acc"] == pytest.approx(expected, rel=1e-6)
+    gusts.fill_gust_effect(record, design[0], X, Y, U)
+    gusts.begin_gust_sums(record, 45.0, 0.01)
+    record["output"]["acc"] = 0.0
+    assert record["memory"]["acc_sum"] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(
     ("fields", "force"),
     [
-        ({"uses_accelerometers": 1, "has_only_coarse_estimate": 1}, (1.0, -2.0, -9.0)),
-        ({"has_only_coarse_estimate": 1, "is_gust_measured": 0}, (0.0, 0.0, -GRAVITY / 0.8)),
-        ({"has_only_coarse_estimate": 1, "is_gust_measured": 0, "steep": 0.3}, (0.0, 0.0, -GRAVITY / 0.5)),
+        ({"uses_accelerometers": 1, "coarse_only": 1}, (1.0, -2.0, -9.0)),
+        ({"coarse_only": 1, "measured": 0}, (0.0, 0.0, -GRAVITY / 0.8)),
+        ({"coarse_only": 1, "measured": 0, "steep": 0.3}, (0.0, 0.0, -GRAVITY / 0.5)),
     ],
 )
 def test_the_force_is_as_measured_or_the_lift_of_this_bank_and_a_coarse_gust_is_counted_apart(fields, force):
     design = design_record().view(np.recarray)
     record = new_air(**{name: value for name, value in fields.items() if name != "steep"})
     gusts.store_accelerometer_reading(record, np.array([1.0, -2.0, -9.0]))
-    record["memory"]["level_to_body"][2, 2] = fields.get("steep", 0.8)
-    record["memory"]["air_rotation_in_level_axes"] = 9.0, 0.02, -0.03
-    record["output"]["gust_axes_in_body"] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
-    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
-    assert record["memory"]["specific_force"] == pytest.approx(force)
+    record["memory"]["T"][2, 2] = fields.get("steep", 0.8)
+    record["memory"]["w"] = 9.0, 0.02, -0.03
+    record["output"]["C"] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
+    gusts.fill_gust_effect(record, design[0], X, Y, U)
+    assert record["memory"]["f"] == pytest.approx(force)
     rotation = np.array([[0.2, 0.3], [0.5, 0.6], [0.8, 0.9]]) @ [0.02, -0.03]
     effect, none = -record["output"]["rate_damping"] @ rotation, np.zeros(3)
-    found = [record["output"][f"angular_acceleration_by_{name}"] for name in ("gust", "coarse_gust")]
-    is_measured = fields.get("is_gust_measured", 1)
+    found = [record["output"][name] for name in ("acc", "acc_coarse")]
+    is_measured = fields.get("measured", 1)
     assert np.array(found) == pytest.approx(np.array([effect, none] if is_measured else [none, effect]))
 
 
@@ -296,38 +284,38 @@ def test_without_accelerometers_and_a_model_of_the_forces_all_of_the_gust_is_unk
 ):
     """Its variance is V sigma2 / 2 times the lag's length; the rolling gust was unknown before."""
     rng, intensity = np.random.default_rng(3), np.array([1e-3, 2e-3, 3e-3])
-    record = new_air(uses_accelerometers=1, is_gust_measured=measured, has_force_model=model)
+    record = new_air(uses_accelerometers=1, measured=measured, has_forces=model)
     output, memory = record["output"], record["memory"]
-    output["rate_damping"], output["gust_axes_in_body"] = rng.normal(size=(2, 3, 3))
-    memory["gust_rotation_intensity_per_airspeed"] = intensity
-    memory["unmeasured_intensity_share"] = share = np.array([0.1, 0.2, 0.3])
-    before = memory["acceleration_variance_by_axes_turn_now"][:] = rng.normal(size=(3, 3))
-    gusts.stop_using_accelerometers(record)
+    output["rate_damping"], output["C"] = rng.normal(size=(2, 3, 3))
+    memory["Q"] = intensity
+    memory["share"] = share = np.array([0.1, 0.2, 0.3])
+    before = memory["var_now"][:] = rng.normal(size=(3, 3))
+    gusts.drop_accelerometers(record)
     lengths_m = np.array([0.0, 4.0 * SPAN / np.pi, 3.0 * SPAN / np.pi])
-    effect = output["rate_damping"] @ output["gust_axes_in_body"]
+    effect = output["rate_damping"] @ output["C"]
     added = effect @ np.diag(0.5 * lengths_m * intensity) @ effect.T
-    assert memory["acceleration_variance_by_axes_turn_now"] == pytest.approx(before + unknown * added)
-    assert memory["n_frames_left_with_axes_turn_variance"] == 3 * unknown
-    assert memory["unmeasured_intensity_share"] == pytest.approx(np.ones(3) if unknown else share)
-    assert (output["uses_accelerometers"], output["is_gust_measured"]) == (0, measured and not unknown)
+    assert memory["var_now"] == pytest.approx(before + unknown * added)
+    assert memory["n_turn"] == 3 * unknown
+    assert memory["share"] == pytest.approx(np.ones(3) if unknown else share)
+    assert (output["uses_accelerometers"], output["measured"]) == (0, measured and not unknown)
 
 
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(
         (
-            "air_rotation_in_level_axes",
-            "has_acceleration_before",
-            "unmeasured_yawing_share_by_turn_now",
-            "unmeasured_yawing_share_by_past_turns",
-            "acceleration_variance_by_axes_turn_now",
-            "acceleration_variance_by_axes_turn_before",
-            "acceleration_variance_by_axes_turn",
-            "n_frames_left_with_axes_turn_variance",
+            "w",
+            "has_prev",
+            "turn_now",
+            "turn_past",
+            "var_now",
+            "var_prev",
+            "var_turn",
+            "n_turn",
         ),
         1,
     )
     record = new_air(**kept)
-    gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
+    gusts.start_gust(record, Y, np.array([0.3, 0.2, 1.0]))
     assert {name for name in kept if np.any(holder(record, name)[name])} == set()
 
 
@@ -340,17 +328,17 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     alpha = 0.15
     y, level = np.array([alpha, 0.0, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0]), np.array([0.0, alpha, 1.0])
     record, seen = new_air(), []
-    gusts.start_gust_estimate(record, y, level)
+    gusts.start_gust(record, y, level)
     for _ in range(4000):
-        record["memory"]["specific_force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
+        record["memory"]["f"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
-        gusts.advance_gust_estimate(record, y, blurred, DT)
-        seen.append(record["memory"]["air_rotation_in_level_axes"].copy())
+        gusts.advance_gust(record, y, blurred, DT)
+        seen.append(record["memory"]["w"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
     counted, reckoned = (
         np.std(seen, axis=0)[1:] * lags,
-        bounds.flow_angle_in_level_axes_noise_std(SensorErrors(sensors), 45.0),
+        bounds.flow_noise(SensorErrors(sensors), 45.0),
     )
     assert (counted <= 1.02 * reckoned).all()
     if axis is not None:

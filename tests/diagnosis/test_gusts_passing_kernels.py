@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
-from beaver_ftc.diagnosis.bounds import declared_errors_dtype
+from beaver_ftc.diagnosis.bounds import errors_dtype
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
@@ -25,18 +25,18 @@ def record_of(dtype):
 def in_moving_air():
     record = record_of(gusts.GUST_RECORD)
     (
-        record["output"]["is_gust_measured"],
-        record["config"]["max_gust_velocity"],
-        record["config"]["gust_velocity_decay_rate"],
+        record["output"]["measured"],
+        record["config"]["v_max"],
+        record["config"]["a_v"],
     ) = (
         1,
         30.0,
         0.02,
     )
     (
-        record["memory"]["air_relative_velocity"],
-        record["memory"]["gust_velocity_change_since_start"],
-        record["memory"]["remaining_initial_gust_variance_share"],
+        record["memory"]["v"],
+        record["memory"]["v_g"],
+        record["memory"]["start_left"],
     ) = (
         (44.0, 1.5, 3.0),
         (5.0, -2.0, 0.7),
@@ -47,56 +47,50 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
-    gusts.update_gust_velocity_and_speed(
-        record, 45.0, 1.1, 3.3, 44.1, dt
-    )  # the gust has changed by 1.0, -0.4, 0.3
+    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, dt)
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
-    assert record["memory"]["gust_velocity_change_since_start"] == pytest.approx(blown)
-    assert record["output"]["speed_relative_to_mean_air"] == pytest.approx(
-        np.linalg.norm(blown + np.array([44.0, 1.5, 3.0]))
-    )
-    assert record["memory"]["remaining_initial_gust_variance_share"] == pytest.approx(0.8 * kept**2)
+    assert record["memory"]["v_g"] == pytest.approx(blown)
+    assert record["output"]["V"] == pytest.approx(np.linalg.norm(blown + np.array([44.0, 1.5, 3.0])))
+    assert record["memory"]["start_left"] == pytest.approx(0.8 * kept**2)
 
 
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
-    record["config"]["max_gust_velocity"] = 2.0
-    gusts.update_gust_velocity_and_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
-    assert record["memory"]["gust_velocity_change_since_start"][:2] == pytest.approx([2.0, -2.0])
+    record["config"]["v_max"] = 2.0
+    gusts.update_gust_speed(record, (46.0, -71.5, 0.3), 44.1, 0.01)
+    assert record["memory"]["v_g"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
     record = in_moving_air()
-    record["output"]["is_gust_measured"] = 0
-    gusts.update_gust_velocity_and_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
-    assert record["output"]["speed_relative_to_mean_air"] == 44.1
-    assert gusts.unmeasured_gust_intensity_share(record, 1) == 0.0
+    record["output"]["measured"] = 0
+    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, 0.5)
+    assert record["output"]["V"] == 44.1
+    assert gusts.unmeasured_share(record, 1) == 0.0
 
 
 @pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
 def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further):
     record = in_moving_air()
     (
-        record["memory"]["unmeasured_intensity_share"],
-        record["memory"]["unmeasured_pitching_share_by_start"],
-        record["memory"]["unmeasured_yawing_share_by_past_turns"],
+        record["memory"]["share"],
+        record["memory"]["start_share"],
+        record["memory"]["turn_past"],
     ) = (
         (1.0, 0.003, 0.03),
         0.02,
         0.05,
     )
     (
-        record["output"]["speed_relative_to_mean_air"],
-        record["config"]["speed_error_variance"],
-        record["config"]["gust_velocity_variance"],
-        record["config"]["unmeasured_share_per_speed_error_variance"],
+        record["output"]["V"],
+        record["config"]["var_V"],
+        record["config"]["var_v"],
+        record["config"]["speed_error_share"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert gusts.unmeasured_gust_intensity_share(record, g) == pytest.approx(
-        record["memory"]["unmeasured_intensity_share"][g] + off + further
-    )
-    assert gusts.unmeasured_gust_intensity_share(record, 0) == 1.0
+    assert gusts.unmeasured_share(record, g) == pytest.approx(record["memory"]["share"][g] + off + further)
+    assert gusts.unmeasured_share(record, 0) == 1.0
 
 
 def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
@@ -105,9 +99,7 @@ def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
     e, tau, level = 1e-3, 0.37, 6.6
     s = 1j * np.geomspace(1e-3, 1e3, 20001)
     error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert gusts.unmeasured_share_per_speed_error_variance(level) / (0.5 * level) ** 2 == pytest.approx(
-        error.max() / e**2, rel=2e-3
-    )
+    assert gusts.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
 
 
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
@@ -118,36 +110,32 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(gusts.GUST_RECORD)
-    record["config"]["gust_rotation_intensity_per_airspeed_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
-    record["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(
-        SPAN_M
-    )
-    record["config"]["altitude_error_bound_at_zero_m"], record["config"]["altitude_error_bound_per_m"] = (
+    record["config"]["Q_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["config"]["Q_1m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
+    record["config"]["h0"], record["config"]["h1"] = (
         0.7,
         0.02,
     )
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    gusts.set_gust_intensity_at_altitude(record, reading)
+    gusts.set_intensity(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
     by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
-    assert record["memory"]["gust_rotation_intensity_per_airspeed"] == pytest.approx(by_gusts)
+    assert record["memory"]["Q"] == pytest.approx(by_gusts)
 
-    declared_errors = record_of(declared_errors_dtype(4))
-    declared_errors["air_rotation_bound_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(
-        turbulence
-    ).rotation_limit_rad_s(SPAN_M)
-    declared_errors["air_rotation_bound_at_1_m"] = admitting.GUST_LIMIT_SIGMA * Dryden(
-        turbulence
-    ).low_rotation_limit_rad_s(SPAN_M)
-    declared_errors["altitude_error_bound_at_zero_m"], declared_errors["altitude_error_bound_per_m"] = (
+    declared_errors = record_of(errors_dtype(4))
+    declared_errors["wg_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(SPAN_M)
+    declared_errors["wg_1m"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(
+        SPAN_M
+    )
+    declared_errors["h0"], declared_errors["h1"] = (
         0.7,
         0.02,
     )
-    bounds.set_air_rotation_bound(declared_errors, reading)
+    bounds.set_air_rotation(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
-    assert declared_errors["air_rotation_bound"] == pytest.approx(6.0 * sigma)
+    assert declared_errors["wg"] == pytest.approx(6.0 * sigma)
 
 
 def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_reckoned_with():
@@ -176,9 +164,9 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts(turbule
     accelerometers are off, or what the model's forces are: at most 0.3 of the weight, by 8 % and 5 % mass."""
     given = Bounds.model_validate({"turbulence": turbulence, "sensors": sensors, "coefficients": 0.08})
     record = record_of(gusts.GUST_RECORD)
-    record["output"]["accounts_for_gusts"] = record["output"]["is_gust_measured"] = 1
+    record["output"]["gusty"] = record["output"]["measured"] = 1
     record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust_velocity_and_speed_error(record, declared_in(given, load()), 6.6, 45.0)
+    gusts.configure_gust_speed(record, declared_in(given, load()), 6.6, 45.0)
     sigma, V_L, g = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT), 9.80665
     b = 2.0 * 7.292115e-5 * 45.0 + 0.3 * 0.03 + (g * np.radians(0.5) if sensors else 0.0)
     of_the_sensor = 0.04 + 0.3 * g * 0.02 if sensors else 0.0
@@ -186,21 +174,21 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts(turbule
     a = (2.0 * b**2 * V_L / sigma**2) ** (1.0 / 3.0)
     speed = np.hypot(0.4, 0.3 / np.sqrt(12.0)) ** 2 + (0.5 + 0.01 * 45.0) ** 2 if sensors else 0.0
     expected = {
-        "gust_velocity_decay_rate": a, "gust_velocity_variance": sigma**2, "max_gust_velocity": 4.0 * sigma,
-        "speed_error_variance": sigma**2 * a / (a + V_L) + (b / a) ** 2 + speed,
-        "unmeasured_share_per_speed_error_variance": 6.6**2 / 16.0,
+        "a_v": a, "var_v": sigma**2, "v_max": 4.0 * sigma,
+        "var_V": sigma**2 * a / (a + V_L) + (b / a) ** 2 + speed,
+        "speed_error_share": 6.6**2 / 16.0,
     }  # fmt: skip
     for name in record["config"].dtype.names:
         assert record["config"][name] == pytest.approx(expected.get(name, 0.0), rel=1e-6), name
 
 
-@pytest.mark.parametrize("missing", ["accounts_for_gusts", "is_gust_measured"])
+@pytest.mark.parametrize("missing", ["gusty", "measured"])
 def test_where_no_gust_is_measured_no_sum_of_one_is_kept(missing):
     record = record_of(gusts.GUST_RECORD)
-    record["output"]["accounts_for_gusts"] = record["output"]["is_gust_measured"] = 1
+    record["output"]["gusty"] = record["output"]["measured"] = 1
     record["output"][missing] = 0
     declared = declared_in(Bounds(turbulence="light"), load())
-    gusts.configure_gust_velocity_and_speed_error(record, declared, 6.6, 45.0)
+    gusts.configure_gust_speed(record, declared, 6.6, 45.0)
     assert not any(record["config"][name].any() for name in record["config"].dtype.names)
 
 
@@ -213,25 +201,23 @@ def test_all_that_an_estimate_of_gusts_is_set_up_with(turbulence, accelerometers
     given = Bounds.model_validate({"turbulence": turbulence, "sensors": SENSORS})
     record, aircraft = record_of(gusts.GUST_RECORD), load()
     record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust_estimate(
-        record, declared_in(given, aircraft), replace(aircraft.mass, mass_kg=2000.0)
-    )
+    gusts.configure_gust(record, declared_in(given, aircraft), replace(aircraft.mass, mass_kg=2000.0))
     span, L = aircraft.geometry.span_m, 1750.0 * FT
     aloft = Dryden(turbulence).rotation_walk(span)
     low = Dryden(turbulence).rotation_walk_at_1_m(span)
     expected = {
-        "has_force_model": 1, "has_only_coarse_estimate": coarse, "wing_area_per_mass": 23.23 / 2000.0,
-        "gravity": 9.80665, "wing_span": span, "gust_rotation_intensity_per_airspeed_aloft": aloft,
-        "gust_rotation_intensity_per_airspeed_at_1_m": low, "turbulence_scale_length": L,
-        "altitude_error_bound_at_zero_m": 4.0 * 2.0 + 5.0, "altitude_error_bound_per_m": 0.03,
-        "rolling_gust_correlation_length": np.sqrt(L * span) / 2.6,
+        "has_forces": 1, "coarse_only": coarse, "S_m": 23.23 / 2000.0,
+        "gravity": 9.80665, "span": span, "Q_aloft": aloft,
+        "Q_1m": low, "L_gust": L,
+        "h0": 4.0 * 2.0 + 5.0, "h1": 0.03,
+        "L_roll": np.sqrt(L * span) / 2.6,
     }  # fmt: skip
     for name in record["config"].dtype.names:
         assert record["config"][name] == pytest.approx(expected.get(name, 0.0), rel=1e-6), name
     memory, output = record["memory"], record["output"]
-    assert memory["gust_rotation_intensity_per_airspeed"].tolist() == aloft.tolist()
-    assert memory["unmeasured_intensity_share"].tolist() == [1.0, 0.003, 0.03]
-    found = output["accounts_for_gusts"], output["is_gust_measured"], output["uses_accelerometers"]
+    assert memory["Q"].tolist() == aloft.tolist()
+    assert memory["share"].tolist() == [1.0, 0.003, 0.03]
+    found = output["gusty"], output["measured"], output["uses_accelerometers"]
     assert found == (turbulence != "none", measured, accelerometers)
 
 
@@ -242,9 +228,9 @@ def test_without_forces_a_gust_is_seen_by_accelerometers_or_roughly(turbulence, 
     assert not blind.measurable_forces
     record = record_of(gusts.GUST_RECORD)
     record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust_estimate(record, declared_in(Bounds(turbulence=turbulence), blind), aircraft.mass)
-    assert record["config"]["has_force_model"] == 0
-    assert record["output"]["is_gust_measured"] == accelerometers
-    assert record["config"]["has_only_coarse_estimate"] == (turbulence == "severe" and not accelerometers)
+    gusts.configure_gust(record, declared_in(Bounds(turbulence=turbulence), blind), aircraft.mass)
+    assert record["config"]["has_forces"] == 0
+    assert record["output"]["measured"] == accelerometers
+    assert record["config"]["coarse_only"] == (turbulence == "severe" and not accelerometers)
     shares = [1.0, 0.003, 0.03] if accelerometers else [1.0, 1.0, 1.0]
-    assert record["memory"]["unmeasured_intensity_share"].tolist() == shares
+    assert record["memory"]["share"].tolist() == shares

@@ -8,13 +8,12 @@ from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import (
-    fault_acceleration_range,
-    fault_acceleration_range_along_parity,
+    fault_range,
 )
 from beaver_ftc.diagnosis.model_prediction import (
-    add_instant_to_sums_and_extremes,
-    begin_frame_with_instant,
-    fill_frame_means,
+    add_to_sums,
+    begin_sums,
+    fill_means,
 )
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
@@ -23,7 +22,7 @@ from beaver_ftc.scenario.schema import Scenario
 @kernel
 def first(frames):
     fdi = frames[0].fdi
-    begin_frame_with_instant(
+    begin_sums(
         frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frames[0].measured
     )
 
@@ -31,20 +30,18 @@ def first(frames):
 @kernel
 def another(frames):
     fdi = frames[0].fdi
-    add_instant_to_sums_and_extremes(
-        frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types
-    )
+    add_to_sums(frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types)
 
 
 @kernel
 def over(frames):
-    fill_frame_means(frames[0].prediction, frames[0].fdi.bound)
+    fill_means(frames[0].prediction, frames[0].fdi.bound)
 
 
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return fault_acceleration_range(fie, 0), fault_acceleration_range_along_parity(fie)
+    return fault_range(fie, 0), fault_range(fie, 3)
 
 
 def record(substeps):
@@ -55,12 +52,12 @@ def fill(frame, rng):
     prediction = frame["prediction"]
     for name in ("f", "G", "u"):
         prediction[name] = rng.uniform(-1, 1, prediction[name].shape)
-    frame["fdi"]["bound"]["eta_bar_now"] = rng.uniform(0, 1, 3)
+    frame["fdi"]["bound"]["eta_now"] = rng.uniform(0, 1, 3)
     return (
         prediction["f"].copy(),
         prediction["G"].copy(),
         prediction["u"].copy(),
-        frame["fdi"]["bound"]["eta_bar_now"].copy(),
+        frame["fdi"]["bound"]["eta_now"].copy(),
     )
 
 
@@ -74,7 +71,7 @@ def test_what_is_believed_is_the_mean_over_the_instants(substeps):
         another(frames)
     over(frames)
     believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
-    assert frames[0]["prediction"]["frame_means"]["predicted_acceleration"] == pytest.approx(believed)
+    assert frames[0]["prediction"]["means"]["F"] == pytest.approx(believed)
     assert frames[0]["fdi"]["bound"]["eta_bar"] == pytest.approx(
         np.mean([bound for *_, bound in seen], axis=0)
     )
@@ -89,14 +86,14 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
     """The first instant under the old command and the old fault, the others under the new ones."""
     frames = record(n)
     prediction, fie = frames[0]["prediction"], frames[0]["fdi"]["isolation"]["estimator"][0]
-    prediction["sums"]["first_instant_Gu"][0, 0], prediction["sums"]["Gu"][0, 0] = (
-        moment0,
-        moment0 + (n - 1) * moment,
+    prediction["sums"]["Gu_first"][0, 0], prediction["sums"]["Gu"][0, 0] = (
+        moment0 / n,
+        (moment0 + (n - 1) * moment) / n,
     )
     over(frames)
-    fie["frame_mean_effect"]["regressor"][0], fie["frame_mean_effect"]["error_bound"][0] = (
-        prediction["frame_means"]["Gu"][0, 0],
-        prediction["frame_means"]["Gu_tolerance_for_fault_change"][0, 0],
+    fie["effect"]["regressor"][0], fie["effect"]["e"][0] = (
+        prediction["means"]["Gu"][0, 0],
+        prediction["means"]["e_Gu"][0, 0],
     )
     fie["parity_direction"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
@@ -109,4 +106,4 @@ def test_one_instant_leaves_no_room():
     fill(frames[0], np.random.default_rng(0))
     first(frames)
     over(frames)
-    assert (frames[0]["prediction"]["frame_means"]["Gu_tolerance_for_fault_change"] == 0.0).all()
+    assert (frames[0]["prediction"]["means"]["e_Gu"] == 0.0).all()

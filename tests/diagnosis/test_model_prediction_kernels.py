@@ -16,25 +16,25 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     rng, n = np.random.default_rng(instants), 4
     prediction = np.zeros(1, model_prediction.prediction_dtype(n))[0]
     bound = np.zeros(1, bound_dtype(n))[0]
-    prediction["frame_share_per_instant"] = 1.0 / instants
+    prediction["w"] = 1.0 / instants
     G, u = rng.uniform(0.5, 2.0, (5, 3, n)), rng.uniform(-0.3, 0.3, (5, n))
     for k in range(5):
-        prediction["sums"]["G"], prediction["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
-        model_prediction.fill_frame_means(prediction, bound)
-        model_prediction.fill_surface_effects_with_previous_G(prediction["frame_means"])
-        assert prediction["frame_means"]["Gu"] == pytest.approx(G[k] * u[k])
+        prediction["sums"]["G"], prediction["sums"]["Gu"] = G[k], G[k] * u[k]
+        model_prediction.fill_means(prediction, bound)
+        model_prediction.fill_old_effects(prediction["means"])
+        assert prediction["means"]["Gu"] == pytest.approx(G[k] * u[k])
         if k > 0:
-            assert prediction["frame_means"]["previous_G"] == pytest.approx(G[k - 1])
-            assert prediction["frame_means"]["Gu_with_previous_G"] == pytest.approx(G[k - 1] * u[k])
+            assert prediction["means"]["G_old"] == pytest.approx(G[k - 1])
+            assert prediction["means"]["Gu_old"] == pytest.approx(G[k - 1] * u[k])
 
 
 def test_of_the_first_frame_nothing_is_foreseen():
     prediction = np.zeros(1, model_prediction.prediction_dtype(2))[0]
-    prediction["frame_share_per_instant"] = 1.0
+    prediction["w"] = 1.0
     prediction["sums"]["G"][:, 0] = prediction["sums"]["Gu"][:, 0] = 1.0
-    model_prediction.fill_frame_means(prediction, np.zeros(1, bound_dtype(2))[0])
-    model_prediction.fill_surface_effects_with_previous_G(prediction["frame_means"])
-    assert not prediction["frame_means"]["Gu_with_previous_G"].any()
+    model_prediction.fill_means(prediction, np.zeros(1, bound_dtype(2))[0])
+    model_prediction.fill_old_effects(prediction["means"])
+    assert not prediction["means"]["Gu_old"].any()
 
 
 def test_actuators_are_believed_an_instant_at_a_time():
@@ -50,10 +50,10 @@ def test_actuators_are_believed_an_instant_at_a_time():
     record = np.zeros(1, model_prediction.prediction_dtype(4))[0]
     model_prediction.configure_prediction(record, Declared.of(scenario), travel)
     actuators = record["actuators"]
-    assert (record["frame_share_per_instant"], bool(actuators["real"])) == (0.25, True)
+    assert (record["w"], bool(actuators["real"])) == (0.25, True)
     assert (actuators["low"].tolist(), actuators["high"].tolist()) == tuple(travel.tolist())
     assert actuators["approach"] == pytest.approx([1 - np.exp(-0.1), 1 - np.exp(-0.175), 1.0, 1.0])
     assert actuators["step"] == pytest.approx([np.radians(0.3), np.inf, np.radians(0.2), np.inf])
     ideal = np.zeros(1, model_prediction.prediction_dtype(4))[0]
     model_prediction.configure_prediction(ideal, Declared.of(Scenario(name="x")), travel)
-    assert (ideal["frame_share_per_instant"], bool(ideal["actuators"]["real"])) == (1.0, False)
+    assert (ideal["w"], bool(ideal["actuators"]["real"])) == (1.0, False)

@@ -37,14 +37,14 @@ from beaver_ftc.diagnosis.types import EMPTY_SET, UNLIMITED_SET, FaultType
 @kernel
 def consistent_interval(config, surface, type_index, k):
     """Whether the mirrored command explains this frame."""
-    seen = surface.judged_observation
-    return UNLIMITED_SET if seen.position_low <= -seen.healthy_position <= seen.position_high else EMPTY_SET
+    seen = surface.judged
+    return UNLIMITED_SET if seen.lo <= -seen.u <= seen.hi else EMPTY_SET
 
 
 @kernel
 def deflection(config, surface, type_index, k):
     """The mirrored command."""
-    return -surface.last_observation.healthy_position, -surface.last_observation.healthy_position
+    return -surface.last.u, -surface.last.u
 
 
 def estimate(fdi, s, kind):
@@ -95,7 +95,7 @@ WORN = '''
 """A surface that moves further than it is told, by a factor that never becomes smaller: p = g u, g >= 1."""
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.isolation import consistent_theta_interval
+from beaver_ftc.diagnosis.isolation import consistent_theta
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     SUBTRACT_OFFSET,
@@ -116,10 +116,10 @@ def reset_memory(surface, type_index):
 @kernel
 def consistent_interval(config, surface, type_index, k):
     """A factor explains this frame that is no smaller than one that was needed before."""
-    seen, worn = surface.judged_observation, surface.overdrive
-    low, high = seen.position_low, seen.position_high
+    seen, worn = surface.judged, surface.overdrive
+    low, high = seen.lo, seen.hi
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = consistent_theta_interval(middle, slack, seen.healthy_position, worn.least, MOST)
+    low, high = consistent_theta(middle, slack, seen.u, worn.least, MOST)
     if low > high:
         return EMPTY_SET
     worn.least = max(worn.least, low)
@@ -137,7 +137,7 @@ TYPES = (
         consistent_interval=consistent_interval, memory_record_name="overdrive",
         memory_dtype=record(least=float), accommodation_mode=SUBTRACT_OFFSET, estimate_parameter=estimate,
         deflection_relation=DeflectionRelation(
-            1.0, theta_is_share=True, theta_range_for_travel=lambda low, high: (0.0, MOST - 1.0)
+            1.0, theta_is_share=True, theta_span=lambda low, high: (0.0, MOST - 1.0)
         ),
     ),
 )  # fmt: skip
@@ -219,8 +219,8 @@ def flown(name, sign):
     for _ in range(130):
         plant.fly(1, UNCERTAINTIES[name])
         surface = plant.fdi["types"]["surface"][0]
-        excluded += surface["feasible_sets"]["excluded"][KIND] or plant.position_excluded(0)
-        judged = int(surface["evidence"]["n_anomalous_frames"])
+        excluded += surface["sets"]["excluded"][KIND] or plant.position_excluded(0)
+        judged = int(surface["evidence"]["n_anomalous"])
     return int(excluded), judged
 
 print(json.dumps(dict(worn=[flown(name, 1.0) for name in UNCERTAINTIES], heals=flown("random", -1.0))))
@@ -439,7 +439,7 @@ def test_every_type_keeps_the_contract():
 def test_types_of_a_constant_parameter_come_first():
     constant = [row.has_constant_parameter for row in registry.TYPES]
     assert constant == sorted(constant, reverse=True)
-    assert sum(constant) == registry.N_CONSTANT_PARAMETER_TYPES
+    assert sum(constant) == registry.N_CONSTANT
 
 
 def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():

@@ -66,7 +66,7 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
     assert not plant.fdi["verdict"]["detected"]
     assert not any(plant.excluded(s) for s in range(3))
     assert (
-        max(plant.fdi["bank"]["output"]["max_residual_over_threshold_so_far"]) <= 1.0
+        max(plant.fdi["bank"]["output"]["peak"]) <= 1.0
     )  # of every filter, however near the uncertainty drives it
 
 
@@ -112,8 +112,8 @@ def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
     assert not plant.excluded(surface)
     if plant.fdi["verdict"]["detected"]:
         fie, true = plant.fdi["isolation"]["estimator"][surface], theta(FRAMES)
-        assert (fie["feasible_theta_min"] <= true + 1e-9).all()
-        assert (fie["feasible_theta_max"] >= true - 1e-9).all()
+        assert (fie["set_lo"] <= true + 1e-9).all()
+        assert (fie["set_hi"] >= true - 1e-9).all()
 
 
 @settings(max_examples=samples(100), deadline=None)
@@ -133,9 +133,7 @@ def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_
 
 def test_bounds_are_attained_so_no_smaller_ones_would_do():
     plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
-    assert plant.fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:4] == pytest.approx(
-        1.0, abs=1e-6
-    )
+    assert plant.fdi["bank"]["output"]["peak"][:4] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_filters_and_bounds_are_the_convolutions_they_stand_for():
@@ -192,6 +190,6 @@ def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
     plant.fly(200, lambda *_: np.zeros(3), until=lambda p: False)
     fie = plant.fdi["isolation"]["estimator"][surface]
     if plant.fdi["verdict"]["detected"]:
-        assert fie["feasible_theta_min"][0] - 1e-9 <= -size <= fie["feasible_theta_max"][0] + 1e-9
-        assert fie["feasible_theta_min"][0] <= fie["theta"][0] <= fie["feasible_theta_max"][0]
-        assert fie["feasible_theta_min"][0] == fie["feasible_theta_min"][2]
+        assert fie["set_lo"][0] - 1e-9 <= -size <= fie["set_hi"][0] + 1e-9
+        assert fie["set_lo"][0] <= fie["theta"][0] <= fie["set_hi"][0]
+        assert fie["set_lo"][0] == fie["set_lo"][2]

@@ -43,7 +43,7 @@ def recomputed(memory, axis, pole, dt, errors=False):
     return filtered(decay, dt * innovation), bound
 
 
-def detection_poles_for_delays(constant):
+def poles_for_delays(constant):
     """The three poles of detection.md, "A bank of poles"."""
     found, nbar = [], 2 * LIMIT_SIGMA * SIGMA
     for delay in DELAYS_S:
@@ -104,7 +104,7 @@ def test_residuals_thresholds_and_the_alarm_follow_from_the_log(rate_hz, substep
         },
     )
     dt, t = 1.0 / rate_hz, memory["t_s"]
-    poles = [published, 1e6, further, *(detection_poles_for_delays(0.02) if gyros else ())]
+    poles = [published, 1e6, further, *(poles_for_delays(0.02) if gyros else ())]
     alarm = np.zeros(t.size, bool)
     for axis in "pqr":
         filters = [recomputed(memory, axis, pole, dt, bool(gyros)) for pole in poles]

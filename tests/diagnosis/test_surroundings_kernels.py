@@ -12,10 +12,10 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record, fill_table, regressors, response
 from beaver_ftc.diagnosis import bounds, conclusion, gusts, isolation, model_prediction, schemes
-from beaver_ftc.diagnosis.bounds import error_map_dtype
+from beaver_ftc.diagnosis.bounds import map_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
-from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.state import (
@@ -38,7 +38,7 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    fill(record, wing_span=SPAN, gravity=9.8, accounts_for_gusts=1, is_gust_measured=1)
+    fill(record, span=SPAN, gravity=9.8, gusty=1, measured=1)
     return fill(record, **fields)
 
 
@@ -57,32 +57,32 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
     y_then, y_now = Y.copy(), Y.copy()
     y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
     y_now[2] = 47.0
-    gusts.start_gust_estimate(record, y_then, then)
-    assert record["memory"]["air_relative_velocity"] == pytest.approx(through_air(y_then, then))
+    gusts.start_gust(record, y_then, then)
+    assert record["memory"]["v"] == pytest.approx(through_air(y_then, then))
     assert record["memory"]["heading"] == then[2]
-    assert not record["memory"]["air_rotation_in_level_axes"].any()
-    record["memory"]["air_rotation_in_level_axes"], record["memory"]["specific_force"] = (
+    assert not record["memory"]["w"].any()
+    record["memory"]["w"], record["memory"]["f"] = (
         (0.0, 0.02, -0.03),
         rng.normal(size=3),
     )
     level = Rotation.from_euler("ZYX", [0.0, then[1], then[0]])
     expected = through_air(y_then, then) + dt * (
-        level.apply(record["memory"]["specific_force"]) + np.array([0.0, 0.0, 9.8])
+        level.apply(record["memory"]["f"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    gusts.advance_gust_estimate(record, y_now, now, dt)
+    gusts.advance_gust(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
     yawing = -0.03 * np.exp(-dt / tau_r) + change[1] / (47.0 * tau_r)
-    assert record["memory"]["air_rotation_in_level_axes"] == pytest.approx([0.0, pitching, yawing])
-    assert record["memory"]["air_relative_velocity"] == pytest.approx(through_air(y_now, now))
+    assert record["memory"]["w"] == pytest.approx([0.0, pitching, yawing])
+    assert record["memory"]["v"] == pytest.approx(through_air(y_now, now))
 
 
 def test_the_specific_force_is_that_of_the_terms():
-    record, out = new_air(wing_area_per_mass=0.01), np.zeros(3)
-    fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    gusts.fill_specific_force(record, X, Y, U, out)
+    record, out = new_air(S_m=0.01), np.zeros(3)
+    fill_table(record["memory"]["table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    gusts.fill_force(record, X, Y, U, out)
     of = {
         "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
         "qh": X[1] * AIRCRAFT.geometry.chord_m / V, **dict(zip(AIRCRAFT.surfaces, U, strict=True)),
@@ -95,17 +95,15 @@ def test_the_specific_force_is_that_of_the_terms():
 
 
 def test_the_gusts_of_a_frame_are_summed_over_its_instants():
-    record, design = new_air(wing_area_per_mass=0.01), design_record().view(np.recarray)[0]
-    gusts.start_gust_estimate(record, Y, np.zeros(3))
-    record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
-    gusts.fill_gust_effect_and_specific_force(record, design, X, Y, U)
-    first = record["output"]["angular_acceleration_by_gust"].copy()
-    gusts.begin_gust_sums_with_instant(record, V, 0.01)
-    gusts.update_gust_and_sums(record, design, X, Y, U, np.zeros(3), 0.01)
-    assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(
-        first + record["output"]["angular_acceleration_by_gust"]
-    )
-    assert np.abs(record["output"]["angular_acceleration_by_gust"] - first).max() > 1e-5
+    record, design = new_air(S_m=0.01), design_record().view(np.recarray)[0]
+    gusts.start_gust(record, Y, np.zeros(3))
+    record["memory"]["w"] = 0.0, 0.02, -0.03
+    gusts.fill_gust_effect(record, design, X, Y, U)
+    first = record["output"]["acc"].copy()
+    gusts.begin_gust_sums(record, V, 0.01)
+    gusts.update_gust(record, design, X, Y, U, np.zeros(3), 0.01)
+    assert record["memory"]["acc_sum"] == pytest.approx(first + record["output"]["acc"])
+    assert np.abs(record["output"]["acc"] - first).max() > 1e-5
 
 
 @pytest.mark.parametrize("swings", [0, 1])
@@ -116,46 +114,44 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     """
     rng = np.random.default_rng(7)
     record = new_air(
-        has_fast_axes_turn=swings,
-        unmeasured_yawing_share_by_past_turns=0.4,
-        rolling_gust_correlation_length=30.0,
+        turns_fast=swings,
+        turn_past=0.4,
+        L_roll=30.0,
     )
     (
         record["output"]["rate_damping"],
-        record["output"]["gust_axes_in_body"],
-        record["memory"]["gust_axes_rate"],
+        record["output"]["C"],
+        record["memory"]["C_dot"],
     ) = rng.normal(size=(3, 3, 3))
     (
-        record["memory"]["unmeasured_intensity_share"],
-        record["memory"]["gust_rotation_intensity_per_airspeed"],
+        record["memory"]["share"],
+        record["memory"]["Q"],
     ) = (
         (1.0, 0.2, 0.7),
         (1e-3, 2e-3, 3e-3),
     )
     axes, swing = (
-        record["output"]["rate_damping"] @ record["output"]["gust_axes_in_body"],
-        record["output"]["rate_damping"] @ record["memory"]["gust_axes_rate"],
+        record["output"]["rate_damping"] @ record["output"]["C"],
+        record["output"]["rate_damping"] @ record["memory"]["C_dot"],
     )
     expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
     lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
     turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
-    found = [[gusts.unmeasured_gust_drift_intensity(record, V, i, j) for j in range(3)] for i in range(3)]
+    found = [[gusts.unmeasured_drift(record, V, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(V * expected, rel=1e-12)
     once = swings * DT * V * swing @ np.diag(turned) @ swing.T
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
-            gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
-        gusts.finish_gust_mean_and_turn_variance(record, 1.0)
-        assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
+            gusts.add_turn_variance(record, V, DT)
+        gusts.finish_gust(record, 1.0)
+        assert record["output"]["var_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
-    record, rate = new_air(turbulence_scale_length=500.0), 0.3
+    record, rate = new_air(L_gust=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert gusts.unmeasured_yawing_share_from_heading_rate(record, V, rate) == pytest.approx(
-        rate**2 * lag / (3.0 * V / 500.0)
-    )
+    assert gusts.yaw_turn_share(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
@@ -163,8 +159,8 @@ def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
     low, high = filters.residual_interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
     assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
     assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert filters.published_threshold_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert filters.published_threshold_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
+    assert filters.published_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
+    assert filters.published_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
 
 
 def test_the_published_bound_and_the_turning_earth():
@@ -208,22 +204,20 @@ def test_the_turning_earth_moves_no_aircraft_more_whatever_its_inertia(constants
 
 
 def test_filters_of_bounds_are_those_of_residuals():
-    assert filters.advance_residual_bound(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
-    assert filters.advance_gyro_error_bound(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
+    assert filters.advance_bound(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
+    assert filters.advance_gyro(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
 
 
 def new_map(**fields):
-    record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
-    record["n_boxes"], record["n_travel_levels"], record["n_time_rows"] = 2, 3, 2
-    record["is_outside_all_boxes"] = 7
-    record["box_low"], record["box_high"] = -1e6, 1e6
-    record["box_low"][0, 0], record["box_high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
-    record["box_low"][1, 5], record["box_high"][1, 5] = 30.0, 60.0  # the outer one by airspeed
-    record["travel_share_by_level"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
-    record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
-    record["error_bound"] = (
-        np.arange(record["error_bound"].size).reshape(record["error_bound"].shape) / 1000.0
-    )
+    record = np.zeros(1, map_dtype(4)).view(np.recarray)[0]
+    record["n_boxes"], record["n_levels"], record["n_rows"] = 2, 3, 2
+    record["outside"] = 7
+    record["lo"], record["hi"] = -1e6, 1e6
+    record["lo"][0, 0], record["hi"][0, 0] = -0.1, 0.1  # the inner box by roll rate
+    record["lo"][1, 5], record["hi"][1, 5] = 30.0, 60.0  # the outer one by airspeed
+    record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
+    record["stop_lo"], record["stop_hi"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
+    record["e"] = np.arange(record["e"].size).reshape(record["e"].shape) / 1000.0
     return fill(record, **fields)
 
 
@@ -236,19 +230,15 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.travel_level_index_for_positions(new_map(), np.array(u)) == level
-    assert (
-        bounds.travel_level_index_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u)) == 2
-    )
+    assert bounds.level_of_positions(new_map(), np.array(u)) == level
+    assert bounds.level_of_positions(new_map(two_free=1), np.array(u)) == 2
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
-    up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
-    assert (
-        bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
-    )  # at rest at an end it uses none
+    up_only = new_map(stop_lo=(-0.4, -0.4, -0.2, 0.0))
+    assert bounds.level_of_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.level_of_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert bounds.level_of_positions(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
 
 
 SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [2.0, 3.0, 1.0]])
@@ -265,59 +255,59 @@ SHARE, ERROR = (0.3, 0.6, 1.0), np.array([[0.02, 0.03, 0.02], [0.2, 0.3, 0.1], [
 def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
     error_map = new_fdi()["bound"]["error_map"]
-    error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
-    assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
-    error_map["travel_low"][1], error_map["travel_high"][1] = 0.0, 0.0  # a travel that ends at neutral
+    error_map["stop_lo"][1], error_map["stop_hi"][1] = -0.2, 0.4
+    assert bounds.share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+    error_map["stop_lo"][1], error_map["stop_hi"][1] = 0.0, 0.0  # a travel that ends at neutral
     beyond = float(where[0] < 0.0 or where[1] > 0.0)
-    assert bounds.max_travel_share_used(error_map, 1, where, 0.0, 1) == beyond
+    assert bounds.share_used(error_map, 1, where, 0.0, 1) == beyond
 
 
 def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
     fie, bound = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
-        bound["error_map"]["one_surface_may_be_anywhere"],
-        bound["error_map"]["n_travel_levels"],
-        bound["error_map"]["travel_share_by_level"][:3],
+        bound["error_map"]["one_free"],
+        bound["error_map"]["n_levels"],
+        bound["error_map"]["share"][:3],
     ) = (
         1,
         3,
         SHARE,
     )
-    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = (
+    bound["error_map"]["stop_lo"], bound["error_map"]["stop_hi"] = (
         -0.5,
         0.5,
     )
     (
-        bound["additional_error_bound_by_travel_level"][:3],
-        bound["frame_innovation_bound"],
+        bound["extra"][:3],
+        bound["nu_max"],
         fdi["bank"]["output"]["innovation"],
     ) = (
         ERROR,
         0.1,
         (0.0, 1.0, 0.0),
     )
-    fie["frame_mean_effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
+    fie["effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(isolation.bound_deflection_and_widen_error, fdi, fie)
-    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(ERROR[0])
-    assert fie["max_travel_share_in_last_frame"] == pytest.approx(1.13 / 20 / 0.5)
+    on(isolation.widen_error, fdi, fie)
+    assert fie["effect"]["e"] == pytest.approx(ERROR[0])
+    assert fie["share_far"] == pytest.approx(1.13 / 20 / 0.5)
 
 
 def test_a_surface_further_out_adds_what_the_map_has_there_beyond_the_error_of_now():
-    error_map = new_map(is_outside_all_boxes=0, time_row_index=1, box_index=1)
-    error_map["error_bound_now"] = error_map["error_bound"][1, 1, 1]
-    added = [bounds.additional_error_bound_at_travel_level(error_map, 2, i) for i in range(3)]
-    assert added == pytest.approx(error_map["error_bound"][1, 1, 2] - error_map["error_bound"][1, 1, 1])
+    error_map = new_map(outside=0, row=1, box=1)
+    error_map["e_now"] = error_map["e"][1, 1, 1]
+    added = [bounds.extra_bound(error_map, 2, i) for i in range(3)]
+    assert added == pytest.approx(error_map["e"][1, 1, 2] - error_map["e"][1, 1, 1])
     assert min(added) > 0.0
-    assert bounds.additional_error_bound_at_travel_level(error_map, 0, 1) == 0.0
-    error_map["is_outside_all_boxes"] = 1
-    assert bounds.additional_error_bound_at_travel_level(error_map, 2, 1) == 0.0
+    assert bounds.extra_bound(error_map, 0, 1) == 0.0
+    error_map["outside"] = 1
+    assert bounds.extra_bound(error_map, 2, 1) == 0.0
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.error_map_time_row_index(new_map(time_s=time_s)) == age
+    assert bounds.map_row(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -331,15 +321,14 @@ def test_the_row_is_that_of_a_flight_so_old(time_s, age):
     ],
 )
 def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_s, box):
-    record, out = new_map(time_s=time_s), np.full(3, 0.5)
+    record = new_map(time_s=time_s)
     y = Y.copy()
     y[2] = airspeed
-    bounds.look_up_and_add_mapped_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.look_up_map(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]))
     age = 0 if time_s <= 10.0 else 1
-    expected = record["error_bound"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
-    assert out == pytest.approx(0.5 + expected)
-    assert record["error_bound_now"] == pytest.approx(np.full(3, expected))
-    assert record["is_outside_all_boxes"] == (box is None)
+    expected = record["e"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
+    assert record["e_now"] == pytest.approx(np.full(3, expected))
+    assert record["outside"] == (box is None)
     assert record["coordinates"][:7] == pytest.approx(
         [roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2]
     )
@@ -355,23 +344,23 @@ def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
     (
-        record["test_config"]["frame_share_per_instant"],
-        record["noise"]["drift_intensity_over_squared_bound"],
+        record["test"]["w"],
+        record["noise"]["q"],
     ) = 0.25, 2.0
     (
-        record["noise"]["acceleration_variance_by_input_noise"],
-        record["noise"]["deflection_error_effect_bound"],
+        record["noise"]["Q"],
+        record["noise"]["eta_u"],
     ) = (
         (0.1, 0.2, 0.3),
         (0.01, 0.02, 0.03),
     )
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n_axes"], block["axes"][: len(axes)], block["gust_drift_intensity_factor"] = (
+        block["n"], block["axes"][: len(axes)], block["Q_scale"] = (
             len(axes),
             axes,
             1.0,
         )
-    record["block"][2]["gust_drift_intensity_factor"], record["block"][2]["drift_correlation_length_m"] = (
+    record["block"][2]["Q_scale"], record["block"][2]["drift_correlation_length_m"] = (
         4.0,
         90.0,
     )
@@ -383,23 +372,21 @@ def new_detector(**fields):
 def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi, record, design = new_detector()
     rng = np.random.default_rng(1)
-    record["gust"]["output"]["accounts_for_gusts"] = moving
-    record["gust"]["output"]["rate_damping"], record["gust"]["output"]["gust_axes_in_body"] = rng.normal(
-        size=(2, 3, 3)
-    )
+    record["gust"]["output"]["gusty"] = moving
+    record["gust"]["output"]["rate_damping"], record["gust"]["output"]["C"] = rng.normal(size=(2, 3, 3))
     (
-        record["gust"]["memory"]["unmeasured_intensity_share"],
-        record["gust"]["memory"]["gust_rotation_intensity_per_airspeed"],
+        record["gust"]["memory"]["share"],
+        record["gust"]["memory"]["Q"],
     ) = (
         (1.0, 0.2, 0.3),
         (1e-3, 2e-3, 3e-3),
     )
     (
-        record["gust"]["config"]["has_only_coarse_estimate"],
-        record["gust"]["config"]["rolling_gust_correlation_length"],
-        record["gust"]["config"]["wing_span"],
+        record["gust"]["config"]["coarse_only"],
+        record["gust"]["config"]["L_roll"],
+        record["gust"]["config"]["span"],
     ) = moving, 20.0, 5.0 * np.pi
-    fdi["bound"]["constant_error_bound"], fdi["bound"]["inertia_coupling_error_share"] = (
+    fdi["bound"]["const"], fdi["bound"]["inertia_coupling_error_share"] = (
         (0.02, 0.0, 0.04),
         0.1,
     )
@@ -407,27 +394,27 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     bounded = np.zeros(3)
     bounds.add_published_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
-    assert record["noise"]["uncertainty_bound"] == pytest.approx(bounded)
-    turned = record["gust"]["output"]["rate_damping"] @ record["gust"]["output"]["gust_axes_in_body"]
+    assert record["noise"]["eta"] == pytest.approx(bounded)
+    turned = record["gust"]["output"]["rate_damping"] @ record["gust"]["output"]["C"]
     usual, slow = (1e-3, 4e-4, 9e-4), (4e-3, 16e-4, 36e-4 * 0.75**2)  # stronger; 20, 20 and 15 m
     for block, intensity in zip(record["block"], (usual, usual, slow), strict=True):
-        axes = block["axes"][: block["n_axes"]]
+        axes = block["axes"][: block["n"]]
         unseen = moving * V * turned @ np.diag(intensity) @ turned.T
         drift = unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
-        assert block["drift_intensity"][: len(axes), : len(axes)] == pytest.approx(drift)
-        assert block["model_noise_variance"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
-    assert record["block"]["drift_decay_factor"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])
+        assert block["Q_d"][: len(axes), : len(axes)] == pytest.approx(drift)
+        assert block["Q_x"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
+    assert record["block"]["a"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])
 
 
 def test_where_nothing_is_bounded_a_little_is_reckoned_with():
-    fdi, record, design = new_detector(deflection_error_effect_bound=0.0)
+    fdi, record, design = new_detector(eta_u=0.0)
     Statistical.drifts(record, fdi, design, np.zeros(3), Y)
-    assert record["block"][0]["drift_intensity"][0, 0] == pytest.approx(2.0 * 1e-6)
+    assert record["block"][0]["Q_d"][0, 0] == pytest.approx(2.0 * 1e-6)
 
 
 def test_regressors_are_what_each_coefficient_multiplies():
     """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
-    fdi, record, design = new_detector(frame_share_per_instant=1.0, uses_regressors=1)
+    fdi, record, design = new_detector(w=1.0, regress=1)
     record["block"]["regressor"] = 9.0
     x = np.zeros(3)
     Statistical.prepare(record, fdi, design, x, Y, U)
@@ -439,13 +426,13 @@ def test_regressors_are_what_each_coefficient_multiplies():
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         of_it = value[np.isin(axis, axes)]
         assert of_it @ block["regressor"][: of_it.size, : len(axes)] == pytest.approx(total[list(axes)])
-    terms = np.zeros_like(record["noise"]["coefficient_regressor"])
+    terms = np.zeros_like(record["noise"]["zC"])
     regressors(design["moments"], design["moments"]["power"], U, terms)
-    assert record["noise"]["coefficient_regressor"] == pytest.approx(terms)
+    assert record["noise"]["zC"] == pytest.approx(terms)
 
 
 def test_instants_inside_a_frame_add_to_the_mean():
-    fdi, record, design = new_detector(uses_regressors=1)
+    fdi, record, design = new_detector(regress=1)
     Statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
@@ -459,28 +446,27 @@ def test_instants_inside_a_frame_add_to_the_mean():
 def test_what_is_known_of_a_fault_is_expected(offsets_count):
     rng = np.random.default_rng(2)
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
-    mean = prediction["frame_means"]
+    mean = prediction["means"]
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
-    mean["predicted_acceleration"] = rng.normal(size=3)
+    mean["F"] = rng.normal(size=3)
     effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    model_prediction.fill_acceleration_with_known_faults(prediction, 0, effectiveness, offset, offsets_count)
-    assert (prediction["acceleration_with_known_faults"] == mean["predicted_acceleration"]).all()
-    model_prediction.fill_acceleration_with_known_faults(prediction, 1, effectiveness, offset, offsets_count)
+    model_prediction.predict_known(prediction, 0, effectiveness, offset, offsets_count)
+    assert (prediction["F_known"] == mean["F"]).all()
+    model_prediction.predict_known(prediction, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
-    expected = mean["predicted_acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
-    assert prediction["acceleration_with_known_faults"] == pytest.approx(expected)
+    expected = mean["F"] + mean["Gu"] @ (effectiveness - 1.0) + off
+    assert prediction["F_known"] == pytest.approx(expected)
     prediction["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
-    model_prediction.form_innovation_after_known_faults(prediction, x, 0.5)
+    model_prediction.innovation_known(prediction, x, 0.5)
     innovation = np.array([0.4, -0.2, 0.0]) - expected
-    assert prediction["innovation_after_known_faults"] == pytest.approx(innovation)
+    assert prediction["nu_known"] == pytest.approx(innovation)
 
 
 def take(fdi, given, t):
     """A frame's verdict of a plug-in, as the frame of the loop takes it."""
     on(conclusion.record_plugin_verdict, fdi, given, t)
-    isolation.replace_theta_by_plugin_estimate(
-        fdi["isolation"], fdi["verdict"]["isolated_estimator"], given["theta"]
-    )
+    if fdi["verdict"]["isolated_estimator"] >= 0:
+        fdi["isolation"]["estimator"]["theta"][fdi["verdict"]["isolated_estimator"]] = given["theta"]
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
@@ -493,7 +479,7 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     given["detected"] = 1
     take(fdi, given, 4.0)
     found = fdi["verdict"]
-    assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
+    assert (found["detected"], found["detected_at_s"], found["axis"]) == (1, 4.0, 1)
     assert (found["isolated_estimator"], found["isolated_at_s"], found["has_effectiveness"]) == (2, 4.0, 1)
     assert fdi["isolation"]["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
     assert found["effectiveness"] == pytest.approx([0.5] * 4)
@@ -519,18 +505,18 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
 def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi = new_fdi()
     (
-        fdi["statistical"]["test_config"]["enabled"],
-        fdi["config"]["alarm_authority"],
-        fdi["statistical"]["alarm"]["score_over_alarm_level"],
+        fdi["statistical"]["test"]["enabled"],
+        fdi["config"]["authority"],
+        fdi["statistical"]["alarm"]["ratio"],
     ) = (
         enabled,
         authority,
         score,
     )
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
-    likely = conclusion.uses_statistical_estimates(fdi["statistical"]["test_config"], authority)
+    likely = conclusion.weighs_statistics(fdi["statistical"]["test"], authority)
     alarm = fdi["statistical"]["alarm"]
-    found = schemes.built_in_detection_threshold_ratio(fdi["bank"], alarm, authority, likely)
+    found = schemes.detection_share(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
     assert bool(likely) == (enabled == 1 and authority != WORST_CASE_DETECTOR)
 
@@ -539,7 +525,7 @@ def unknown_acceleration(fdi):
     """What the assessment explains by no known fault, rad/s2."""
     assessed = np.zeros(1, conclusion.assessment_dtype(4)).view(np.recarray)[0]
     stages = (fdi[name] for name in ("config", "verdict", "types", "layout", "statistical", "fdae", "bound"))
-    conclusion.assess_unknown_acceleration_and_pitch(assessed, *stages)
+    conclusion.assess_unknown(assessed, *stages)
     return assessed["unknown_acceleration"].tolist()
 
 
@@ -552,13 +538,13 @@ def test_the_estimate_is_that_of_whoever_counts():
     ) = 5, 2, 1
     fdi["isolation"]["estimator"]["theta"][5] = -0.1, -0.2, -0.3
     block = fdi["statistical"]["block"][0]
-    block["n_hypotheses"], block["n_axes"], block["axes"][0] = 1, 1, 1
+    block["n_h"], block["n"], block["axes"][0] = 1, 1, 1
     hypothesis = block["hypothesis"][0]
     (
         hypothesis["kind"],
         hypothesis["surface"],
-        hypothesis["theta_estimate"],
-        hypothesis["theta_information"],
+        hypothesis["th"],
+        hypothesis["D"],
     ) = (
         LOSS,
         2,
@@ -566,15 +552,15 @@ def test_the_estimate_is_that_of_whoever_counts():
         1.0,
     )
     assert on(conclusion.isolated_surface, fdi) == 2
-    assert frame.estimated_theta_of_isolated_loss(fdi, 2) == -0.2
-    fdi["fdae"]["network"]["output"], block["filter_state_after_known_faults"] = 0.3, (0, 0, 0.7, 0)
+    assert frame.isolated_theta(fdi, 2) == -0.2
+    fdi["fdae"]["network"]["output"], block["x_known"] = 0.3, (0, 0, 0.7, 0)
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["detected"] = 1
     assert unknown_acceleration(fdi) == pytest.approx([0.3] * 3)
-    fdi["statistical"]["test_config"]["enabled"] = 1
-    assert frame.estimated_theta_of_isolated_loss(fdi, 2) == -0.6
+    fdi["statistical"]["test"]["enabled"] = 1
+    assert frame.isolated_theta(fdi, 2) == -0.6
     assert unknown_acceleration(fdi)[1] == 0.7
-    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, WAIT_FOR_SURFACE
+    fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"] = 2, WAIT_FOR_SURFACE
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
     assert on(conclusion.isolated_surface, fdi) == -1
@@ -582,28 +568,24 @@ def test_the_estimate_is_that_of_whoever_counts():
 
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
-    record = new_air(angular_acceleration_by_gust_sum=(0.4, -0.8, 1.2))
-    gusts.finish_gust_mean_and_turn_variance(record, share)
-    assert record["output"]["mean_angular_acceleration_by_gust"] == pytest.approx(
-        share * np.array([0.4, -0.8, 1.2])
-    )
+    record = new_air(acc_sum=(0.4, -0.8, 1.2))
+    gusts.finish_gust(record, share)
+    assert record["output"]["acc_mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
-    block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block_capacity)).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(USUAL_SIZE.rate_size)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
     (
-        record["output"]["acceleration_variance_by_axes_turn"],
-        block["gust_drift_intensity_factor"],
+        record["output"]["var_turn"],
+        block["Q_scale"],
         block["P_dd"],
     ) = (
         rng.normal(size=(3, 3)),
         1.7,
         0.3,
     )
-    block["n_axes"], block["axes"] = 2, (0, 2)
-    statistical.add_gust_axes_turn_to_drift_covariance(record, block)
-    assert block["P_dd"] == pytest.approx(
-        0.3 + 1.7 * record["output"]["acceleration_variance_by_axes_turn"][np.ix_((0, 2), (0, 2))]
-    )
+    block["n"], block["axes"] = 2, (0, 2)
+    statistical.add_axes_turn(record, block)
+    assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["output"]["var_turn"][np.ix_((0, 2), (0, 2))])

@@ -39,7 +39,7 @@ def names(scenario):
     while not sim.done:
         sim.step()
         named.add(sim.verdict.isolated)
-    assert not sim._loop.frames[0]["fdi"]["sensor_monitor"]["output"]["surface_was_isolated_at_alarm"]
+    assert not sim._loop.frames[0]["fdi"]["sensor_monitor"]["output"]["had_surface"]
     assert not sim.departed
     return named - {None}
 
@@ -105,7 +105,7 @@ def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
         for _ in loop.chunks():
             pass
         monitor = loop.frames[0]["fdi"]["sensor_monitor"]
-        assert monitor["memory"]["start_stage"]
+        assert monitor["memory"]["stage"]
         assert not monitor["output"]["alarmed"]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.diagnosis.detection.parity import required_record_size
+from beaver_ftc.diagnosis.detection.parity import required_size
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
@@ -53,18 +53,14 @@ def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it
     """A record has the room that its aircraft and its delays need."""
     usual = assembled()
     assert usual.nbytes <= 1_000_000  # the order of a second-level cache
-    assert usual["fdi"]["statistical"].dtype == statistical_dtype(required_record_size(load()))
+    assert usual["fdi"]["statistical"].dtype == statistical_dtype(required_size(load()))
     file = load().file
     twice = {axis: 2 * terms for axis, terms in file.moments}
     many = file.model_copy(update={"moments": file.moments.model_copy(update=twice)})
-    size = required_record_size(dataclasses.replace(load(), file=many))
+    size = required_size(dataclasses.replace(load(), file=many))
     in_roll_and_yaw = 2 * sum(term.coefficient != "Cm" for term in load().moments)
-    assert usual["fdi"]["statistical"]["block"]["regressor_tolerance"].shape[1] < in_roll_and_yaw + 5
-    assert (
-        in_roll_and_yaw + 5
-        <= size.rate_block_capacity.max_regressors
-        < size.view_block_capacity.max_regressors
-    )
+    assert usual["fdi"]["statistical"]["block"]["tol"].shape[1] < in_roll_and_yaw + 5
+    assert in_roll_and_yaw + 5 <= size.rate_size.max_regressors < size.view_size.max_regressors
     slow = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}
     says = {}, {"sensors": slow}, {"changes": [{"at_s": 3.0, "sensors": slow}]}
     lines = [assembled(**keys)["instruments"]["line"].size for keys in says]
@@ -83,39 +79,39 @@ def at(record, path):
 
 
 EXPECTED = {
-    "dt": DT, "prediction.frame_share_per_instant": 0.5, "prediction.u": TRIM, "prediction.commanded": TRIM,
+    "dt": DT, "prediction.w": 0.5, "prediction.u": TRIM, "prediction.commanded": TRIM,
     "control.layout.trim": TRIM,
     "control.allocation.output.command": TRIM,
-    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.config.forgetting_factor": exp(-DT / 2.0),
-    "fdi.isolation.config.filter_decay": exp(-2.5 * DT),
-    "fdi.fdae.config.pole_per_s": 1.5, "fdi.fdae.config.decay_factor": exp(-1.5 * DT),
+    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.config.forget": exp(-DT / 2.0),
+    "fdi.isolation.config.a": exp(-2.5 * DT),
+    "fdi.fdae.config.pole_per_s": 1.5, "fdi.fdae.config.a": exp(-1.5 * DT),
     "fdi.isolation.config.n_estimators": 8,
-    "fdi.fdae.network.config.learning_gain": 45.0, "fdi.fdae.network.config.leak_per_s": 0.8,
-    "fdi.fdae.network.config.weight_limit": 15.0,
+    "fdi.fdae.network.config.gain": 45.0, "fdi.fdae.network.config.leak": 0.8,
+    "fdi.fdae.network.config.w_max": 15.0,
     "fdi.bound.inertia_coupling_error_share": (0.1, 0.2, 0.3),
-    "fdi.bound.constant_error_bound": (0.01, 0.02, 0.03),
+    "fdi.bound.const": (0.01, 0.02, 0.03),
     "fdi.bound.earth_rate_rad_s": 7.292115e-5,  # rad/s [WGS84]
     "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.fault_type": -1,
-    "fdi.verdict.type_decided_at_s": -1.0, "fdi.verdict.accommodated_surface": -1,
+    "fdi.verdict.typed_at_s": -1.0, "fdi.verdict.target": -1,
     "fdi.verdict.accommodation_mode": -1, "accounts.guarantee.certain_after_s": -1.0,
     "fdi.layout.main": (AILERON, ELEVATOR, RUDDER), "fdi.layout.dominant_axis": (0, 1, 2, 1),
     "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
     "fdi.config.diagnoses_all_types": 1, "fdi.types.config.frames_per_block": 1,
     "fdi.types.config.block_duration_s": DT,
-    "fdi.types.config.frame_shows_single_instant": 0, "fdi.config.n_substeps": 2,
-    "fdi.types.config.released_surface_returns_via_actuator": 1,
-    "fdi.types.config.slowest_half_cycle_frames": 131,
+    "fdi.types.config.single_instant": 0, "fdi.config.n_substeps": 2,
+    "fdi.types.config.returns_lagged": 1,
+    "fdi.types.config.half_frames": 131,
     # of 2.618 s
-    "fdi.types.pair.enabled": 0, "fdi.types.pair.first_pitch_fault_surface": -1,
-    "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
+    "fdi.types.pair.enabled": 0, "fdi.types.pair.first_pitch": -1,
+    "fdi.types.surface.0.actuator.stop_lo": -0.5, "fdi.types.surface.3.actuator.stop_hi": 1.0,
     "fdi.types.surface.1.accommodation.mode": -1,
-    "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.may_be_sole_fault": 1,
-    "fdi.types.surface.1.actuator.approach_share_per_substep": 1.0 - exp(-25.0 * DT / 2),
-    "fdi.types.surface.1.actuator.max_motion_per_substep": pi / 2 * DT / 2,
-    "fdi.types.surface.1.actuator.min_runaway_rate": pi / 4,
-    "fdi.types.surface.1.actuator.min_rate_limited_motion_per_substep": radians(3.0) * DT / 2,
-    "fdi.bank.config.n_filters": 3, "fdi.isolation.config.uses_reach_test": 0,
-    "fdi.isolation.config.narrows_theta_sets": 1,
+    "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.may_be_sole": 1,
+    "fdi.types.surface.1.actuator.approach_share": 1.0 - exp(-25.0 * DT / 2),
+    "fdi.types.surface.1.actuator.step": pi / 2 * DT / 2,
+    "fdi.types.surface.1.actuator.runaway": pi / 4,
+    "fdi.types.surface.1.actuator.slow_step": radians(3.0) * DT / 2,
+    "fdi.bank.config.n_filters": 3, "fdi.isolation.config.reach": 0,
+    "fdi.isolation.config.narrows": 1,
     "control.reference.config.dt": DT,
     "control.surfaces.output.effectiveness": 1.0,
     "control.surfaces.config.effectiveness_step": 2.5 * DT, "control.reference.memory.scale": 1.0,
@@ -158,9 +154,7 @@ def test_a_number_of_the_record(path, frame):
 
 
 def test_poles_are_that_of_detection_and_the_bank(frame):
-    assert frame["fdi"]["bank"]["config"]["decay_factor"][:3] == pytest.approx(
-        np.exp(-DT * np.array([1.5, 0.5, 4.0]))
-    )
+    assert frame["fdi"]["bank"]["config"]["a"][:3] == pytest.approx(np.exp(-DT * np.array([1.5, 0.5, 4.0])))
 
 
 def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
@@ -192,15 +186,15 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
     assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
     assert fies["theta_min"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
     assert fies["theta_max"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
-    assert frame["fdi"]["layout"]["loss_estimator"].tolist() == [0, 1, 2, 3]
-    assert frame["fdi"]["layout"]["position_estimator"].tolist() == [4, 5, 6, 7]
+    assert frame["fdi"]["layout"]["loss"].tolist() == [0, 1, 2, 3]
+    assert frame["fdi"]["layout"]["position"].tolist() == [4, 5, 6, 7]
 
 
 def test_in_pairs_each_plane_is_asked_for_itself():
     fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
-    assert fdi["types"]["surface"]["status"]["may_be_sole_fault"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["status"]["may_be_sole"].tolist() == [0, 1, 0, 1]
     pitch, others = [1, 0, 1], [0, 1, 0]
-    assert fdi["isolation"]["estimator"]["ignored_axes"][:4].tolist() == [others, pitch, others, pitch]
+    assert fdi["isolation"]["estimator"]["skip"][:4].tolist() == [others, pitch, others, pitch]
 
 
 def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
@@ -231,7 +225,7 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         fdi["sensor_monitor"]["config"]["enabled"],
     )
     power = frames["control"]["power"]["config"]
-    assert (*off, fdi["statistical"]["test_config"]["enabled"], power["enabled"][0]) == (0,) * 6
+    assert (*off, fdi["statistical"]["test"]["enabled"], power["enabled"][0]) == (0,) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None
     pairs = {**given, "fdi": given["fdi"] | {"pairs": True, "authority": "worst-case"}, "substeps": 1}

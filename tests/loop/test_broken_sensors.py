@@ -85,7 +85,7 @@ def test_sound_instruments_are_never_suspected(more):
     for _ in loop.chunks():
         pass
     watch = loop.frames[0]["fdi"]["sensor_monitor"]
-    assert watch["memory"]["start_stage"]
+    assert watch["memory"]["stage"]
     assert not watch["output"]["alarmed"]
 
 

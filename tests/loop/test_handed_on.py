@@ -31,8 +31,8 @@ GOES_ON = {
         *(f"control.power.{name}" for name in ENGINE),
     },
     "scheme": {
-        "fdi.bank.output.max_residual_over_threshold_so_far",
-        "fdi.statistical.alarm.max_score_over_alarm_level_so_far"},
+        "fdi.bank.output.peak",
+        "fdi.statistical.alarm.peak"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")
@@ -53,7 +53,7 @@ OWN = {
     "scheme": {
         "since",
         "fdi.statistical.gust.config.starts_in_flight",
-        "fdi.statistical.inertial_gust.config.starts_in_flight",
+        "fdi.statistical.vaneless.config.starts_in_flight",
     },
     "sensors": {"instruments.taken"},
 }

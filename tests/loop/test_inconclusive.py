@@ -157,12 +157,12 @@ INSIDE = [0.0, 0.0, 0.0, 0.1, 0.0, 45.0, 1.0, 0.5, 0.0]
     [
         ({1: 0.4}, 3.0, {}, 1, ["q_rad_s"]), ({1: 0.4, 7: 0.05}, 13.0, {}, 1, ["q_rad_s", "dpt", "flown_s"]),
         ({6: 0.8}, 12.0, {}, 1, ["altitude_m"]), ({}, 3.0, {}, 1, ["between"]),
-        ({1: 0.4}, 3.0, {"n_boxes": 0}, 1, []), ({1: 0.4}, 3.0, {"is_outside_all_boxes": 0}, 1, []),
+        ({1: 0.4}, 3.0, {"n_boxes": 0}, 1, []), ({1: 0.4}, 3.0, {"outside": 0}, 1, []),
         ({1: 0.4}, 3.0, {}, 0, ["scheme"]), ({}, 3.0, {"n_boxes": 0}, 0, ["scheme"]),
     ],
 )  # fmt: skip
 def test_why_nothing_can_be_concluded_now(changes, at_s, error_map, enabled, says):
     place = np.array([changes.get(i, value) for i, value in enumerate(INSIDE)])
-    here = {"n_boxes": 2, "is_outside_all_boxes": 1, "coordinates": place, "time_s": at_s} | error_map
+    here = {"n_boxes": 2, "outside": 1, "coordinates": place, "time_s": at_s} | error_map
     frame = {"fdi": {"bound": {"error_map": here}, "config": {"enabled": enabled}}}
     assert inconclusive_now(frame, mapped()) == "; ".join(SPANS_SAID[name] for name in says)

@@ -12,11 +12,11 @@ DENSITY = 6
 def diagnosis(enabled=1, outside=1, time_s=5.0, n_boxes=2, **place):
     fdi = np.zeros(1, fdi_dtype(4)).view(np.recarray)[0]
     fdi["config"]["enabled"], error_map = enabled, fdi["bound"]["error_map"]
-    error_map["n_boxes"], error_map["is_outside_all_boxes"], error_map["time_s"] = n_boxes, outside, time_s
-    error_map["n_time_rows"], error_map["until_s"][0] = 1, 60.0
-    error_map["box_low"][0], error_map["box_high"][0] = -1.0, 1.0
-    error_map["box_low"][1], error_map["box_high"][1] = -2.0, 3.0
-    error_map["box_low"][:2, DENSITY], error_map["box_high"][:2, DENSITY] = (0.9, 1.0), (1.05, 1.2)
+    error_map["n_boxes"], error_map["outside"], error_map["time_s"] = n_boxes, outside, time_s
+    error_map["n_rows"], error_map["until_s"][0] = 1, 60.0
+    error_map["lo"][0], error_map["hi"][0] = -1.0, 1.0
+    error_map["lo"][1], error_map["hi"][1] = -2.0, 3.0
+    error_map["lo"][:2, DENSITY], error_map["hi"][:2, DENSITY] = (0.9, 1.0), (1.05, 1.2)
     error_map["coordinates"][:], error_map["coordinates"][DENSITY] = 0.5, 1.1
     for name, value in place.items():
         error_map["coordinates"][int(name[1:])] = value

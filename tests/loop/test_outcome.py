@@ -16,7 +16,7 @@ from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
-ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.detected_axis": 1}
+ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.axis": 1}
 NAMED = ALARM | {"fdi.verdict.isolated_estimator": 1, "fdi.verdict.isolated_at_s": 2.5}
 PILOT = {"autopilot.enabled": 1, "autopilot.is_commanded": [1, 1, 0, 1]}
 
@@ -39,19 +39,19 @@ CASES = {
         "accounts.envelope.outside_frames": 150, "accounts.envelope.exit_at_s": [2.0, 8.0, 5.0],
         "accounts.envelope.return_at_s": [3.0, inf, 6.0],
     }),
-    "alarm": ({}, ALARM | {"fdi.bank.output.max_residual_over_threshold_so_far": [0.2, 0.7, 0.9],
+    "alarm": ({}, ALARM | {"fdi.bank.output.peak": [0.2, 0.7, 0.9],
                            "fdi.bank.config.n_filters": 2,
                            "fdi.isolation.estimator.2.excluded": 1}),
     "named": ({}, NAMED | {"fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
                            "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7],
                            "fdi.bank.config.n_filters": 0,
-                           "fdi.bank.output.max_residual_over_threshold_so_far": [0.3, 0.7]}),
+                           "fdi.bank.output.peak": [0.3, 0.7]}),
     "a-damage-besides": ({"aircraft": "beaver", "fdi": {"fault_class": "published"}}, ALARM | {
-        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.config.can_be_lost_by_damage": [0, 1, 0, 1],
+        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.config.losable": [0, 1, 0, 1],
     }),
     "a-damage-excluded": ({}, NAMED | {
         "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
-        "fdi.isolation.config.can_be_lost_by_damage": [0, 1, 0, 1],
+        "fdi.isolation.config.losable": [0, 1, 0, 1],
     }),
     "named-first": ({}, NAMED | {
         "fdi.verdict.isolated_estimator": 0, "fdi.isolation.estimator.0.theta": [-0.3, -0.5, -0.7],
@@ -62,15 +62,15 @@ CASES = {
                                    "fdi.verdict.isolated_at_s": 3.0}),
     "withdrawn": ({}, ALARM | {
         "fdi.verdict.isolated_estimator": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0,
-        "fdi.verdict.n_withdrawn_isolations": 2,
-        "fdi.verdict.withdrawn_isolations.surface": [1, 3, 2],
-        "fdi.verdict.withdrawn_isolations.from_s": [2.0, 2.5, 4.0],
-        "fdi.verdict.withdrawn_isolations.to_s": [2.25, 3.0, 5.0],
+        "fdi.verdict.n_gone": 2,
+        "fdi.verdict.gone.surface": [1, 3, 2],
+        "fdi.verdict.gone.from_s": [2.0, 2.5, 4.0],
+        "fdi.verdict.gone.to_s": [2.25, 3.0, 5.0],
     }),
     "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
         "fdi.statistical.alarm.detected_at_s": 2.0,
-        "fdi.statistical.alarm.max_score_over_alarm_level_so_far": 0.95,
-        "fdi.statistical.test_config.alarm_level": 6.5,
+        "fdi.statistical.alarm.peak": 0.95,
+        "fdi.statistical.test.alarm_level": 6.5,
     }),
     "engine": ({}, {
         "control.power.config.enabled": 1, "control.power.output.from_s": 0.0,
@@ -202,7 +202,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0 - TIME_TOLERANCE_S}, False, True),
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
-        ({}, {"fdi.config.alarm_authority": STATISTICAL_DETECTOR}, False, False),
+        ({}, {"fdi.config.authority": STATISTICAL_DETECTOR}, False, False),
         ({}, {"fdi.sensor_monitor.output.alarmed": 1}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),

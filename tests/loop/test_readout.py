@@ -85,7 +85,7 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
         assert block.hypothesis_tests_by_onset.score.shape[0] == len(block.hypotheses)
         assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled
-    assert (monitor.worst_residual_bound_ratio, monitor.worst_test_index) == (
+    assert (monitor.top_ratio, monitor.worst_test_index) == (
         row["watch_share"],
         row["watch_test"],
     )
@@ -134,17 +134,15 @@ def test_instruments_change_with_the_flight_that_they_read():
 
 def test_each_number_of_a_frame_is_read_from_its_own_field():
     """A record in which no two numbers are alike: each readout is counted off by hand."""
-    means = np.dtype([("G", float, (3, 2)), ("predicted_acceleration", float, 3)])
+    means = np.dtype([("G", float, (3, 2)), ("F", float, 3)])
     actuators = np.dtype([(name, float, 2) for name in ("step", "approach", "high", "low")])
-    prediction = np.dtype(
-        [("u", float, 2), ("G", float, (3, 2)), ("frame_means", means), ("actuators", actuators)]
-    )
+    prediction = np.dtype([("u", float, 2), ("G", float, (3, 2)), ("means", means), ("actuators", actuators)])
     frame = np.zeros(1, [("since", int), ("prediction", prediction), ("y", float)])[0]
     frame["since"] = 3
     now = frame["prediction"]
     now["u"], now["G"] = (1.0, 2.0), np.arange(3.0, 9.0).reshape(3, 2)
-    now["frame_means"]["G"] = np.arange(9.0, 15.0).reshape(3, 2)
-    now["frame_means"]["predicted_acceleration"] = (15.0, 16.0, 17.0)
+    now["means"]["G"] = np.arange(9.0, 15.0).reshape(3, 2)
+    now["means"]["F"] = (15.0, 16.0, 17.0)
     for first, name in enumerate(("low", "high", "approach", "step")):
         now["actuators"][name] = (18.0 + 2 * first, 19.0 + 2 * first)
     readout = FrameReadout(frame)

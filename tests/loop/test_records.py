@@ -98,22 +98,22 @@ def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
 
 @pytest.mark.parametrize(
     ("noise", "quantum", "looks"),
-    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, redundancy.UNREACHABLE_FROZEN_SAMPLES)],
+    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, redundancy.N_FROZEN_NEVER)],
 )
 def test_for_how_long_a_sound_instrument_may_stand_still(noise, quantum, looks):
-    assert redundancy.min_frozen_samples(noise, quantum) == looks
+    assert redundancy.n_frozen(noise, quantum) == looks
 
 
 def test_gusts_that_the_watch_reckons_with():
     """Changes of variance 3 sigma^2 V / L a second, V 1.4 times that at the start, L 533.4 m (1750 ft); the
     filter passes h / (1 - exp(-2 lam h)) of them."""
-    speed, changes = redundancy.gust_speed_and_filtered_change_bounds(Dryden("light"), 45.0, 0.01)
+    speed, changes = redundancy.bound_gusts(Dryden("light"), 45.0, 0.01)
     sigma = 7.4 * 0.3048
     assert speed == pytest.approx(GUST_LIMIT_SIGMA * sigma)
     per_s = GUST_LIMIT_SIGMA * sigma * sqrt(3.0 * 1.4 * 45.0 / 533.4)
     expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in redundancy.FILTER_POLES_PER_S]
     assert changes == pytest.approx(expected)
-    assert redundancy.gust_speed_and_filtered_change_bounds(Dryden("none"), 45.0, 0.01)[0] == 0.0
+    assert redundancy.bound_gusts(Dryden("none"), 45.0, 0.01)[0] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from tests import seventeen
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.diagnosis.detection.parity import required_record_size
-from beaver_ftc.diagnosis.isolation import list_isolation_estimators
+from beaver_ftc.diagnosis.detection.parity import required_size
+from beaver_ftc.diagnosis.isolation import list_estimators
 from beaver_ftc.loop.assembly import frame_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
@@ -65,22 +65,20 @@ def test_it_is_trimmed_as_the_whole_where_one_part_does_the_work(folder):
 def test_every_loss_and_position_has_an_estimator(folder):
     aircraft = load(f"./{seventeen.NAME}", folder)
     assert aircraft.n == 17 <= MAX_SURFACES
-    assert len(list_isolation_estimators("all", aircraft)) == 34
+    assert len(list_estimators("all", aircraft)) == 34
     stand_ins = {part.name for part in seventeen.parts()["flap"]}
-    assert {surface for surface, _, _ in list_isolation_estimators("published", aircraft)} == {
+    assert {surface for surface, _, _ in list_estimators("published", aircraft)} == {
         *aircraft.surfaces
     } - stand_ins
 
 
 def test_a_record_has_the_room_that_its_aircraft_needs(folder):
     few, many = load(), load(f"./{seventeen.NAME}", folder)
-    small, large = (
-        frame_dtype(aircraft.n, required_record_size(aircraft)).itemsize for aircraft in (few, many)
-    )
+    small, large = (frame_dtype(aircraft.n, required_size(aircraft)).itemsize for aircraft in (few, many))
     assert small < 700_000  # onset tests in groups of four hypotheses, of which a view needs three at most
     assert 5_000_000 < large < 7_000_000
     assert (
-        required_record_size(many).rate_block_capacity.max_hypotheses == 3 * 8 + 2
+        required_size(many).rate_size.max_hypotheses == 3 * 8 + 2
     )  # ailerons and rudders: losses that are one block's
 
 

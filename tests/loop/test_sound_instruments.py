@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.diagnosis.monitors.redundancy import ALPHA_FLOW_TEST, BETA_FLOW_TEST, RPM_TEST
+from beaver_ftc.diagnosis.monitors.redundancy import ALPHA_TEST, BETA_TEST, RPM_TEST
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.sensors import PRESETS
 
@@ -74,7 +74,7 @@ def test_a_heading_that_leaps_past_north_is_sound_while_a_blurred_bank_swings():
 @pytest.mark.parametrize("substeps", [1, 2, 5])
 @pytest.mark.parametrize(
     ("sensor", "kind", "tests"),
-    [("beta", "lost", None), ("alpha", "bias", ALPHA_FLOW_TEST), ("beta", "bias", BETA_FLOW_TEST),
+    [("beta", "lost", None), ("alpha", "bias", ALPHA_TEST), ("beta", "bias", BETA_TEST),
      ("engine_rpm", "bias", RPM_TEST)],
 )  # fmt: skip
 def test_a_broken_instrument_is_found_when_it_breaks_in_verdict_and_log(sensor, kind, tests, substeps):

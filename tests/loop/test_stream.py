@@ -230,7 +230,7 @@ def test_what_a_frame_left_unexplained_is_held_against_the_bound_of_that_frame()
         diagnosis.step(*sample)
         rows.append((*diagnosis.innovation(), diagnosis.inside()[0]["fdi"]["bound"].copy()))
     for (*_, then), (innovation, bound, _, now) in pairwise(rows[60:]):
-        errors = (then["changing_gyro_error_bound"][0] + now["changing_gyro_error_bound"][0]) * 100.0
+        errors = (then["n_gyro"][0] + now["n_gyro"][0]) * 100.0
         apart(errors=errors, bound=bound, innovation=innovation, eta_bar=then["eta_bar"][0])
         assert bound == pytest.approx(then["eta_bar"][0] + errors, rel=1e-2)
 

@@ -121,12 +121,12 @@ def test_delays_that_just_fit_are_taken(lines):
 def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
     frame, new = _frame("nominal"), _frame("nominal")
     (
-        frame["fdi"]["bank"]["output"]["max_residual_over_threshold_so_far"],
-        frame["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level_so_far"],
+        frame["fdi"]["bank"]["output"]["peak"],
+        frame["fdi"]["statistical"]["alarm"]["peak"],
     ) = 0.5, 0.75
     for same in (True, False):
         (
-            new["fdi"]["bank"]["output"]["max_residual_over_threshold_so_far"],
+            new["fdi"]["bank"]["output"]["peak"],
             new["fdi"]["sensor_monitor"]["memory"]["substep"],
         ) = 0.0, 3
         new["fdi"]["bank"]["config"]["n_filters"] = frame["fdi"]["bank"]["config"]["n_filters"] + (not same)
@@ -134,10 +134,8 @@ def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
         take_diagnosis(then, new, 77)
         assert then["since"] == 77
         assert then["fdi"]["sensor_monitor"]["memory"]["substep"] == 0
-        assert then["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level_so_far"] == 0.75
-        assert set(then["fdi"]["bank"]["output"]["max_residual_over_threshold_so_far"]) == {
-            0.5 if same else 0.0
-        }
+        assert then["fdi"]["statistical"]["alarm"]["peak"] == 0.75
+        assert set(then["fdi"]["bank"]["output"]["peak"]) == {0.5 if same else 0.0}
 
 
 def test_changes_are_due_at_their_frames():

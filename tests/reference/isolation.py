@@ -81,7 +81,7 @@ class Widening:
         self.more = np.zeros((len(self.per_rad), 1, 3))
         if self.has_map:
             given = declaration.aircraft.file["model_error_map"]
-            self.shares, (self.travel_low, self.travel_high) = given["travel_share"], bounds.mapped_travel()
+            self.shares, (self.stop_lo, self.stop_hi) = given["travel_share"], bounds.mapped_travel()
             self.more = mean_of_frames(n, bounds.more_at_level())
         self.delta_before, self.share_before = (
             np.zeros(2 * len(declaration.aircraft.surfaces)) for _ in range(2)
@@ -119,8 +119,8 @@ class Widening:
         """Largest share of its travel that the surface can have used at any instant of the frame, for a mean
         position in the interval: if it began at the share b, at most max(b, (n share + b) / (n - 1))."""
         share = max(
-            interval[1] / self.travel_high[s] if interval[1] > 0.0 else 0.0,
-            interval[0] / self.travel_low[s] if interval[0] < 0.0 else 0.0,
+            interval[1] / self.stop_hi[s] if interval[1] > 0.0 else 0.0,
+            interval[0] / self.stop_lo[s] if interval[0] < 0.0 else 0.0,
         )
         if self.n > 1:
             b = self.share_before[row]

@@ -46,7 +46,7 @@ def alarm_level(declaration: Declaration, tests: int) -> float:
     return -NormalDist().inv_cdf(per_frame / tests)
 
 
-def drift_intensity(eta_bar: float, omega: float, sigma: float, z: float, dt: float) -> float:
+def drift_power(eta_bar: float, omega: float, sigma: float, z: float, dt: float) -> float:
     """Intensity of the drift over eta_bar^2, 1/s.
 
     An error eta_bar sin(omega t) changes a test by less than half of z (statistical.md). With the density of
@@ -74,7 +74,7 @@ class Noise:
         self.omega = declaration["statistical.uncertainty_rad_s"]
         b, dt = declaration.per_axis("bounds.constant_rad_s2").max(), declaration.dt
         exact = max(random_error(declaration, gyro) for gyro in "pqr")
-        self.intensity = drift_intensity(b, self.omega, exact, z, dt)
+        self.intensity = drift_power(b, self.omega, exact, z, dt)
         window = 2 ** (ONSETS - 1) * dt
         self.length = trim[1][2] * sqrt(2.0 * window / self.intensity) / z  # m, of the drift that returns
         self.eta_bar = self._bounded()

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from beaver_ftc.design import altitude_of, standard_air_density
+from beaver_ftc.design import altitude_of, standard_density
 from beaver_ftc.scenario.declared import (
     ALTITUDE,
     BETWEEN,
@@ -25,7 +25,7 @@ TABLE = [(0, 1.225), (1000, 1.1116), (2000, 1.0065), (5000, 0.73612), (11000, 0.
 
 @pytest.mark.parametrize(("altitude_m", "density"), TABLE)
 def test_density_and_altitude_are_the_tables(altitude_m, density):
-    assert standard_air_density(altitude_m) == pytest.approx(density, rel=2e-4)
+    assert standard_density(altitude_m) == pytest.approx(density, rel=2e-4)
     assert altitude_of(density) == pytest.approx(altitude_m, abs=3.0)
 
 

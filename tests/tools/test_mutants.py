@@ -89,7 +89,7 @@ def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not
             around = [f.name for f in functions if f.lineno <= mutant.lines[0] <= f.end_lineno]
             of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
     assert of["configure_isolation"] == {scope.GLUE}
-    assert of["a constant"] == of["advance_whitening_filter"] == {scope.KERNELS}
+    assert of["a constant"] == of["whiten_step"] == {scope.KERNELS}
     frame = {scope.kind_of(mutant) for mutant in mutants(scope.CORE / "loop" / "frame.py")}
     assert frame == {"fly"}
 

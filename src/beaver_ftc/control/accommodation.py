@@ -61,8 +61,8 @@ def mode_from(config, layout, verdict, assessment):
         relieved = assessment.isolated_surface == elevator and relievable
         return mode_of(config, verdict.detected, verdict.isolated_estimator, relieved)
     replaced = verdict.accommodation_mode in (SCALE_COMMAND, GIVE_UP)
-    relieved = replaced and verdict.accommodated_surface == elevator and relievable
-    isolated = verdict.accommodated_surface if replaced else min(verdict.isolated_estimator, 0)
+    relieved = replaced and verdict.target == elevator and relievable
+    isolated = verdict.target if replaced else min(verdict.isolated_estimator, 0)
     return mode_of(config, verdict.detected, isolated, relieved)
 
 
@@ -134,7 +134,7 @@ def accommodate(control, assessment, faults, prediction, measured):
 def begin_frame(output, assessment, informed):
     """Nothing is given up or parked yet; a slow surface has lost authority."""
     output.given_up[:], output.parked[:] = 0, 0
-    output.authority_lost = assessment.any_surface_lags and not informed
+    output.authority_lost = assessment.lags and not informed
 
 
 @kernel
@@ -142,7 +142,7 @@ def reported(output, assessment, faults, s, u, informed):
     """Take offset and lag of surface s from the diagnosis, from the truth if the law is `informed`; returns
     its effectiveness, 0 if it does not move. u rad: where it would be if healthy."""
     if not informed:
-        output.offset[s], output.lag[s] = assessment.deflection_offset[s], assessment.deflection_lag[s]
+        output.offset[s], output.lag[s] = assessment.offset[s], assessment.lag[s]
         return assessment.effectiveness[s]
     effectiveness = 0.0 if faults.immovable[s] else faults.effectiveness[s]
     output.offset[s], output.lag[s] = 0.0, 0.0
@@ -155,7 +155,7 @@ def reported(output, assessment, faults, s, u, informed):
 def start_of(output, assessment, s, informed):
     """Effectiveness of surface s from which this frame's step begins. A jam bypasses the rate limit, as does
     an effectiveness that is well known."""
-    jumps = assessment.apply_immediately[s] and not informed
+    jumps = assessment.at_once[s] and not informed
     return assessment.effectiveness[s] if jumps else output.effectiveness[s]
 
 

@@ -348,7 +348,7 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
     """
     own, waiting, u = 0.0, 0.0, prediction.u
     for s in range(u.size):
-        reach = prediction.actuators.step[s] / prediction.frame_share_per_instant
+        reach = prediction.actuators.step[s] / prediction.w
         half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
         hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
         problem.u_preferred[s] = min(max(hold, layout.low[s]), layout.high[s])

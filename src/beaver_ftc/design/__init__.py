@@ -42,17 +42,17 @@ def standard_air(altitude_m: float) -> tuple[float, float]:
     return pressure * exp(-GRAVITY_MPS2 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - KELVIN_AT_0_C
 
 
-def standard_air_density(altitude_m: float) -> float:
+def standard_density(altitude_m: float) -> float:
     """Density of the air, kg/m3."""
     pressure_hpa, celsius = standard_air(altitude_m)
     return PA_PER_HPA * pressure_hpa / (R_AIR * (celsius + KELVIN_AT_0_C))
 
 
 def altitude_of(density_kg_m3: float) -> float:
-    """The altitude at which the air has this density, m: the inverse of `standard_air_density`."""
-    tropopause = standard_air_density(STRATOSPHERE_M)
+    """The altitude at which the air has this density, m: the inverse of `standard_density`."""
+    tropopause = standard_density(STRATOSPHERE_M)
     if density_kg_m3 >= tropopause:
-        share = density_kg_m3 / standard_air_density(0.0)
+        share = density_kg_m3 / standard_density(0.0)
         return T0_K / LAPSE_K_M * (1.0 - share ** (1.0 / (SCALE - 1.0)))
     scale_m = R_AIR * (T0_K - LAPSE_K_M * STRATOSPHERE_M) / GRAVITY_MPS2
     return STRATOSPHERE_M + scale_m * log(tropopause / density_kg_m3)

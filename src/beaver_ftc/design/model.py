@@ -265,7 +265,7 @@ def density_ratio(y):
 @kernel
 def slipstream_slopes(y, power_error_kw_per_density_ratio):
     """What dpt changes by per unit of airspeed, s/m, of dynamic pressure, 1/Pa, and of the power, 1/kW, from
-    which it is worked out; power_error_kw_per_density_ratio: of that for the whole of the density."""
+    which it is worked out; kw1: of that for the whole of the density."""
     V, qdyn = y[AIRSPEED], y[QDYN]
     per_kw = KW_TO_DPT / (qdyn * V)
     thin = per_kw * power_error_kw_per_density_ratio * density_ratio(y)

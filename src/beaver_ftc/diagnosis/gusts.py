@@ -19,13 +19,24 @@ coarse estimate (likelihood.py).
 V is the speed relative to the field of gusts. The mean wind carries that field [MIL-F-8785C, 3.7.1], so V is
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
 sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
-`gust_velocity_change_since_start` is that sum, with a decay as slow as this drift permits. A relative error e
-of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_error_variance`).
+`v_g` is that sum, with a decay as slow as this drift permits. A relative error e
+of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`speed_error_share`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
 The velocity is integrated as in JSBSim, by the two-step method of Adams and Bashforth:
-v' = v + dt (3 a - a_before) / 2.
+v' = v + dt (3 a - a_prev) / 2.
+
+Letters of the kernels. i is a body axis, j an axis of the gusts; p, q, r at the end: roll, pitch, yaw.
+
+    v, v_g         velocity relative to the air; gust since the start, m/s in level axes
+    V              speed relative to the mean air, m/s
+    f, a           specific force, m/s2 in body axes; acceleration in level axes
+    T, C           rotations (3, 3): from level axes to body axes; from the gusts' axes to body axes
+    w, tau         rotation of the air in the gusts' axes, rad/s; its lag, s
+    acc            effect of w on the rates, rad/s2
+    L              rate damping, angular acceleration per rad/s (3, 3), 1/s; of a view (3,)
+    Q              intensity of the drift of w over V, rad2/s3 per m/s; Q_V: of an acceleration
 """
 
 from math import pi
@@ -48,816 +59,532 @@ from beaver_ftc.design.model import (
     rate_damping,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import (
-    angular_acceleration_by_gust_noise_std,
-    flow_angle_in_level_axes_noise_std,
-    min_true_height_m,
-)
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
+from beaver_ftc.diagnosis.bounds import flow_noise, gust_noise, least_height
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
-MIN_UNMEASURED_GUST_INTENSITY_SHARES = (1.0, 0.003, 0.03)
-UNMEASURED_SHARE_FROM_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
-ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
+MIN_UNMEASURED_SHARES = (1.0, 0.003, 0.03)
+FORCE_ERROR_SHARE = 0.01  # share left unmeasured by an error of a tenth in the forces
+INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
-MAX_GUST_VELOCITY_OVER_STD = 4.0  # limit of the estimated gust velocity, standard deviations
+MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
 MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
 MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
 # share of a gust's own intensity below which the turn of its axes is ignored
-MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN = 0.01
+FAST_TURN_SHARE = 0.01
 
 GUST_CONFIG_RECORD = record(
-    has_force_model=int,  # whether the design model has forces
-    has_only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
-    wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
-    # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
-    gust_rotation_intensity_per_airspeed_aloft=3, gust_rotation_intensity_per_airspeed_at_1_m=3,
-    altitude_error_bound_at_zero_m=float,
-    altitude_error_bound_per_m=float,  # bound on the altimeter's error: offset, m; slope
-    # limit of a gust component, m/s; decay of `gust_velocity_change_since_start`, 1/s
-    max_gust_velocity=float, gust_velocity_decay_rate=float,
-    # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
-    # relative error of the speed leaves, over the variance of that error.
-    speed_error_variance=float, gust_velocity_variance=float, unmeasured_share_per_speed_error_variance=float,
-    rolling_gust_correlation_length=float,  # lag of the rolling gust times airspeed, m
-    turbulence_scale_length=float,  # of the gusts, m
+    has_forces=int, coarse_only=int,  # whether the design model has forces; whether the estimate is coarse
+    S_m=float, gravity=float, span=float,  # S / m, m2/kg; m/s2; b, m
+    Q_aloft=3, Q_1m=3,  # Q above 2000 ft; at a height of 1 m
+    h0=float, h1=float,  # bound on the altimeter's error: offset, m; slope
+    v_max=float, a_v=float,  # limit of a component of v_g, m/s; decay of v_g, 1/s
+    # Error variance of V, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a relative
+    # error of V leaves, over the variance of that error.
+    var_V=float, var_v=float, speed_error_share=float,
+    L_roll=float, L_gust=float,  # correlation lengths of the rolling gust and of the gusts, m
     starts_in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
-    has_acceleration_before=int,  # whether `acceleration_in_level_axes_before` is valid
-    accelerometer_reading=3,  # reading of the accelerometers, m/s2
-    force_table=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
-    # Velocity relative to the air, m/s in level axes; specific force, m/s2 in body axes; attitude.
-    air_relative_velocity=3, specific_force=3, level_to_body=(3, 3), heading=float,
-    # an instant before, by forces and gravity, m/s2 in the level axes of this one
-    acceleration_in_level_axes_before=3,
-    air_rotation_in_level_axes=3, air_rotation_in_body_axes=3,  # rad/s
-    # sum of `angular_acceleration_by_gust` over the instants of a frame, rad/s2
-    angular_acceleration_by_gust_sum=3,
-    # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
-    gust_rotation_intensity_per_airspeed=3,
-    unmeasured_intensity_share=3,  # share of it that the vanes do not measure
-    # Change of the gust's velocity since the start, m/s ahead, right, down; share of the variance of the
-    # initial gust that still counts.
-    gust_velocity_change_since_start=3, remaining_initial_gust_variance_share=float,
+    # whether a_prev is valid; reading of the accelerometers, m/s2; force coefficients
+    has_prev=int, f_read=3, table=TABLE, scratch=MAX_MONOMIALS,
+    v=3, f=3, T=(3, 3), heading=float, a_prev=3,  # a an instant before, in level axes of now
+    w=3, w_body=3, acc_sum=3,  # w in body axes; sum of acc over the instants of a frame
+    Q=3, share=3,  # share of Q that the vanes do not measure
+    v_g=3, start_left=float,  # share of the variance of the initial gust that still counts
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
     # the pitching gust that was present when the diagnosis started.
-    unmeasured_yawing_share_by_turn_now=float, unmeasured_yawing_share_by_past_turns=float,
-    unmeasured_pitching_share_by_start=float,
-    # turn of the gusts' axes in the body, 1/s; whether it counts
-    gust_axes_rate=(3, 3), has_fast_axes_turn=int,
-    # Variance of the accelerations by that turn, (rad/s2)2: in the current frame, in the frame before; number
-    # of frames for which there is any.
-    acceleration_variance_by_axes_turn_now=(3, 3), acceleration_variance_by_axes_turn_before=(3, 3),
-    n_frames_left_with_axes_turn_variance=int,
+    turn_now=float, turn_past=float, start_share=float,
+    C_dot=(3, 3), turns_fast=int,  # turn of C, 1/s; whether it counts
+    # Variance of acc by that turn, (rad/s2)2: in this frame, in the frame before; frames that it lasts.
+    var_now=(3, 3), var_prev=(3, 3), n_turn=int,
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
     # Whether there is turbulence; whether accelerometers are used; whether the gust is measured. These are
     # filled by configure, and end with the accelerometers.
-    accounts_for_gusts=int, uses_accelerometers=int, is_gust_measured=int,
-    # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
-    angular_acceleration_by_gust=3, mean_angular_acceleration_by_gust=3,
-    angular_acceleration_by_coarse_gust=3,  # effect of the coarse estimate, rad/s2
-    # `acceleration_variance_by_axes_turn_now` plus `acceleration_variance_by_axes_turn_before`, (rad/s2)2
-    acceleration_variance_by_axes_turn=(3, 3),
-    speed_relative_to_mean_air=float,  # relative to the mean air, m/s
-    rate_damping=(3, 3), gust_axes_in_body=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
+    gusty=int, uses_accelerometers=int, measured=int,
+    acc=3, acc_mean=3, acc_coarse=3,  # of the measured gust, now and mean of the frame; of the coarse one
+    var_turn=(3, 3), V=float,  # var_now plus var_prev
+    rate_damping=(3, 3), C=(3, 3),
 )  # fmt: skip
 
 GUST_RECORD = record(config=GUST_CONFIG_RECORD, memory=GUST_MEMORY_RECORD, output=GUST_OUTPUT_RECORD)
 
 
 @kernel
-def fill_specific_force(gust, x, y, u, out):
-    """Fill out (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
+def fill_force(gust, x, y, u, f):
+    """Fill f (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
+
+        f_i = qdyn S / m C_i(x, y, u)
 
     x (3,) rad/s, y (4 + declared,), u (n,) rad. The term of the rate of sideslip is omitted: it is below a
     hundredth of the side force.
     """
-    force_table = gust.memory.force_table
-    evaluate(force_table, x, y)
+    table = gust.memory.table
+    evaluate(table, x, y)
     for i in range(3):
-        out[i] = y[QDYN] * gust.config.wing_area_per_mass * whole_sum(force_table, i, force_table.power, u)
+        f[i] = y[QDYN] * gust.config.S_m * whole_sum(table, i, table.power, u)
 
 
 @kernel
-def fill_level_to_body_rotation(phi, theta, level_to_body):
-    """Fill level_to_body (3, 3), the rotation from level axes (forward, right, down) to body axes; angles
-    rad."""
-    sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    level_to_body[0, 0], level_to_body[0, 1], level_to_body[0, 2] = cos_theta, 0.0, -sin_theta
-    level_to_body[1, 0] = sin_phi * sin_theta
-    level_to_body[1, 1] = cos_phi
-    level_to_body[1, 2] = sin_phi * cos_theta
-    level_to_body[2, 0] = cos_phi * sin_theta
-    level_to_body[2, 1] = -sin_phi
-    level_to_body[2, 2] = cos_phi * cos_theta
+def fill_rotation(phi, th, T):
+    """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
+    sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
+    T[0, 0], T[0, 1], T[0, 2] = cos_theta, 0.0, -sin_theta
+    T[1, 0] = sin_phi * sin_theta
+    T[1, 1] = cos_phi
+    T[1, 2] = sin_phi * cos_theta
+    T[2, 0] = cos_phi * sin_theta
+    T[2, 1] = -sin_phi
+    T[2, 2] = cos_phi * cos_theta
 
 
 @kernel
-def component_in_level_axes(level_to_body, body_vector, level_axis):
-    """Component along a level axis of a vector (3,) in body axes."""
-    return (
-        level_to_body[0, level_axis] * body_vector[0]
-        + level_to_body[1, level_axis] * body_vector[1]
-        + level_to_body[2, level_axis] * body_vector[2]
-    )
+def level_component(T, v, i):
+    """Component i in level axes of a vector v (3,) in body axes: (T' v)_i."""
+    return T[0, i] * v[0] + T[1, i] * v[1] + T[2, i] * v[2]
 
 
 @kernel
-def fill_attitude_and_air_relative_velocity(gust, y, attitude):
-    """Fill attitude, heading and velocity relative to the air, m/s in level axes, of this instant.
+def fill_velocity(gust, y, attitude):
+    """Fill attitude, heading and v = T' (velocity relative to the air) of this instant.
 
     y (5,) and attitude (3,) rad as measured.
     """
-    alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    fill_level_to_body_rotation(attitude[0], attitude[1], gust.memory.level_to_body)
-    gust.memory.heading = attitude[2]
-    body_forward_velocity = V * np.cos(alpha) * np.cos(beta)
-    body_right_velocity = V * np.sin(beta)
-    body_down_velocity = V * np.sin(alpha) * np.cos(beta)
+    mem, V, alpha, beta = gust.memory, y[AIRSPEED], y[ALPHA], y[BETA]
+    fill_rotation(attitude[0], attitude[1], mem.T)
+    mem.heading = attitude[2]
+    v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
-        gust.memory.air_relative_velocity[i] = (
-            gust.memory.level_to_body[0, i] * body_forward_velocity
-            + gust.memory.level_to_body[1, i] * body_right_velocity
-            + gust.memory.level_to_body[2, i] * body_down_velocity
-        )
+        mem.v[i] = level_component(mem.T, v, i)
 
 
 @kernel
-def start_gust_estimate(gust, y, attitude):
+def start_gust(gust, y, attitude):
     """Start at the first frame of a diagnosis: the estimated gust is zero.
 
     If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
     """
-    fill_attitude_and_air_relative_velocity(gust, y, attitude)
-    update_gust_axes_keeping_previous(gust, 0.0, 1.0)
-    gust.memory.air_rotation_in_level_axes[:] = 0.0
-    gust.memory.has_acceleration_before, gust.memory.unmeasured_yawing_share_by_turn_now = 0, 0.0
-    gust.memory.unmeasured_yawing_share_by_past_turns = gust.memory.unmeasured_pitching_share_by_start = (
-        gust.memory.remaining_initial_gust_variance_share
-    ) = float(gust.config.starts_in_flight)
-    gust.memory.gust_velocity_change_since_start[:], gust.output.speed_relative_to_mean_air = 0.0, y[AIRSPEED]
-    gust.memory.acceleration_variance_by_axes_turn_now[:] = 0.0
-    gust.memory.acceleration_variance_by_axes_turn_before[:] = 0.0
-    gust.output.acceleration_variance_by_axes_turn[:] = 0.0
-    gust.memory.n_frames_left_with_axes_turn_variance = 0
+    mem, out = gust.memory, gust.output
+    fill_velocity(gust, y, attitude)
+    update_axes(gust, 1.0 + 0.0j)
+    mem.w[:] = mem.v_g[:] = 0.0
+    mem.has_prev, mem.turn_now, mem.n_turn = 0, 0.0, 0
+    mem.turn_past = mem.start_share = mem.start_left = float(gust.config.starts_in_flight)
+    out.V = y[AIRSPEED]
+    mem.var_now[:] = mem.var_prev[:] = out.var_turn[:] = 0.0
 
 
 @kernel
-def update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change):
-    """Fill `gust_axes_in_body` for this instant, and keep those of the instant before in `gust_axes_rate`.
+def update_axes(gust, z):
+    """Fill `C` for this instant, and keep that of the instant before in `C_dot`.
 
-    sin, cos_heading_change: of the change of heading. JSBSim's gusts have the heading of the step before.
+    z = exp(-i change of heading). JSBSim's gusts have the heading of the step before.
     """
-    gust.memory.gust_axes_rate[:] = gust.output.gust_axes_in_body
+    T, C = gust.memory.T, gust.output.C
+    gust.memory.C_dot[:] = C
     for i in range(3):
-        level_ahead_on_body_axis = gust.memory.level_to_body[i, 0]
-        level_right_on_body_axis = gust.memory.level_to_body[i, 1]
-        gust.output.gust_axes_in_body[i, 0] = (
-            level_ahead_on_body_axis * cos_heading_change - level_right_on_body_axis * sin_heading_change
-        )
-        gust.output.gust_axes_in_body[i, 1] = (
-            level_ahead_on_body_axis * sin_heading_change + level_right_on_body_axis * cos_heading_change
-        )
-        gust.output.gust_axes_in_body[i, 2] = gust.memory.level_to_body[i, 2]
+        c = complex(T[i, 0], T[i, 1]) * z.conjugate()
+        C[i, 0], C[i, 1], C[i, 2] = c.real, c.imag, T[i, 2]
 
 
 @kernel
-def fill_axes_rate_and_fast_turn(gust, dt, V):
-    """Fill `gust_axes_rate`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant
-    before.
+def fill_axes_rate(gust, dt, V):
+    """Fill `C_dot`, 1/s, from the C of the instant before, dt s ago, and whether the axes turn fast.
 
-    A constant unmeasured gust of deviation sigma = sqrt(intensity lag / 2) then changes in body axes at the
-    rate sigma gust_axes_rate. Over its lag this equals a random walk of (gust_axes_rate lag)^2 / 2 times its
-    intensity.
+    A constant unmeasured gust of deviation sigma = sqrt(Q tau / 2) then changes in body axes at the rate
+    sigma C_dot. Over its lag tau this equals a random walk of (C_dot tau)^2 / 2 times its intensity.
     """
-    largest_turn_rate_magnitude_so_far = 0.0
+    C, C_dot, fastest = gust.output.C, gust.memory.C_dot, 0.0
     for i in range(3):
-        for gust_axis in range(3):
-            gust.memory.gust_axes_rate[i, gust_axis] = (
-                gust.output.gust_axes_in_body[i, gust_axis] - gust.memory.gust_axes_rate[i, gust_axis]
-            ) / dt
-            largest_turn_rate_magnitude_so_far = max(
-                largest_turn_rate_magnitude_so_far, abs(gust.memory.gust_axes_rate[i, gust_axis])
-            )
-    gust.memory.has_fast_axes_turn = (
-        0.5 * (largest_turn_rate_magnitude_so_far * gust.config.rolling_gust_correlation_length / V) ** 2
-        > MIN_INTENSITY_SHARE_OF_FAST_AXES_TURN
-    )
+        for j in range(3):
+            C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
+            fastest = max(fastest, abs(C_dot[i, j]))
+    gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, 0, V)) ** 2 > FAST_TURN_SHARE
 
 
 @kernel
-def unmeasured_yawing_share_from_heading_rate(gust, V, heading_rate):
-    """Share of the yawing gust's intensity that is unmeasured while the heading turns at `heading_rate`
-    rad/s.
+def yaw_turn_share(gust, V, psi_dot):
+    """Share of the yawing gust's intensity that is unmeasured at a rate psi_dot, rad/s, of the heading.
+
+        share = psi_dot^2 b L / (pi V^2)
 
     The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
-    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / turbulence_scale_length. The share is
-    the ratio of their squares over the lag of the yawing gust, 3 span / pi V.
+    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L. The share is the ratio of their
+    squares over the lag of the yawing gust, 3 b / pi V.
     """
-    return (
-        heading_rate
-        * heading_rate
-        * gust.config.wing_span
-        * gust.config.turbulence_scale_length
-        / (pi * V * V)
-    )
+    return psi_dot * psi_dot * gust.config.span * gust.config.L_gust / (pi * V * V)
 
 
 @kernel
-def advance_gust_estimate(gust, y, attitude, dt):
-    """Update `air_rotation_in_level_axes` (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
+def advance_gust(gust, y, attitude, dt):
+    """Update w (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
-    y (5,) and attitude (3,) rad as measured now; `specific_force` and attitude in memory are those dt s ago.
-    If the heading turns so fast that the vanes mostly measure this turn, as when the nose passes the
-    vertical, the yawing gust only decays, and the sum of changes `gust_velocity_change_since_start` starts
-    again. It does so one instant longer: JSBSim's gusts turn a step after the heading.
+        v <- v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
+
+    y (5,) and attitude (3,) rad as measured now; f and T in memory are those dt s ago. If the heading turns
+    so fast that the vanes mostly measure this turn, as when the nose passes the vertical, the yawing gust
+    only decays, and the sum of changes v_g starts again. It does so one instant longer: JSBSim's gusts turn a
+    step after the heading.
     """
-    acceleration_in_level_axes = gust.memory.scratch
+    mem, a = gust.memory, gust.memory.scratch
     for i in range(3):
-        acceleration_in_level_axes[i] = component_in_level_axes(
-            gust.memory.level_to_body, gust.memory.specific_force, i
-        )
-    acceleration_in_level_axes[2] += gust.config.gravity
-    if not gust.memory.has_acceleration_before:
-        gust.memory.acceleration_in_level_axes_before[:] = acceleration_in_level_axes[:3]
-        gust.memory.has_acceleration_before = 1
+        a[i] = level_component(mem.T, mem.f, i)
+    a[2] += gust.config.gravity
+    if not mem.has_prev:
+        mem.a_prev[:] = a[:3]
+        mem.has_prev = 1
     for i in range(3):
-        gust.memory.air_relative_velocity[i] += dt * (
-            1.5 * acceleration_in_level_axes[i] - 0.5 * gust.memory.acceleration_in_level_axes_before[i]
-        )
-    heading_change = wrapped(attitude[2] - gust.memory.heading)
-    sin_heading_change, cos_heading_change = np.sin(heading_change), np.cos(heading_change)
-    predicted_horizontal_velocity_ahead = (
-        gust.memory.air_relative_velocity[0] * cos_heading_change
-        + gust.memory.air_relative_velocity[1] * sin_heading_change
-    )
-    predicted_horizontal_velocity_right = (
-        gust.memory.air_relative_velocity[1] * cos_heading_change
-        - gust.memory.air_relative_velocity[0] * sin_heading_change
-    )
-    predicted_vertical_velocity_down = gust.memory.air_relative_velocity[2]
-    gust.memory.acceleration_in_level_axes_before[0] = (
-        acceleration_in_level_axes[0] * cos_heading_change
-        + acceleration_in_level_axes[1] * sin_heading_change
-    )
-    gust.memory.acceleration_in_level_axes_before[1] = (
-        acceleration_in_level_axes[1] * cos_heading_change
-        - acceleration_in_level_axes[0] * sin_heading_change
-    )
-    gust.memory.acceleration_in_level_axes_before[2] = acceleration_in_level_axes[2]
-    fill_attitude_and_air_relative_velocity(gust, y, attitude)
-    update_gust_velocity_and_speed(
-        gust,
-        predicted_horizontal_velocity_ahead,
-        predicted_horizontal_velocity_right,
-        predicted_vertical_velocity_down,
-        y[AIRSPEED],
-        dt,
-    )
-    V = gust.output.speed_relative_to_mean_air
-    update_gust_axes_keeping_previous(gust, sin_heading_change, cos_heading_change)
-    fill_axes_rate_and_fast_turn(gust, dt, V)
-    update_air_rotation_and_unmeasured_shares(
-        gust, predicted_horizontal_velocity_right, predicted_vertical_velocity_down, heading_change / dt, dt
-    )
+        mem.v[i] += dt * (1.5 * a[i] - 0.5 * mem.a_prev[i])
+    turn = wrapped(attitude[2] - mem.heading)
+    z = complex(np.cos(turn), -np.sin(turn))
+    v_h, a_h, v_z = complex(mem.v[0], mem.v[1]) * z, complex(a[0], a[1]) * z, mem.v[2]
+    mem.a_prev[0], mem.a_prev[1], mem.a_prev[2] = a_h.real, a_h.imag, a[2]
+    fill_velocity(gust, y, attitude)
+    dv = v_h.real - mem.v[0], v_h.imag - mem.v[1], v_z - mem.v[2]
+    update_gust_speed(gust, dv, y[AIRSPEED], dt)
+    update_axes(gust, z)
+    fill_axes_rate(gust, dt, gust.output.V)
+    update_rotation(gust, dv, turn / dt, dt)
 
 
 @kernel
-def update_air_rotation_and_unmeasured_shares(
-    gust, predicted_horizontal_velocity_right, predicted_vertical_velocity_down, heading_rate, dt
-):
+def update_rotation(gust, dv, psi_dot, dt):
     """Let the pitching and yawing rotation of the air decay, and add what the change of the gust shows of it.
 
-    predicted_horizontal_velocity_right, predicted_vertical_velocity_down, m/s: velocity relative to the air
-    if the gust had not changed. heading_rate rad/s; dt s.
+        w_q <- exp(-dt / tau_q) w_q + dv_z / V tau_q      w_r <- exp(-dt / tau_r) w_r + dv_y / V tau_r
+
+    dv (3,) m/s: change of the gust in level axes; psi_dot rad/s: rate of the heading; dt s.
     """
-    V = gust.output.speed_relative_to_mean_air
-    pitching_lag_s, yawing_lag_s = gust_correlation_time_s(gust, 1, V), gust_correlation_time_s(gust, 2, V)
-    previous_unmeasured_yawing_share = gust.memory.unmeasured_yawing_share_by_turn_now
-    gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_from_heading_rate(
-        gust, V, heading_rate
-    )
-    larger_unmeasured_yawing_share = max(
-        previous_unmeasured_yawing_share, gust.memory.unmeasured_yawing_share_by_turn_now
-    )
-    gust.memory.unmeasured_yawing_share_by_past_turns = min(
-        max(
-            np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns,
-            larger_unmeasured_yawing_share,
-        ),
-        1.0,
-    )
-    gust.memory.unmeasured_pitching_share_by_start *= np.exp(-dt / pitching_lag_s)
-    gust.memory.air_rotation_in_level_axes[1] = np.exp(
-        -dt / pitching_lag_s
-    ) * gust.memory.air_rotation_in_level_axes[1] + (
-        predicted_vertical_velocity_down - gust.memory.air_relative_velocity[2]
-    ) / (V * pitching_lag_s)
-    gust.memory.air_rotation_in_level_axes[2] = (
-        np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
-    )
-    if larger_unmeasured_yawing_share < 1.0:
-        gust.memory.air_rotation_in_level_axes[2] += (
-            predicted_horizontal_velocity_right - gust.memory.air_relative_velocity[1]
-        ) / (V * yawing_lag_s)
+    mem, V = gust.memory, gust.output.V
+    tau_q, tau_r = gust_lag(gust, 1, V), gust_lag(gust, 2, V)
+    a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
+    previous, mem.turn_now = mem.turn_now, yaw_turn_share(gust, V, psi_dot)
+    larger = max(previous, mem.turn_now)
+    mem.turn_past = min(max(a_r * mem.turn_past, larger), 1.0)
+    mem.start_share *= a_q
+    mem.w[1] = a_q * mem.w[1] + dv[2] / (V * tau_q)
+    mem.w[2] *= a_r
+    if larger < 1.0:
+        mem.w[2] += dv[1] / (V * tau_r)
     else:
-        gust.memory.gust_velocity_change_since_start[:], gust.memory.remaining_initial_gust_variance_share = (
-            0.0,
-            1.0,
-        )
+        mem.v_g[:], mem.start_left = 0.0, 1.0
 
 
 @kernel
-def update_gust_velocity_and_speed(
-    gust,
-    predicted_horizontal_velocity_ahead,
-    predicted_horizontal_velocity_right,
-    predicted_vertical_velocity_down,
-    airspeed,
-    dt,
-):
-    """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
+def update_gust_speed(gust, dv, V, dt):
+    """Update v_g and V for the elapsed dt s.
 
-    predicted_horizontal_velocity_ahead, _right and predicted_vertical_velocity_down, m/s: velocity relative
-    to the air if the gust had not changed. airspeed m/s: it is the speed if no gust is measured.
+        v_g <- a v_g + dv      V = |v + v_g|
+
+    dv (3,) m/s: change of the gust in level axes. V m/s: airspeed; it is the speed if no gust is measured.
     """
-    gust.output.speed_relative_to_mean_air = airspeed
-    if not gust.output.is_gust_measured:
+    mem, cfg = gust.memory, gust.config
+    gust.output.V = V
+    if not gust.output.measured:
         return
-    decay_factor = np.exp(-gust.config.gust_velocity_decay_rate * dt)
-    gust.memory.remaining_initial_gust_variance_share *= decay_factor * decay_factor
-    gust.memory.gust_velocity_change_since_start[0] = (
-        decay_factor * gust.memory.gust_velocity_change_since_start[0]
-        + predicted_horizontal_velocity_ahead
-        - gust.memory.air_relative_velocity[0]
-    )
-    gust.memory.gust_velocity_change_since_start[1] = (
-        decay_factor * gust.memory.gust_velocity_change_since_start[1]
-        + predicted_horizontal_velocity_right
-        - gust.memory.air_relative_velocity[1]
-    )
-    gust.memory.gust_velocity_change_since_start[2] = (
-        decay_factor * gust.memory.gust_velocity_change_since_start[2]
-        + predicted_vertical_velocity_down
-        - gust.memory.air_relative_velocity[2]
-    )
-    squared_speed_relative_to_mean_air = 0.0
+    a, V2 = np.exp(-cfg.a_v * dt), 0.0
+    mem.start_left *= a * a
     for i in range(3):
-        gust.memory.gust_velocity_change_since_start[i] = min(
-            max(gust.memory.gust_velocity_change_since_start[i], -gust.config.max_gust_velocity),
-            gust.config.max_gust_velocity,
-        )
-        squared_speed_relative_to_mean_air += (
-            gust.memory.air_relative_velocity[i] + gust.memory.gust_velocity_change_since_start[i]
-        ) ** 2
-    gust.output.speed_relative_to_mean_air = max(np.sqrt(squared_speed_relative_to_mean_air), 0.5 * airspeed)
+        mem.v_g[i] = min(max(a * mem.v_g[i] + dv[i], -cfg.v_max), cfg.v_max)
+        V2 += (mem.v[i] + mem.v_g[i]) ** 2
+    gust.output.V = max(np.sqrt(V2), 0.5 * V)
 
 
 @kernel
-def set_gust_intensity_at_altitude(gust, measured_altitude_m):
-    """Fill the intensity of turbulence at this altitude."""
-    min_height_m = min_true_height_m(
-        measured_altitude_m,
-        gust.config.altitude_error_bound_at_zero_m,
-        gust.config.altitude_error_bound_per_m,
-    )
-    gust.memory.gust_rotation_intensity_per_airspeed[0] = max(
-        gust.config.gust_rotation_intensity_per_airspeed_aloft[0],
-        gust.config.gust_rotation_intensity_per_airspeed_at_1_m[0] / min_height_m**1.5,
-    )
-    for gust_axis in range(1, 3):
-        gust.memory.gust_rotation_intensity_per_airspeed[gust_axis] = max(
-            gust.config.gust_rotation_intensity_per_airspeed_aloft[gust_axis],
-            gust.config.gust_rotation_intensity_per_airspeed_at_1_m[gust_axis] / min_height_m,
-        )
+def set_intensity(gust, altitude):
+    """Fill Q at this altitude, m."""
+    cfg = gust.config
+    h = least_height(altitude, cfg.h0, cfg.h1)
+    for j in range(3):
+        gust.memory.Q[j] = max(cfg.Q_aloft[j], cfg.Q_1m[j] / (h**1.5 if j == 0 else h))
 
 
 @kernel
-def start_or_advance_gust_estimate(gust, y, attitude, dt, frame_index):
-    """Start at frame 0, and update the gust at later frames; arguments as in `advance_gust_estimate`."""
-    if frame_index > 0:
-        advance_gust_estimate(gust, y, attitude, dt)
+def step_gust(gust, y, attitude, dt, k):
+    """Start at frame 0, and update the gust at later frames; arguments as in `advance_gust`."""
+    if k > 0:
+        advance_gust(gust, y, attitude, dt)
     else:
-        start_gust_estimate(gust, y, attitude)
+        start_gust(gust, y, attitude)
 
 
 @kernel
-def fill_gust_effect_and_specific_force(gust, design, x, y, u):
-    """Fill `angular_acceleration_by_gust` (3,) rad/s2, the effect of the gust from now on, and
-    `specific_force`, m/s2.
+def fill_gust_effect(gust, design, x, y, u):
+    """Fill acc (3,) rad/s2, the effect of the gust from now on, -L C w, and f, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
-    if gust.output.uses_accelerometers:
-        gust.memory.specific_force[:] = gust.memory.accelerometer_reading
-    elif gust.config.has_only_coarse_estimate:  # lift balances the weight, and turns with the bank
-        gust.memory.specific_force[0] = gust.memory.specific_force[1] = 0.0
-        gust.memory.specific_force[2] = -gust.config.gravity / max(
-            gust.memory.level_to_body[2, 2], MIN_BANK_COSINE
-        )
+    cfg, mem, out = gust.config, gust.memory, gust.output
+    if out.uses_accelerometers:
+        mem.f[:] = mem.f_read
+    elif cfg.coarse_only:  # lift balances the weight, and turns with the bank
+        mem.f[0] = mem.f[1] = 0.0
+        mem.f[2] = -cfg.gravity / max(mem.T[2, 2], MIN_BANK_COSINE)
     else:
-        fill_specific_force(gust, x, y, u, gust.memory.specific_force)
-    rate_damping(design, x, y, u, gust.memory.scratch, gust.output.rate_damping)
+        fill_force(gust, x, y, u, mem.f)
+    rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
     for i in range(3):
-        air_rotation_about_body_axis = (
-            gust.output.gust_axes_in_body[i, 1] * gust.memory.air_rotation_in_level_axes[1]
-            + gust.output.gust_axes_in_body[i, 2] * gust.memory.air_rotation_in_level_axes[2]
-        )
-        gust.memory.air_rotation_in_body_axes[i] = (
-            air_rotation_about_body_axis
-            if gust.output.is_gust_measured or gust.config.has_only_coarse_estimate
-            else 0.0
-        )
+        w_i = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
+        mem.w_body[i] = w_i if out.measured or cfg.coarse_only else 0.0
     for i in range(3):
-        acceleration_from_gust = 0.0
+        acc = 0.0
         for j in range(3):
-            acceleration_from_gust -= (
-                gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
-            )
-        gust.output.angular_acceleration_by_gust[i], gust.output.angular_acceleration_by_coarse_gust[i] = (
-            (acceleration_from_gust, 0.0) if gust.output.is_gust_measured else (0.0, acceleration_from_gust)
-        )
+            acc -= out.rate_damping[i, j] * mem.w_body[j]
+        out.acc[i], out.acc_coarse[i] = (acc, 0.0) if out.measured else (0.0, acc)
 
 
 @kernel
-def begin_gust_sums_with_instant(gust, V, dt):
+def begin_gust_sums(gust, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
-    gust.memory.angular_acceleration_by_gust_sum[:] = gust.output.angular_acceleration_by_gust
-    add_acceleration_variance_by_axes_turn(gust, V, dt)
+    gust.memory.acc_sum[:] = gust.output.acc
+    add_turn_variance(gust, V, dt)
 
 
 @kernel
-def update_gust_and_sums(gust, design, x, y, u, attitude, dt):
+def update_gust(gust, design, x, y, u, attitude, dt):
     """Update gust and sums for an instant inside a frame, dt s after the instant before.
 
-    Arguments as in `fill_gust_effect_and_specific_force`; attitude (3,) rad.
+    Arguments as in `fill_gust_effect`; attitude (3,) rad.
     """
-    advance_gust_estimate(gust, y, attitude, dt)
-    fill_gust_effect_and_specific_force(gust, design, x, y, u)
+    advance_gust(gust, y, attitude, dt)
+    fill_gust_effect(gust, design, x, y, u)
     for i in range(3):
-        gust.memory.angular_acceleration_by_gust_sum[i] += gust.output.angular_acceleration_by_gust[i]
-    add_acceleration_variance_by_axes_turn(gust, y[AIRSPEED], dt)
+        gust.memory.acc_sum[i] += gust.output.acc[i]
+    add_turn_variance(gust, y[AIRSPEED], dt)
 
 
 @kernel
-def store_accelerometer_reading(gust, specific_force):
-    """Keep the reading of the accelerometers, specific_force (3,) m/s2."""
-    gust.memory.accelerometer_reading[:] = specific_force
+def store_accelerometer_reading(gust, f):
+    """Keep the reading of the accelerometers, f (3,) m/s2."""
+    gust.memory.f_read[:] = f
 
 
 @kernel
-def stop_gust_estimate(gust):
-    """Stop estimating the gust."""
-    gust.output.accounts_for_gusts = 0
-
-
-@kernel
-def stop_using_accelerometers(gust):
+def drop_accelerometers(gust):
     """Stop using the accelerometers.
 
     Without a model of the forces the gust is then unmeasured, and all of its variance counts as unknown.
     """
     gust.output.uses_accelerometers = 0
-    if gust.output.is_gust_measured and not gust.config.has_force_model:
-        gust.output.is_gust_measured, gust.memory.unmeasured_intensity_share[:] = 0, 1.0
-        half_pitching_correlation_length_m = 0.5 * gust_correlation_length(gust, 1)
-        half_yawing_correlation_length_m = 0.5 * gust_correlation_length(gust, 2)
-        for i in range(3):
-            for j in range(3):
-                gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                    half_pitching_correlation_length_m
-                    * gust.memory.gust_rotation_intensity_per_airspeed[1]
-                    * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 1)
-                )
-                gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                    half_yawing_correlation_length_m
-                    * gust.memory.gust_rotation_intensity_per_airspeed[2]
-                    * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 2)
-                )
-        gust.memory.n_frames_left_with_axes_turn_variance = 3
+    if gust.output.measured and not gust.config.has_forces:
+        gust.output.measured, gust.memory.share[:] = 0, 1.0
+        for j in range(1, 3):
+            add_variance(gust, gust.output.C, j, 0.5 * gust_lag(gust, j, 1.0) * gust.memory.Q[j])
 
 
 @kernel
-def unmeasured_gust_intensity_share(gust, gust_axis):
-    """Share of the intensity of the gust about a gust axis that is unmeasured in this frame."""
-    if gust_axis == 0:
-        return min(gust.memory.unmeasured_intensity_share[gust_axis], 1.0)
-    unmeasured_share_from_speed_error = (
-        gust.config.unmeasured_share_per_speed_error_variance
-        * (
-            gust.config.speed_error_variance
-            + gust.memory.remaining_initial_gust_variance_share * gust.config.gust_velocity_variance
-        )
-        / max(gust.output.speed_relative_to_mean_air, 1.0) ** 2
-        if gust.output.is_gust_measured
-        else 0.0
-    )
-    return min(
-        gust.memory.unmeasured_intensity_share[gust_axis]
-        + unmeasured_share_from_speed_error
-        + (
-            gust.memory.unmeasured_pitching_share_by_start
-            if gust_axis == 1
-            else gust.memory.unmeasured_yawing_share_by_past_turns
-        ),
-        1.0,
-    )
+def unmeasured_share(gust, j):
+    """Share of the intensity of the gust about axis j that is unmeasured in this frame."""
+    cfg, mem, V = gust.config, gust.memory, max(gust.output.V, 1.0)
+    if j == 0:
+        return min(mem.share[j], 1.0)
+    var = cfg.var_V + mem.start_left * cfg.var_v if gust.output.measured else 0.0
+    by_time = mem.start_share if j == 1 else mem.turn_past
+    return min(mem.share[j] + cfg.speed_error_share * var / V**2 + by_time, 1.0)
 
 
 @kernel
-def intensity_scale_for_rolling_length(gust, gust_axis):
-    """Power of the gust about a gust axis at low frequency, over that with the correlation length of the
-    rolling gust.
+def rolling_scale(gust, j):
+    """Power of the gust about axis j at low frequency, over that with the length of the rolling gust.
 
     A gust of the rolling gust's length and with this share of the intensity has the same power at low
     frequency. It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
     """
-    return (
-        (gust_correlation_length(gust, gust_axis) / gust.config.rolling_gust_correlation_length) ** 2
-        if gust.config.has_only_coarse_estimate
-        else 1.0
-    )
+    return (gust_lag(gust, j, 1.0) / gust.config.L_roll) ** 2 if gust.config.coarse_only else 1.0
 
 
 @kernel
-def gust_correlation_time_s(gust, gust_axis, V):
-    """Lag of the gust about a gust axis, s, at a speed V m/s: its correlation length over V."""
-    if gust_axis == 0:
-        return gust.config.rolling_gust_correlation_length / V
-    return (4.0 if gust_axis == 1 else 3.0) * gust.config.wing_span / (pi * V)
+def gust_lag(gust, j, V):
+    """tau of the gust about axis j, s, at a speed V m/s: its correlation length over V."""
+    if j == 0:
+        return gust.config.L_roll / V
+    return (4.0 if j == 1 else 3.0) * gust.config.span / (pi * V)
 
 
 @kernel
-def gust_correlation_length(gust, gust_axis):
-    """Correlation length of the gust about a gust axis, m, as in `design.rotation_lengths`: lag at 1 m/s."""
-    return gust_correlation_time_s(gust, gust_axis, 1.0)
+def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
+    """Intensity, (rad/s2)2/s, of the drift of accelerations i_1 and i_2 by the unmeasured rotation; V m/s.
 
+        V sum_j (L C)_i1j (L C)_i2j share_j Q_j
 
-@kernel
-def unmeasured_gust_drift_intensity(gust, V, axis_i, axis_j, with_rolling_correlation_length=False):
-    """Intensity, (rad/s2)2/s, of the drift of two accelerations by the unmeasured rotation; V m/s.
-
-    with_rolling_correlation_length: that of a gust with the correlation length of the rolling gust and equal
-    power at low frequency.
+    as_rolling: that of a gust with the correlation length of the rolling gust and equal power at low
+    frequency.
     """
-    drift_intensity_per_airspeed = 0.0
-    for gust_axis in range(3):
-        intensity_scale = (
-            intensity_scale_for_rolling_length(gust, gust_axis) if with_rolling_correlation_length else 1.0
-        )
-        drift_intensity_per_airspeed += (
-            gust_effect_product(gust, gust.output.gust_axes_in_body, axis_i, axis_j, gust_axis)
-            * unmeasured_gust_intensity_share(gust, gust_axis)
-            * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-            * intensity_scale
-        )
-    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
+    C, Q_V = gust.output.C, 0.0
+    for j in range(3):
+        Q = unmeasured_share(gust, j) * gust.memory.Q[j]
+        scale = rolling_scale(gust, j) if as_rolling else 1.0
+        Q_V += effect_product(gust, C, i_1, i_2, j) * Q * scale
+    return Q_V * max(V, gust.output.V)
 
 
 @kernel
-def add_acceleration_variance_by_axes_turn(gust, V, dt):
-    """Add to `acceleration_variance_by_axes_turn_now` the effect of the turn of the gusts' axes in dt s; V
-    m/s."""
-    if not gust.memory.has_fast_axes_turn:
+def add_turn_variance(gust, V, dt):
+    """Add to var_now the effect of the turn of the gusts' axes in dt s; V m/s.
+
+    dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
+    """
+    mem = gust.memory
+    if not mem.turns_fast:
         return
-    rolling_intensity_per_squared_axes_rate = (
-        0.5 * gust_correlation_time_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
-    )
-    yawing_intensity_per_squared_axes_rate = (
-        0.5
-        * gust_correlation_time_s(gust, 2, V) ** 2
-        * gust.memory.gust_rotation_intensity_per_airspeed[2]
-        * gust.memory.unmeasured_yawing_share_by_past_turns
-    )
-    for i in range(3):
-        for j in range(3):
-            rolling_effect_rate_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
-            yawing_effect_rate_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
-            gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                dt
-                * V
-                * (
-                    rolling_intensity_per_squared_axes_rate * rolling_effect_rate_product
-                    + yawing_intensity_per_squared_axes_rate * yawing_effect_rate_product
-                )
-            )
-    gust.memory.n_frames_left_with_axes_turn_variance = 3
+    add_variance(gust, mem.C_dot, 0, 0.5 * dt * V * gust_lag(gust, 0, V) ** 2 * mem.Q[0])
+    add_variance(gust, mem.C_dot, 2, 0.5 * dt * V * gust_lag(gust, 2, V) ** 2 * mem.Q[2] * mem.turn_past)
 
 
 @kernel
-def finish_gust_mean_and_turn_variance(gust, frame_share_per_instant):
-    """Fill `mean_angular_acceleration_by_gust` and `acceleration_variance_by_axes_turn` for the elapsed
-    frame.
-
-    frame_share_per_instant: one over the number of instants. Axes may turn in the middle of a frame. A part
-    of the effect is then in this frame and the rest in the next, so the variance counts in both frames.
-    """
+def add_variance(gust, C, j, q):
+    """Add to var_now the variance of the accelerations by a variance q of the gust about axis j; C as of
+    `effect_product`. It lasts for three frames."""
     for i in range(3):
-        gust.output.mean_angular_acceleration_by_gust[i] = (
-            frame_share_per_instant * gust.memory.angular_acceleration_by_gust_sum[i]
-        )
-    if gust.memory.n_frames_left_with_axes_turn_variance > 0:
-        gust.memory.n_frames_left_with_axes_turn_variance -= 1
+        for k in range(3):
+            gust.memory.var_now[i, k] += q * effect_product(gust, C, i, k, j)
+    gust.memory.n_turn = 3
+
+
+@kernel
+def finish_gust(gust, share):
+    """Fill acc_mean = share acc_sum, and var_turn, for the elapsed frame.
+
+    share: one over the number of instants. Axes may turn in the middle of a frame. A part of the effect is
+    then in this frame and the rest in the next, so the variance counts in both frames.
+    """
+    mem, out = gust.memory, gust.output
+    for i in range(3):
+        out.acc_mean[i] = share * mem.acc_sum[i]
+    if mem.n_turn > 0:
+        mem.n_turn -= 1
         for i in range(3):
             for j in range(3):
-                gust.output.acceleration_variance_by_axes_turn[i, j] = (
-                    gust.memory.acceleration_variance_by_axes_turn_before[i, j]
-                    + gust.memory.acceleration_variance_by_axes_turn_now[i, j]
-                )
-                gust.memory.acceleration_variance_by_axes_turn_before[i, j] = (
-                    gust.memory.acceleration_variance_by_axes_turn_now[i, j]
-                )
-                gust.memory.acceleration_variance_by_axes_turn_now[i, j] = 0.0
+                out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
+                mem.var_prev[i, j], mem.var_now[i, j] = mem.var_now[i, j], 0.0
 
 
 @kernel
-def full_gust_drift_intensity(gust, V, body_axes_rate_sensitivity, body_axes_force_sensitivity):
+def full_drift(gust, V, L_rate, L_force):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    body_axes_rate_sensitivity, body_axes_force_sensitivity (3,) 1/s: gust sensitivity of the rates and of
-    the forces, about the body axes.
+        V sum_j (|L_rate' C_j| + |L_force' C_j|)^2 Q_j      if C turns fast: + (tau L_rate' C_dot_j)^2 Q_j / 2
+
+    L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
-    drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_correlation_time_s(gust, 0, V)
-    for gust_axis in range(3):
-        rate_plus_force_sensitivity = abs(
-            project_on_gust_axis(body_axes_rate_sensitivity, gust.output.gust_axes_in_body, gust_axis)
-        ) + abs(project_on_gust_axis(body_axes_force_sensitivity, gust.output.gust_axes_in_body, gust_axis))
-        drift_intensity_per_airspeed += (
-            rate_plus_force_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-        )
-        if gust.memory.has_fast_axes_turn:
-            drift_intensity_per_airspeed += (
-                0.5
-                * rolling_lag_s
-                * rolling_lag_s
-                * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-                * project_on_gust_axis(body_axes_rate_sensitivity, gust.memory.gust_axes_rate, gust_axis) ** 2
-            )
-    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
+    C, C_dot, Q, Q_V = gust.output.C, gust.memory.C_dot, gust.memory.Q, 0.0
+    tau = gust_lag(gust, 0, V) if gust.memory.turns_fast else 0.0
+    for j in range(3):
+        L_all = abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
+        Q_V += (L_all**2 + 0.5 * (tau * project_gust(L_rate, C_dot, j)) ** 2) * Q[j]
+    return Q_V * max(V, gust.output.V)
 
 
 @kernel
-def remaining_gust_drift_intensity(gust, V, body_axes_rate_sensitivity, body_axes_force_sensitivity):
+def remaining_drift(gust, V, L_rate, L_force):
     """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
 
-    body_axes_rate_sensitivity, body_axes_force_sensitivity (3,) 1/s: gust sensitivities about the body axes.
-    On the forces the whole rotation acts.
+        V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
+
+    On the forces the whole rotation acts. L_rate, L_force: see `full_drift`.
     """
-    drift_intensity_per_airspeed = 0.0
-    for gust_axis in range(3):
-        unmeasured_sensitivity = np.sqrt(unmeasured_gust_intensity_share(gust, gust_axis)) * abs(
-            project_on_gust_axis(body_axes_rate_sensitivity, gust.output.gust_axes_in_body, gust_axis)
-        )
-        drift_intensity_per_airspeed += (
-            unmeasured_sensitivity
-            + abs(project_on_gust_axis(body_axes_force_sensitivity, gust.output.gust_axes_in_body, gust_axis))
-        ) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
+    C, Q_V = gust.output.C, 0.0
+    for j in range(3):
+        L_left = np.sqrt(unmeasured_share(gust, j)) * abs(project_gust(L_rate, C, j))
+        Q_V += (L_left + abs(project_gust(L_force, C, j))) ** 2 * gust.memory.Q[j]
+    return Q_V * max(V, gust.output.V)
 
 
 @kernel
-def project_on_gust_axis(body_axes_sensitivity, gust_axes_or_their_rate, gust_axis):
-    """Sensitivity to the gust about a gust axis, from that (3,) to rotation about the body axes."""
-    return (
-        body_axes_sensitivity[0] * gust_axes_or_their_rate[0, gust_axis]
-        + body_axes_sensitivity[1] * gust_axes_or_their_rate[1, gust_axis]
-        + body_axes_sensitivity[2] * gust_axes_or_their_rate[2, gust_axis]
-    )
+def project_gust(L_m, C, j):
+    """Sensitivity L_m' C_j to the gust about axis j, from that (3,) to rotation about the body axes."""
+    return L_m[0] * C[0, j] + L_m[1] * C[1, j] + L_m[2] * C[2, j]
 
 
 @kernel
-def gust_effect_product(gust, gust_axes_or_their_rate, axis_i, axis_j, gust_axis):
-    """Product of the effects of the gust about a gust axis on two accelerations, per (rad/s)2.
+def effect_product(gust, C, i_1, i_2, j):
+    """Product of the effects of the gust about axis j on two accelerations, (L C)_i1j (L C)_i2j.
 
-    gust_axes_or_their_rate (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
+    C (3, 3): axes of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
-    effect_on_i, effect_on_j = 0.0, 0.0
-    for k in range(3):
-        effect_on_i += gust.output.rate_damping[axis_i, k] * gust_axes_or_their_rate[k, gust_axis]
-        effect_on_j += gust.output.rate_damping[axis_j, k] * gust_axes_or_their_rate[k, gust_axis]
-    return effect_on_i * effect_on_j
+    L = gust.output.rate_damping
+    return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)
 
 
-def configure_gust_estimate(gust: np.void, declared: Declared, mass_properties: MassProperties) -> None:
+def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
-    turbulence, sensor_errors, aircraft = declared.air, declared.sensors, declared.aircraft
-    span_m = aircraft.geometry.span_m
-    gust["output"]["accounts_for_gusts"] = turbulence.moves
-    gust["config"]["has_force_model"] = bool(aircraft.measurable_forces)
-    gust["output"]["is_gust_measured"] = (
-        gust["config"]["has_force_model"] or gust["output"]["uses_accelerometers"]
+    air, errors, aircraft = declared.air, declared.sensors, declared.aircraft
+    span = aircraft.geometry.span_m
+    gust["output"]["gusty"] = air.moves
+    gust["config"]["has_forces"] = bool(aircraft.measurable_forces)
+    gust["output"]["measured"] = (
+        gust["config"]["has_forces"] or gust["output"]["uses_accelerometers"]
     )  # only where forces are known
-    gust["config"]["has_only_coarse_estimate"] = (
-        gust["output"]["accounts_for_gusts"] and not gust["output"]["is_gust_measured"]
-    )
-    fill_table(gust["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
-    gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass_properties.mass_kg
+    gust["config"]["coarse_only"] = gust["output"]["gusty"] and not gust["output"]["measured"]
+    fill_table(gust["memory"]["table"], aircraft, aircraft.measurable_forces, FORCES)
+    gust["config"]["S_m"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
-    gust["config"]["wing_span"] = span_m
-    gust["config"]["gust_rotation_intensity_per_airspeed_aloft"] = turbulence.rotation_walk(span_m)
-    gust["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
-    gust["memory"]["gust_rotation_intensity_per_airspeed"], gust["memory"]["unmeasured_intensity_share"] = (
-        gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
-        MIN_UNMEASURED_GUST_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
+    gust["config"]["span"] = span
+    gust["config"]["Q_aloft"] = air.rotation_walk(span)
+    gust["config"]["Q_1m"] = air.rotation_walk_at_1_m(span)
+    gust["memory"]["Q"], gust["memory"]["share"] = (
+        gust["config"]["Q_aloft"],
+        MIN_UNMEASURED_SHARES if gust["output"]["measured"] else 1.0,
     )
-    gust["config"]["altitude_error_bound_at_zero_m"] = sensor_errors["altitude"].worst
-    gust["config"]["altitude_error_bound_per_m"] = sensor_errors["altitude"].slope
-    gust["config"]["turbulence_scale_length"] = SCALE_M
-    gust["config"]["rolling_gust_correlation_length"] = rotation_lengths(span_m)[0]
+    gust["config"]["h0"] = errors["altitude"].worst
+    gust["config"]["h1"] = errors["altitude"].slope
+    gust["config"]["L_gust"] = SCALE_M
+    gust["config"]["L_roll"] = rotation_lengths(span)[0]
 
 
-def fill_and_add_gust_estimate_noise(
-    statistical_detector: np.void,
-    sensor_errors: SensorErrors,
-    design: np.void,
-    y: np.ndarray,
-    u: np.ndarray,
-    dt_s: float,
+def add_gust_noise(
+    stat: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt: float
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    flow_angle_noise_std = flow_angle_in_level_axes_noise_std(sensor_errors, y[AIRSPEED])
-    span_m = float(statistical_detector["gust"]["config"]["wing_span"])
-    if (
-        statistical_detector["forces"]["in_use"]
-        or statistical_detector["gust"]["output"]["uses_accelerometers"]
-    ):
-        flow_angle_noise_std += (
-            ADAMS_BASHFORTH_NOISE_GAIN * sensor_errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
-        )
-    if statistical_detector["forces"]["in_use"]:
-        force_records_normal_first = statistical_detector["forces"]["component"][
-            ::-1
-        ]  # normal to the body, and across
-        flow_angle_noise_std_from_forces = np.sqrt(
-            force_records_normal_first["accelerometer_innovation_variance"]
-        ) / np.abs(force_records_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
-        statistical_detector["forces"]["angular_acceleration_by_gust_noise_std"] = (
-            angular_acceleration_by_gust_noise_std(flow_angle_noise_std_from_forces, design, y, u, span_m)
-        )
-    for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
-        statistical_detector["noise"][field_name] += (
-            angular_acceleration_by_gust_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
-        )
+    std = flow_noise(errors, y[AIRSPEED])
+    span = float(stat["gust"]["config"]["span"])
+    if stat["forces"]["in_use"] or stat["gust"]["output"]["uses_accelerometers"]:
+        std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
+    if stat["forces"]["in_use"]:
+        forces = stat["forces"]["component"][::-1]  # normal to the body, and across
+        by_forces = np.sqrt(forces["var_acc"]) / np.abs(forces["vane"][:, 1])
+        stat["forces"]["gust_noise"] = gust_noise(by_forces, design, y, u, span)
+    for name in ("Q0", "Q"):
+        stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
 
 
-def configure_gust_velocity_and_speed_error(
-    gust: np.void, declared: Declared, alarm_level: float, airspeed_mps: float
-) -> None:
-    """Fill the decay rate of the gust velocity and the error variance of the speed; airspeed_mps: in trim.
+def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
+    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim, m/s.
 
-    alarm_level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of
-    decay rate a, 1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the
-    variance sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
+    level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of decay rate a,
+    1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the variance
+    sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
-    gust_velocity_std_mps, sensor_errors = declared.air.sigma_mps, declared.sensors
-    if not (gust["output"]["accounts_for_gusts"] and gust["output"]["is_gust_measured"]):
+    sigma, errors = declared.air.sigma_mps, declared.sensors
+    if not (gust["output"]["gusty"] and gust["output"]["measured"]):
         return
-    gust_return_rate_per_s, airspeed_errors = airspeed_mps / SCALE_M, sensor_errors["V"]
-    acceleration_error_bound = (
-        2.0 * EARTH_RATE_RAD_S * airspeed_mps + MAX_PATH_SLOPE_RAD * EARTH_ACCELERATION_BOUND_M_S2
-    )  # Coriolis; gravity with place
-    acceleration_error_bound += GRAVITY_MPS2 * (sensor_errors["phi"].steady + sensor_errors["theta"].steady)
+    rate, of_V = V / SCALE_M, errors["V"]
+    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; gravity with place
+    b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
     if gust["output"]["uses_accelerometers"]:
-        acceleration_error_bound += (
-            sensor_errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * sensor_errors["ax"].slope
-        )
+        b += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
     else:
-        acceleration_error_bound += (
-            GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
-        )
-    gust_velocity_decay_rate = (
-        2.0 * acceleration_error_bound**2 * gust_return_rate_per_s / gust_velocity_std_mps**2
-    ) ** (1.0 / 3.0)
-    gust["config"]["gust_velocity_variance"] = gust_velocity_std_mps**2
-    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_OVER_STD * gust_velocity_std_mps
-    gust["config"]["gust_velocity_decay_rate"] = gust_velocity_decay_rate
-    gust["config"]["speed_error_variance"] = (
-        gust_velocity_std_mps**2
-        * gust_velocity_decay_rate
-        / (gust_velocity_decay_rate + gust_return_rate_per_s)
-        + (acceleration_error_bound / gust_velocity_decay_rate) ** 2
-        + airspeed_errors.random**2
-    )
-    gust["config"]["speed_error_variance"] += (
-        airspeed_errors.steady + airspeed_errors.slope * airspeed_mps
-    ) ** 2
-    gust["config"]["unmeasured_share_per_speed_error_variance"] = unmeasured_share_per_speed_error_variance(
-        alarm_level
-    )
+        b += GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
+    a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
+    gust["config"]["var_v"] = sigma**2
+    gust["config"]["v_max"] = MAX_GUST_STDS * sigma
+    gust["config"]["a_v"] = a
+    gust["config"]["var_V"] = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2
+    gust["config"]["var_V"] += (of_V.steady + of_V.slope * V) ** 2
+    gust["config"]["speed_error_share"] = speed_error_share(level)
 
 
-def unmeasured_share_per_speed_error_variance(alarm_level: float) -> float:
+def speed_error_share(level: float) -> float:
     """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
 
     The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2
@@ -865,4 +592,4 @@ def unmeasured_share_per_speed_error_variance(alarm_level: float) -> float:
     noise. The product of two normal numbers exceeds x deviations with a probability of exp(-x). This equals
     that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
     """
-    return (0.5 * alarm_level) ** 2 / 4.0
+    return (0.5 * level) ** 2 / 4.0

@@ -14,10 +14,9 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the
-surface does not follow its command. Its parameter, the deflection in rad, may change in any way, so it
-covers every fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of
-fault it is.
+LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the surface
+does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
+fault of the surface. Both together are `fdi.fault_class: all`; types/ decides which type of fault it is.
 
 Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
 
@@ -33,6 +32,21 @@ isolated.
 
 The sharpened tests (detection/filters.py, set membership) exclude as well, each by its own switch. The first
 test that fails excludes a fault.
+
+Symbols of the kernels:
+
+    nu, nu_max (3,) rad/s2        innovation of the frame and its bound without a fault (filters.py)
+    x (3,) rad/s, F (3,) rad/s2   measured rates; mean of f + G u over the elapsed frame
+    G (3, n), Gu (3, n)           mean of G, rad/s2 per rad, and effect of each healthy surface, rad/s2
+    e_Gu (3, n) rad/s2            error of that mean if a fault changes within the frame
+    phi                           effect of a fault, base + theta Z within +- e (EFFECT_RECORD)
+    lo, hi; between               interval of theta, or of a position, rad
+    Om, Om_pos, Om_neg            Omega, and the same of the positive and the negative part of Z
+    e, e_lag rad/s                bound on the filtered uncertainty, and its part with a memory
+    th, P                         estimate of theta and its variance
+    s, i, j                       surface, axis, estimator
+    iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
+    abrupt                        a fault is declared to stay as it is
 """
 
 from math import exp
@@ -41,19 +55,18 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import max_travel_share_used, travel_level_index_for_share
+from beaver_ftc.diagnosis.bounds import level_of_share, share_used
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
-    advance_gyro_error_bound,
-    advance_reachable_residuals,
-    advance_residual_bound,
-    are_residuals_reachable,
-    published_threshold_interval,
+    advance_bound,
+    advance_reach,
+    is_reachable,
+    published_interval,
     residual_interval,
 )
 from beaver_ftc.diagnosis.state import (
     CONSTANT_THRESHOLD,
-    DAMAGE_MAY_HAVE_EXCLUDED_OTHERS,
+    DAMAGE_EXCLUDES,
     INTERVAL_THRESHOLD,
     LOSS,
     NOT_ISOLATED,
@@ -65,714 +78,421 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
-EMPTY_THETA_INTERVAL = (1.0, -1.0)
-N_DEFLECTION_BOUND_ITERATIONS = (
-    4  # each round reduces the remaining travel to the share of it that the tolerance is
-)
+NO_THETA = (1.0, -1.0)
+N_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
 
 
 @kernel
-def uncertainty_explains_innovation(innovation, innovation_bound):
-    """True if the declared uncertainty alone explains an innovation (3,): |nu| <= innovation_bound (3,),
-    rad/s2."""
-    is_within_bound = True
+def eta_explains(nu, nu_max):
+    """True if the declared uncertainty alone explains an innovation: |nu| <= nu_max."""
+    within = True
     for i in range(3):
-        is_within_bound = is_within_bound and abs(innovation[i]) <= innovation_bound[i]
-    return is_within_bound
+        within = within and abs(nu[i]) <= nu_max[i]
+    return within
 
 
 @kernel
-def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min, theta_max):
-    """The theta of [theta_min, theta_max] with |measured_effect - theta regressor| <= error_bound, as (low,
-    high); low > high if none."""
-    if regressor == 0.0:
-        return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_THETA_INTERVAL
-    end_at_lower_effect = (measured_effect - error_bound) / regressor
-    end_at_upper_effect = (measured_effect + error_bound) / regressor
-    return max(theta_min, min(end_at_lower_effect, end_at_upper_effect)), min(
-        theta_max, max(end_at_lower_effect, end_at_upper_effect)
-    )
+def consistent_theta(nu, e, Z, lo, hi):
+    """The theta of [lo, hi] with |nu - theta Z| <= e, as (low, high); low > high if none."""
+    if Z == 0.0:
+        return (lo, hi) if abs(nu) <= e else NO_THETA
+    a = (nu - e) / Z
+    b = (nu + e) / Z
+    return max(lo, min(a, b)), min(hi, max(a, b))
 
 
 @kernel
-def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, fault_effect, axis):
-    """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
-
-    It is the whole known set if the axis is ignored. innovation_bound (3,) rad/s2: without a fault;
-    fault_effect: acceleration by the fault, of dtype FAULT_EFFECT_RECORD.
+def consistent_on(nu, nu_max, fie, phi, i):
+    """The theta of the known set with |nu - base - theta Z| <= nu_max + e on axis i; the whole set if i is
+    skipped.
     """
-    if fie.ignored_axes[axis]:
+    if fie.skip[i]:
         return fie.theta_min, fie.theta_max
-    measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
-    error_bound = innovation_bound[axis] + fault_effect.error_bound[axis]
-    return consistent_theta_interval(
-        measured_effect, error_bound, fault_effect.regressor[axis], fie.theta_min, fie.theta_max
-    )
+    e = nu_max[i] + phi.e[i]
+    return consistent_theta(nu[i] - phi.base[i], e, phi.regressor[i], fie.theta_min, fie.theta_max)
 
 
 @kernel
-def axis_of_largest_regressor(regressor):
-    """The axis on which a regressor (3,) is largest."""
-    axis = 0
-    for i in range(1, 3):
-        if abs(regressor[i]) > abs(regressor[axis]):
-            axis = i
-    return axis
-
-
-@kernel
-def bound_deflection_and_widen_error(fie, bound_record, innovation, n_substeps):
-    """Widen the tolerance of a position by the errors of the surface's own terms at that position.
-
-    eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
-    the surface can have been follows from the frame itself, in a few rounds from its travel inwards; every
-    round gives a valid bound. If a frame has several substeps, the surface may still be where it was a frame
-    before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
+def own_error(bound, s, i, u, level):
+    """max(eG u - eGu, 0) + extra, rad/s2: by how much the error of surface s at u rad exceeds that at its
+    command.
     """
-    s, fault_effect = fie.surface, fie.frame_mean_effect
-    axis = axis_of_largest_regressor(fault_effect.regressor)
-    last_frame_max_abs_deflection = fie.max_abs_deflection_in_last_frame
-    max_abs_deflection = max(abs(fie.theta_min), abs(fie.theta_max))
-    error_bound_before_widening = fault_effect.error_bound[axis]
-    error_map = bound_record.error_map
-    mean_position_interval = (fie.theta_min, fie.theta_max)
-    travel_level_index = travel_level_index_at_position(error_map, fie, mean_position_interval, n_substeps)
-    measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
-    first_substep_allowance_rad = 2.0 * last_frame_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
-    for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
-        extra_error_bound = max(
-            bound_record.surface_term_error_bound_per_rad[axis, s]
-            * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_term_error_bound_at_command[axis, s],
-            0.0,
+    return max(bound.eG[i, s] * u - bound.eGu[i, s], 0.0) + bound.extra[level, i]
+
+
+@kernel
+def widen_error(fie, bound, nu, n_substeps):
+    """Widen the tolerance of a position by the errors of the surface's own terms at that position:
+
+        e <- e + max(eG (u + first) - eGu, 0) + extra
+
+    eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
+    far the surface can have been follows from the frame itself, on the axis of the largest Z, in a few rounds
+    from its travel inwards; every round gives a valid bound. If a frame has several substeps, the surface may
+    still be where it was a frame before at the first of them. The same holds for a map of the model's error,
+    which is for healthy surfaces.
+    """
+    s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
+    for j in range(1, 3):
+        if abs(phi.regressor[j]) > abs(phi.regressor[i]):
+            i = j
+    first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
+    u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.e[i]
+    between = (fie.theta_min, fie.theta_max)
+    level = level_near(emap, fie, between, n_substeps)
+    for _ in range(N_ROUNDS):
+        more = own_error(bound, s, i, u + first, level)
+        lo, hi = consistent_theta(
+            nu[i] - phi.base[i], e + more, phi.regressor[i], fie.theta_min, fie.theta_max
         )
-        extra_error_bound += bound_record.additional_error_bound_by_travel_level[travel_level_index, axis]
-        mean_position_low, mean_position_high = consistent_theta_interval(
-            measured_effect,
-            bound_record.frame_innovation_bound[axis] + error_bound_before_widening + extra_error_bound,
-            fault_effect.regressor[axis],
-            fie.theta_min,
-            fie.theta_max,
-        )
-        if mean_position_low > mean_position_high:
+        if lo > hi:
             break
-        max_abs_deflection = min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high)))
-        mean_position_interval = (mean_position_low, mean_position_high)
-        travel_level_index = travel_level_index_at_position(
-            error_map, fie, mean_position_interval, n_substeps
-        )
-    fie.max_abs_deflection_in_last_frame = max_abs_deflection
-    if error_map.one_surface_may_be_anywhere:
-        fie.max_travel_share_in_last_frame = max_travel_share_used(
-            error_map, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
-        )
-    for i in range(3):
-        fault_effect.error_bound[i] += max(
-            bound_record.surface_term_error_bound_per_rad[i, s]
-            * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_term_error_bound_at_command[i, s],
-            0.0,
-        )
-        fault_effect.error_bound[i] += bound_record.additional_error_bound_by_travel_level[
-            travel_level_index, i
-        ]
+        u, between = min(u, max(abs(lo), abs(hi))), (lo, hi)
+        level = level_near(emap, fie, between, n_substeps)
+    fie.u_far = u
+    if emap.one_free:
+        fie.share_far = share_used(emap, s, between, fie.share_far, n_substeps)
+    for j in range(3):
+        phi.e[j] += own_error(bound, s, j, u + first, level)
 
 
 @kernel
-def travel_level_index_at_position(error_map, fie, mean_position_interval, n_substeps):
-    """The level of the error map that covers a surface whose mean position is in `mean_position_interval`,
-    (low, high) rad.
-
-    It is 0 without a map.
-    """
-    if not error_map.one_surface_may_be_anywhere:
+def level_near(emap, fie, between, n_substeps):
+    """The level of the map that covers a surface whose mean position is in `between`; 0 without a map."""
+    if not emap.one_free:
         return 0
-    return travel_level_index_for_share(
-        error_map,
-        max_travel_share_used(
-            error_map,
-            fie.surface,
-            mean_position_interval,
-            fie.max_travel_share_in_last_frame,
-            n_substeps,
-        ),
-    )
+    return level_of_share(emap, share_used(emap, fie.surface, between, fie.share_far, n_substeps))
 
 
 @kernel
-def some_theta_explains_innovation(fie, innovation, innovation_bound):
+def theta_explains(fie, nu, nu_max):
     """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
-    if uncertainty_explains_innovation(innovation, innovation_bound):
+    if eta_explains(nu, nu_max):
         return True
-    theta_low, theta_high = fie.theta_min, fie.theta_max
+    lo, hi = fie.theta_min, fie.theta_max
     for i in range(3):
-        axis_theta_low, axis_theta_high = consistent_theta_interval_on_axis(
-            innovation, innovation_bound, fie, fie.frame_mean_effect, i
-        )
-        theta_low, theta_high = max(theta_low, axis_theta_low), min(theta_high, axis_theta_high)
-    return theta_low <= theta_high
+        lo_i, hi_i = consistent_on(nu, nu_max, fie, fie.effect, i)
+        lo, hi = max(lo, lo_i), min(hi, hi_i)
+    return lo <= hi
 
 
 @kernel
-def reset_feasible_theta_sets(fie, projection_disabled):
-    """Start with the known set of theta on every axis, or, if `projection_disabled`, without limits."""
-    fie.feasible_theta_min[:], fie.feasible_theta_max[:] = fie.theta_min, fie.theta_max
-    if projection_disabled:
-        fie.feasible_theta_min[:], fie.feasible_theta_max[:] = -np.inf, np.inf
+def intersect_sets(fie, i, between, shared):
+    """Intersect the set of theta on axis i, or on every axis if `shared`, with `between`."""
+    lo, hi = between
+    for j in range(3):
+        if shared or j == i:
+            fie.set_lo[j] = max(fie.set_lo[j], lo)
+            fie.set_hi[j] = min(fie.set_hi[j], hi)
 
 
 @kernel
-def intersect_feasible_theta_sets(fie, axis, theta_interval, shared_by_axes):
-    """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `theta_interval`."""
-    theta_low, theta_high = theta_interval
-    for set_axis in range(3):
-        if shared_by_axes or set_axis == axis:
-            fie.feasible_theta_min[set_axis] = max(fie.feasible_theta_min[set_axis], theta_low)
-            fie.feasible_theta_max[set_axis] = min(fie.feasible_theta_max[set_axis], theta_high)
-
-
-@kernel
-def narrow_feasible_theta_sets(fie, innovation, innovation_bound, shared_by_axes):
+def narrow_sets(fie, nu, nu_max, shared):
     """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
 
-    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
+    |eps + Omega thetahat - Omega theta| <= e       for any course of the estimate
     """
+    some = True
     for i in range(3):
-        frame_theta_interval = consistent_theta_interval_on_axis(
-            innovation, innovation_bound, fie, fie.frame_mean_effect, i
-        )
-        intersect_feasible_theta_sets(fie, i, frame_theta_interval, shared_by_axes)
-        filtered_measured_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
-        intersect_feasible_theta_sets(
-            fie,
-            i,
-            consistent_theta_interval(
-                filtered_measured_effect,
-                fie.filtered_uncertainty_bound[i],
-                fie.filtered_regressor[i],
-                fie.theta_min,
-                fie.theta_max,
-            ),
-            shared_by_axes,
-        )
-    is_nonempty = True
+        intersect_sets(fie, i, consistent_on(nu, nu_max, fie, fie.effect, i), shared)
+        eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
+        between = consistent_theta(eps, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max)
+        intersect_sets(fie, i, between, shared)
     for i in range(3):
-        is_nonempty = is_nonempty and fie.feasible_theta_min[i] <= fie.feasible_theta_max[i]
-    return is_nonempty
+        some = some and fie.set_lo[i] <= fie.set_hi[i]
+    return some
 
 
 @kernel
-def set_effect_error_bound(fault_effect, effect_error_bound, surface_index):
-    """Set the error bound of a fault's effect to that of its surface; effect_error_bound (3, n) rad/s2."""
-    for i in range(3):
-        fault_effect.error_bound[i] = effect_error_bound[i, surface_index]
+def clear_mean_effect(mean):
+    """Begin the mean of a fault's effect over a block of frames (EFFECT_RECORD)."""
+    mean.base[:], mean.regressor[:], mean.e[:] = (0.0, 0.0, 0.0)
 
 
 @kernel
-def clear_mean_effect(mean_effect):
-    """Begin the mean of a fault's effect over a block of frames (dtype FAULT_EFFECT_RECORD)."""
-    mean_effect.acceleration_at_zero_theta[:], mean_effect.regressor[:], mean_effect.error_bound[:] = (
-        0.0,
-        0.0,
-        0.0,
-    )
-
-
-@kernel
-def add_frame_to_block_mean_effect(mean_effect, fault_effect, frame_share_of_block):
-    """Add the effect of a frame, a `frame_share_of_block` of the block, to the mean over the block."""
+def add_to_mean(mean, phi, w):
+    """mean <- mean + w phi, w the share of a frame in the block."""
     for i in range(3):
-        mean_effect.acceleration_at_zero_theta[i] += (
-            frame_share_of_block * fault_effect.acceleration_at_zero_theta[i]
-        )
-        mean_effect.regressor[i] += frame_share_of_block * fault_effect.regressor[i]
-        mean_effect.error_bound[i] += frame_share_of_block * fault_effect.error_bound[i]
+        mean.base[i] += w * phi.base[i]
+        mean.regressor[i] += w * phi.regressor[i]
+        mean.e[i] += w * phi.e[i]
 
 
-# Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
-FAULT_EFFECT_RECORD = record(acceleration_at_zero_theta=3, regressor=3, error_bound=3)
+# Acceleration by a fault, rad/s2: base + theta regressor, within +/- e.
+EFFECT_RECORD = record(base=3, regressor=3, e=3)
 
-ISOLATION_ESTIMATOR_RECORD = record(
+ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
-    excluded=int, excluded_at_s=float, exclusion_is_pending=int, ignored_axes=(int, 3), xhat=3, residual=3,
-    lower_threshold=3, upper_threshold=3,
-    confirmed_by_likelihood=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
+    excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
+    confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
     # Omega, and the same of the positive and the negative part of Z
-    filtered_regressor=3, filtered_positive_regressor=3, filtered_negative_regressor=3,
-    filtered_uncertainty_bound=3, filtered_eta_bar=3, filtered_gyro_error_bound=3, theta=3, theta_variance=3,
-    frame_mean_effect=FAULT_EFFECT_RECORD, block_mean_effect=FAULT_EFFECT_RECORD,
+    Om=3, Om_pos=3, Om_neg=3, e=3, e_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
+    mean_effect=EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
-    max_abs_deflection_in_last_frame=float, max_travel_share_in_last_frame=float,
+    u_far=float, share_far=float,
     # on the residuals of the bank (filters.py)
-    parity_direction=3,
-    reachable_bank_residual_low=(MAX_POLES, 4), reachable_bank_residual_high=(MAX_POLES, 4),
-    feasible_theta_min=3, feasible_theta_max=3,  # what the frames since the alarm leave of the known set
+    parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
+    set_lo=3, set_hi=3,  # what the frames since the alarm leave of the known set
 )  # fmt: skip
 
 
 @sized
-def isolation_dtype(n_surfaces: int) -> np.dtype:
+def isolation_dtype(n: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
-    them is sharpened. adapts_by_gradient: else by least squares; projection_disabled: their estimates may
-    leave the known set. isolation_hold_off_s: for so long the one left is not isolated yet."""
+    them is sharpened.
+
+    gradient: else by least squares; free: their estimates may leave the known set. hold_s: for so long the
+    one left is not isolated yet. losable (n,): whether damage can take a surface.
+    """
     config = record(
-        n_estimators=int, threshold_kind=int, forgetting_factor=float, filter_decay=3, uses_reach_test=int,
-        shares_theta_across_axes=int, narrows_theta_sets=int,
-        adapts_by_gradient=int, gradient_gain=float, projection_disabled=int, isolation_hold_off_s=float,
-        can_be_lost_by_damage=(int, n_surfaces),
+        n_estimators=int, mu_kind=int, forget=float, a=3, reach=int, shared=int, narrows=int, gradient=int,
+        gain=float, free=int, hold_s=float, losable=(int, n),
     )  # fmt: skip
-    return record(config=config, estimator=(ISOLATION_ESTIMATOR_RECORD, 2 * n_surfaces))
+    return record(config=config, estimator=(ESTIMATOR_RECORD, 2 * n))
 
 
-ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S = (
-    4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
-)
-LOSS_THETA_RANGE = (-1.0, 0.0)
-_THRESHOLD_KIND_OF_NAME = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
+DAMAGE_HOLD_OFF_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
+LOSS_RANGE = (-1.0, 0.0)
+_THRESHOLD_KINDS = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
 
-EstimatorNameKindSurface = tuple[str, int, int]  # of an isolation estimator; surface: its index
+EstimatorEntry = tuple[str, int, int]  # of an isolation estimator; surface: its index
 
 
-def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorNameKindSurface, ...]:
+def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntry, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
     published: a loss of the surface that leads each axis, and of what turns with it. all: a loss and a
     position of every surface.
     """
-    surface_index_by_name = {name: s for s, name in enumerate(aircraft.surfaces)}
-    loss_entries = tuple((name, LOSS, surface_index_by_name[name]) for name in aircraft.class_of_losses)
+    index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    losses = tuple((name, LOSS, index[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
-        return loss_entries
-    stand_in_surface_loss_entries = tuple(
-        (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index_by_name[name]]
-    )
-    return (
-        *loss_entries,
-        *stand_in_surface_loss_entries,
-        *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in surface_index_by_name.items()),
-    )
+        return losses
+    stand_ins = tuple((name, LOSS, s) for name in aircraft.stand_ins for s in [index[name]])
+    return (*losses, *stand_ins, *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in index.items()))
 
 
 def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
     """Names of the isolation estimators of a fault class, in the bank's order."""
-    return tuple(name for name, _, _ in list_isolation_estimators(fault_class, aircraft))
+    return tuple(name for name, _, _ in list_estimators(fault_class, aircraft))
 
 
 def configure_isolation(
-    isolation: np.void,
-    declared: Declared,
-    estimator_entries: tuple[EstimatorNameKindSurface, ...],
-    travel: np.ndarray,
+    iso: np.void, declared: Declared, rows: tuple[EstimatorEntry, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
-    sharpening_switches = config.sharpen
-    isolation["config"]["threshold_kind"] = _THRESHOLD_KIND_OF_NAME[config.thresholds]
-    isolation["config"]["forgetting_factor"] = exp(-dt / config.forgetting_time_s)
-    isolation["config"]["filter_decay"] = exp(-config.isolation_pole_per_s * dt)
-    isolation["config"]["uses_reach_test"], isolation["config"]["shares_theta_across_axes"] = (
-        sharpening_switches.memory,
-        sharpening_switches.shared_effectiveness,
-    )
-    isolation["config"]["narrows_theta_sets"], isolation["config"]["n_estimators"] = (
-        sharpening_switches.set_membership,
-        len(estimator_entries),
-    )
-    travel_including_neutral = np.array(
-        [np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)]
-    )  # a share of it can be left
-    for fie, (_, hypothesis_kind, surface_index) in zip(
-        isolation["estimator"], estimator_entries, strict=False
-    ):
-        fie["hypothesis_kind"], fie["surface"] = hypothesis_kind, surface_index
-        fie["theta_min"], fie["theta_max"] = (
-            LOSS_THETA_RANGE if hypothesis_kind == LOSS else travel_including_neutral[:, surface_index]
-        )
+    sharpen, cfg = config.sharpen, iso["config"]
+    cfg["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
+    cfg["forget"] = exp(-dt / config.forgetting_time_s)
+    cfg["a"] = exp(-config.isolation_pole_per_s * dt)
+    cfg["reach"], cfg["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    cfg["narrows"], cfg["n_estimators"] = sharpen.set_membership, len(rows)
+    ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
+    for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
+        fie["hypothesis_kind"], fie["surface"] = kind, s
+        fie["theta_min"], fie["theta_max"] = LOSS_RANGE if kind == LOSS else ends[:, s]
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
-            fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface_index] == PITCH else (0, 1, 0)
+            fie["skip"] = (1, 0, 1) if aircraft.dominant_axis[s] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
-    initial_weak_exclusion = (
-        DAMAGE_MAY_HAVE_EXCLUDED_OTHERS if config.weighs_chance and aircraft.damage else 0
-    )
-    isolation["estimator"]["weakly_excluded"] = initial_weak_exclusion
-    isolation["config"]["isolation_hold_off_s"] = (
-        ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S if aircraft.damage else 0.0
-    )
-    surfaces_lost_by_some_damage = {
-        surface_name for damage_case in aircraft.damage.values() for surface_name in damage_case.takes
-    }
-    isolation["config"]["can_be_lost_by_damage"] = [
-        surface_name in surfaces_lost_by_some_damage for surface_name in aircraft.surfaces
-    ]
+    iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
+    cfg["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
+    losable = {name for damage in aircraft.damage.values() for name in damage.takes}
+    cfg["losable"] = [name in losable for name in aircraft.surfaces]
 
 
 @kernel
-def fill_effect_of_hypothesis(
-    hypothesis_kind, surface_index, G, Gu_by_surface, acceleration_at_zero_theta, regressor
-):
-    """Fill acceleration_at_zero_theta (3,) rad/s2 and regressor (3,) rad/s2 per unit of theta, for one fault.
-
-    G (3, n) rad/s2 per rad; Gu_by_surface (3, n) rad/s2, the acceleration each commanded surface would give
-    if healthy.
-    """
-    for i in range(3):
-        if hypothesis_kind == POSITION_HYPOTHESIS:
-            acceleration_at_zero_theta[i], regressor[i] = (
-                -Gu_by_surface[i, surface_index],
-                G[i, surface_index],
-            )
-        else:
-            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu_by_surface[i, surface_index]
-
-
-@kernel
-def update_fault_effect_and_reach(
-    isolation, fie, filter_bank, bound_record, config, G, Gu_by_surface, effect_error_bound
-):
+def update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu):
     """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
 
-    G (3, n) rad/s2 per rad; Gu_by_surface (3, n) rad/s2: effect of each surface; means over the frame.
-    effect_error_bound (3, n) rad/s2: error of the mean if a fault changes within the frame.
+    loss  base = 0, Z = Gu_s        position  base = -Gu_s, Z = G_s        e = e_Gu_s
     """
-    fault_effect = fie.frame_mean_effect
-    fill_effect_of_hypothesis(
-        fie.hypothesis_kind,
-        fie.surface,
-        G,
-        Gu_by_surface,
-        fault_effect.acceleration_at_zero_theta,
-        fault_effect.regressor,
-    )
-    set_effect_error_bound(fault_effect, effect_error_bound, fie.surface)
-    if (
-        bound_record.has_surface_term_errors or bound_record.error_map.one_surface_may_be_anywhere
-    ) and fie.hypothesis_kind == POSITION_HYPOTHESIS:
-        bound_deflection_and_widen_error(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
-    if isolation.config.uses_reach_test:
-        advance_reachable_residuals(filter_bank, fie, config.dt)
+    phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
+    for i in range(3):
+        phi.base[i] = -Gu[i, s] if stuck else 0.0
+        phi.regressor[i] = G[i, s] if stuck else Gu[i, s]
+        phi.e[i] = e_Gu[i, s]
+    if stuck and (bound.has_eG or bound.error_map.one_free):
+        widen_error(fie, bound, bank.output.innovation, config.n_substeps)
+    if iso.config.reach:
+        advance_reach(bank, fie, config.dt)
 
 
 @kernel
-def update_all_fault_effects_and_reach(
-    isolation, filter_bank, bound_record, config, is_detected, G, Gu_by_surface, effect_error_bound
-):
-    """Call `update_fault_effect_and_reach` for every estimator, if a later stage reads the effects."""
-    if isolation.config.uses_reach_test or config.diagnoses_all_types or is_detected:
-        for fie in isolation.estimator[: isolation.config.n_estimators]:
-            update_fault_effect_and_reach(
-                isolation, fie, filter_bank, bound_record, config, G, Gu_by_surface, effect_error_bound
-            )
+def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
+    """Call `update_effect` for every estimator, if a later stage reads the effects."""
+    if iso.config.reach or config.diagnoses_all_types or detected:
+        for fie in iso.estimator[: iso.config.n_estimators]:
+            update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu)
 
 
 @kernel
-def start_estimators(isolation, changing_gyro_error_bound, x):
-    """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
+def start_estimators(iso, n, x):
+    """Start every estimator at the measured x, with the prior of theta; n (3,): of `n_gyro`.
 
-    changing_gyro_error_bound (3,) rad/s: on the changing part of the gyros' errors.
+    The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
     """
-    for fie in isolation.estimator[: isolation.config.n_estimators]:
-        fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, changing_gyro_error_bound
-        fie.theta_variance[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
-        reset_feasible_theta_sets(fie, isolation.config.projection_disabled)
+    for fie in iso.estimator[: iso.config.n_estimators]:
+        fie.xhat[:], fie.e_lag[:] = x, n
+        fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
+        fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
+        fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max
 
 
 @kernel
-def update_residual_and_thresholds(fie, threshold_kind, x):
-    """Compute the residual and its thresholds; true if it is within them on every axis not ignored."""
-    is_within_thresholds = True
+def update_residual(fie, kind, x):
+    """eps = x - xhat and its thresholds mu; true if it is within them on every axis that is not skipped."""
+    within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        theta_min = fie.theta_min
-        theta_max = fie.theta_max
-        filtered_regressor = fie.filtered_regressor[i]
-        theta = fie.theta[i]
-        filtered_uncertainty_bound = fie.filtered_uncertainty_bound[i]
-        if threshold_kind == INTERVAL_THRESHOLD:
-            threshold_interval = residual_interval(
-                theta_min,
-                theta_max,
-                fie.filtered_positive_regressor[i],
-                fie.filtered_negative_regressor[i],
-                filtered_regressor,
-                theta,
-                filtered_uncertainty_bound,
-            )
-        elif threshold_kind == CONSTANT_THRESHOLD:
-            threshold_interval = -filtered_uncertainty_bound, filtered_uncertainty_bound
+        lo, hi, Om, th, e = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.e[i]
+        if kind == INTERVAL_THRESHOLD:
+            mu = residual_interval(lo, hi, fie.Om_pos[i], fie.Om_neg[i], Om, th, e)
+        elif kind == CONSTANT_THRESHOLD:
+            mu = -e, e
         else:
-            threshold_interval = published_threshold_interval(
-                theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound
-            )
-        fie.lower_threshold[i], fie.upper_threshold[i] = threshold_interval
-        is_within_thresholds = is_within_thresholds and (
-            fie.lower_threshold[i] <= fie.residual[i] <= fie.upper_threshold[i] or fie.ignored_axes[i]
-        )
-    return is_within_thresholds
+            mu = published_interval(lo, hi, Om, th, e)
+        fie.mu_lo[i], fie.mu_hi[i] = mu
+        within = within and (fie.mu_lo[i] <= fie.residual[i] <= fie.mu_hi[i] or fie.skip[i])
+    return within
 
 
 @kernel
-def update_and_test_if_fault_possible(
-    isolation, fie, filter_bank, innovation_bound, fault_is_declared_constant, x, isolation_started_earlier
-):
+def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
     """True if no test that is switched on excludes the fault of estimator fie.
 
-    innovation_bound (3,) rad/s2: on the innovation of a healthy frame; fault_is_declared_constant: a fault is
-    declared to stay as it is; x (3,) rad/s: measured; isolation_started_earlier: it started a frame or more
-    ago.
+    started: the isolation started a frame or more ago.
     """
-    is_possible = update_residual_and_thresholds(fie, isolation.config.threshold_kind, x)
-    if isolation.config.uses_reach_test:
-        is_possible = is_possible and are_residuals_reachable(
-            filter_bank, fie, isolation.config.shares_theta_across_axes
-        )
-    if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION_HYPOTHESIS) and (
-        isolation_started_earlier or isolation.config.uses_reach_test
-    ):
-        is_possible = is_possible and some_theta_explains_innovation(
-            fie, filter_bank.output.innovation, innovation_bound
-        )
-    if (
-        isolation.config.narrows_theta_sets
-        and fault_is_declared_constant
-        and isolation_started_earlier
-        and fie.hypothesis_kind == LOSS
-    ):
-        is_possible = is_possible and narrow_feasible_theta_sets(
-            fie, filter_bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
-        )
-    return is_possible
+    possible = update_residual(fie, iso.config.mu_kind, x)
+    if iso.config.reach:
+        possible = possible and is_reachable(bank, fie, iso.config.shared)
+    if (iso.config.shared or fie.hypothesis_kind == POSITION_HYPOTHESIS) and (started or iso.config.reach):
+        possible = possible and theta_explains(fie, bank.output.innovation, nu_max)
+    if iso.config.narrows and abrupt and started and fie.hypothesis_kind == LOSS:
+        possible = possible and narrow_sets(fie, bank.output.innovation, nu_max, iso.config.shared)
+    return possible
 
 
 @kernel
-def set_constant_isolation_thresholds(isolation, constant_threshold_rad_s):
-    """Replace the adaptive thresholds by a constant one, rad/s."""
-    for fie in isolation.estimator[: isolation.config.n_estimators]:
-        fie.filtered_uncertainty_bound[:] = constant_threshold_rad_s
-
-
-@kernel
-def exclude_fault(fie, t, waits_a_frame):
-    """Exclude a fault from t s on, or, if `waits_a_frame`, from the next frame on."""
-    if waits_a_frame and not fie.exclusion_is_pending:
-        fie.exclusion_is_pending = 1
+def exclude_fault(fie, t, waits):
+    """Exclude a fault from t s on, or, if `waits`, from the next frame on."""
+    if waits and not fie.pending:
+        fie.pending = 1
     elif not fie.excluded:
         fie.excluded, fie.excluded_at_s = 1, t
 
 
 @kernel
-def decide_isolation(isolation, t):
+def decide_isolation(iso, t):
     """The fault isolated by the generalised observer scheme: the one estimator that is not excluded.
 
     NOT_ISOLATED if several are left; UNANTICIPATED if none is left: the fault is outside the class. A weakly
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
-    one that has been the only one left for less than `isolation_hold_off_s`.
+    one that has been the only one left for less than `hold_s`.
     """
-    n_not_excluded, remaining_estimator_index, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
-    for estimator_index, fie in enumerate(isolation.estimator[: isolation.config.n_estimators]):
+    n, left, last = 0, NOT_ISOLATED, -np.inf
+    for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         if fie.excluded:
-            last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
+            last = max(last, fie.excluded_at_s)
         else:
-            n_not_excluded += 1
-            remaining_estimator_index = (
-                NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed_by_likelihood else estimator_index
-            )
-    if t - last_exclusion_s < isolation.config.isolation_hold_off_s:
-        remaining_estimator_index = NOT_ISOLATED
-    return (
-        NOT_ISOLATED
-        if n_not_excluded > 1
-        else (remaining_estimator_index if n_not_excluded == 1 else UNANTICIPATED)
-    )
+            n += 1
+            left = NOT_ISOLATED if fie.weak and not fie.confirmed else j
+    if t - last < iso.config.hold_s:
+        left = NOT_ISOLATED
+    return NOT_ISOLATED if n > 1 else (left if n == 1 else UNANTICIPATED)
 
 
 @kernel
-def replace_theta_by_plugin_estimate(isolation, isolated_estimator, theta):
-    """Replace theta of the isolated estimator, where there is one, by the estimate of a plug-in."""
-    if isolated_estimator >= 0:
-        isolation.estimator[isolated_estimator].theta[:] = theta
+def least_squares_step(fie, i, eps, forget):
+    """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
 
+        K = P Om / S,  S = R + Om P Om,  R = e^2      th <- th + K eps      P <- min(P R / S / forget, prior)
 
-@kernel
-def least_squares_step(fie, axis, rate_residual, forgetting_factor, theta_min, theta_max):
-    """One least-squares step of thetahat_i on a residual, rad/s, projected onto [theta_min, theta_max];
-    returns the step.
-
-    The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
-    filtered uncertainty, so the estimate changes no faster than its information allows.
+    R is the square of the bound on the filtered uncertainty, so the estimate changes no faster than its
+    information allows.
     """
-    noise_variance = fie.filtered_uncertainty_bound[axis] ** 2
-    variance_times_regressor = fie.theta_variance[axis] * fie.filtered_regressor[axis]
-    residual_variance = noise_variance + fie.filtered_regressor[axis] * variance_times_regressor
-    if residual_variance <= 0.0:
+    th, R, POm = fie.theta[i], fie.e[i] ** 2, fie.P[i] * fie.Om[i]
+    S = R + fie.Om[i] * POm
+    if S <= 0.0:
         return 0.0
-    previous_theta = fie.theta[axis]
-    fie.theta[axis] = min(
-        max(previous_theta + variance_times_regressor / residual_variance * rate_residual, theta_min),
-        theta_max,
-    )
-    prior_variance = (fie.theta_max - fie.theta_min) ** 2 / 12.0
-    fie.theta_variance[axis] = min(
-        fie.theta_variance[axis] * noise_variance / residual_variance / forgetting_factor, prior_variance
-    )
-    return fie.theta[axis] - previous_theta
+    fie.theta[i] = min(max(th + POm / S * eps, fie.set_lo[i]), fie.set_hi[i])
+    fie.P[i] = min(fie.P[i] * R / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
+    return fie.theta[i] - th
 
 
 @kernel
-def gradient_step(fie, axis, gain, dt):
-    """thetahat' = P{gain Omega eps}, by a step of dt s [Zhang2005, sec. IV]; returns the step."""
-    previous_theta = fie.theta[axis]
-    unprojected_theta = previous_theta + dt * gain * fie.filtered_regressor[axis] * fie.residual[axis]
-    fie.theta[axis] = min(max(unprojected_theta, fie.feasible_theta_min[axis]), fie.feasible_theta_max[axis])
-    return fie.theta[axis] - previous_theta
-
-
-@kernel
-def joint_least_squares_step(fie, forgetting_factor):
+def joint_least_squares(fie, forget):
     """A least-squares step of one theta shared by the axes: each axis corrects the residual that the axes
     before left; returns the step."""
-    total_step = 0.0
+    total = 0.0
     for i in range(3):
         if i > 0:
-            fie.theta[i], fie.theta_variance[i] = fie.theta[i - 1], fie.theta_variance[i - 1]
-        if fie.frame_mean_effect.regressor[i] != 0.0:
-            unexplained_residual = fie.residual[i] - fie.filtered_regressor[i] * total_step
-            total_step += least_squares_step(
-                fie,
-                i,
-                unexplained_residual,
-                forgetting_factor,
-                fie.feasible_theta_min[i],
-                fie.feasible_theta_max[i],
-            )
-            forgetting_factor = 1.0  # once a frame
-    fie.theta[:], fie.theta_variance[:] = fie.theta[2], fie.theta_variance[2]
-    return total_step
+            fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
+        if fie.effect.regressor[i] != 0.0:
+            total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
+            forget = 1.0  # once a frame
+    fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
+    return total
 
 
 @kernel
-def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, dt):
-    """Advance one estimator by a frame: estimate, predicted rates, and filtered regressor and bounds.
+def advance_estimator(iso, fie, bound, x, F, dt):
+    """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
-    x (3,) rad/s: at the start of the frame; predicted_acceleration (3,) rad/s2: mean of f + G u over
-    the frame; fie.frame_mean_effect must be that of this frame.
+        xhat <- x + dt (F + base + Z th) + a (xhat - x) + Om[k+1] (step of th)
+        Om <- a Om + dt Z      Om_pos <- a Om_pos + dt max(Z, 0)      Om_neg <- a Om_neg + dt min(Z, 0)
+        th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
+
+    x: at the start of the frame, as the residual eps; fie.effect must be that of this frame.
     """
+    cfg, phi, th = iso.config, fie.effect, fie.theta
     for i in range(3):
-        acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
-        regressor = fie.frame_mean_effect.regressor[i]
-        theta = fie.theta[i]
-        decay_factor = isolation.config.filter_decay[i]
-        fie.xhat[i] = (
-            x[i]
-            + dt * (predicted_acceleration[i] + acceleration_at_zero_theta + regressor * theta)
-            + decay_factor * (fie.xhat[i] - x[i])
-        )
-    update_theta_regressor_and_xhat(isolation, fie, dt)
+        effect = F[i] + phi.base[i] + phi.regressor[i] * th[i]
+        fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])
+    step = joint_least_squares(fie, cfg.forget) if cfg.shared else 0.0
     for i in range(3):
-        regressor, decay_factor = fie.frame_mean_effect.regressor[i], isolation.config.filter_decay[i]
-        fie.filtered_positive_regressor[i] = decay_factor * fie.filtered_positive_regressor[i] + dt * max(
-            regressor, 0.0
-        )
-        fie.filtered_negative_regressor[i] = decay_factor * fie.filtered_negative_regressor[i] + dt * min(
-            regressor, 0.0
-        )
-        fie.filtered_eta_bar[i] = advance_residual_bound(
-            fie.filtered_eta_bar[i],
-            bound_record.eta_bar[i] + fie.frame_mean_effect.error_bound[i],
-            decay_factor,
-            dt,
-        )
-        fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
-            fie.filtered_gyro_error_bound[i], bound_record.changing_gyro_error_bound_before[i], decay_factor
-        )
-        fie.filtered_uncertainty_bound[i] = (
-            fie.filtered_eta_bar[i]
-            + fie.filtered_gyro_error_bound[i]
-            + bound_record.changing_gyro_error_bound[i]
-        )
+        a, Z = cfg.a[i], phi.regressor[i]
+        if cfg.gradient:
+            old = th[i]
+            th[i] = min(max(old + dt * cfg.gain * fie.Om[i] * fie.residual[i], fie.set_lo[i]), fie.set_hi[i])
+            step = th[i] - old
+        elif not cfg.shared:
+            step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
+        fie.Om[i] = a * fie.Om[i] + dt * Z
+        fie.Om_pos[i] = a * fie.Om_pos[i] + dt * max(Z, 0.0)
+        fie.Om_neg[i] = a * fie.Om_neg[i] + dt * min(Z, 0.0)
+        fie.xhat[i] += fie.Om[i] * step
+        fie.e_lag[i] = advance_bound(fie.e_lag[i], bound.eta_bar[i] + phi.e[i], a, dt, bound.n_old[i])
+        fie.e[i] = fie.e_lag[i] + bound.n_gyro[i]
 
 
 @kernel
-def update_theta_regressor_and_xhat(isolation, fie, dt):
-    """Correct the estimate by the residual at the start of the frame, and the predicted rates by Omega[k+1]
-    times the step of the estimate."""
-    joint_step = (
-        joint_least_squares_step(fie, isolation.config.forgetting_factor)
-        if isolation.config.shares_theta_across_axes
-        else 0.0
-    )
-    for i in range(3):
-        if isolation.config.adapts_by_gradient:
-            theta_step = gradient_step(fie, i, isolation.config.gradient_gain, dt)
-        elif isolation.config.shares_theta_across_axes:
-            theta_step = joint_step
-        else:
-            theta_step = least_squares_step(
-                fie,
-                i,
-                fie.residual[i],
-                isolation.config.forgetting_factor,
-                fie.feasible_theta_min[i],
-                fie.feasible_theta_max[i],
-            )
-        fie.filtered_regressor[i] = (
-            isolation.config.filter_decay[i] * fie.filtered_regressor[i]
-            + dt * fie.frame_mean_effect.regressor[i]
-        )
-        fie.xhat[i] += fie.filtered_regressor[i] * theta_step
-
-
-@kernel
-def advance_estimators(isolation, bound_record, x, predicted_acceleration, dt):
+def advance_estimators(iso, bound, x, F, dt):
     """Advance the estimators by a frame; arguments as in `advance_estimator`."""
-    for fie in isolation.estimator[: isolation.config.n_estimators]:
-        advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, dt)
+    for fie in iso.estimator[: iso.config.n_estimators]:
+        advance_estimator(iso, fie, bound, x, F, dt)
 
 
 @kernel
-def update_likelihood_confirmation_and_exclusion(
-    fie,
-    test_config,
-    statistical_filters,
-    isolation,
-    loss_estimator_of_surface,
-    fault_is_declared_constant,
-    gust_can_hide_vane_error,
-):
-    """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed_by_likelihood` and
-    `weakly_excluded`.
+def update_likelihood(fie, cfg, blocks, iso, of, abrupt, hidden):
+    """Fill `unlikely` of estimator fie; update its `confirmed` and `weak`.
 
-    gust_can_hide_vane_error: a gust may hide an error of a vane from the sensor monitor. An exclusion may
-    then be the effect of that error, so all estimators become weakly excluded. loss_estimator_of_surface
-    (n,): index of the estimator; fault_is_declared_constant: a fault is declared to stay as it is.
+    hidden: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be the effect of
+    that error, so all estimators become weakly excluded. cfg, blocks: of the statistical detector; of (n,):
+    index of the estimator of each surface's loss.
     """
-    all_estimator_records, s = isolation.estimator, fie.surface
-    fie.excluded_by_likelihood = 0
-    if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not fault_is_declared_constant):
-        fie.confirmed_by_likelihood = statistical.confirms_loss(
-            test_config, statistical_filters, all_estimator_records, loss_estimator_of_surface, s
+    fies, s = iso.estimator, fie.surface
+    fie.unlikely = 0
+    if not fie.confirmed and (fie.weak or not abrupt):
+        fie.confirmed = statistical.confirms_loss(
+            cfg, blocks, fies, of, s
         )  # what follows later may be its end
-    if fie.confirmed_by_likelihood or not statistical.excludes_loss(
-        test_config,
-        statistical_filters,
-        all_estimator_records,
-        loss_estimator_of_surface,
-        s,
-        False,
-        fault_is_declared_constant,
-    ):
+    if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, of, s, False, abrupt):
         return
-    fie.excluded_by_likelihood = statistical.excludes_loss(
-        test_config,
-        statistical_filters,
-        all_estimator_records,
-        loss_estimator_of_surface,
-        s,
-        True,
-        fault_is_declared_constant,
-    )
-    fie.weakly_excluded = max(fie.weakly_excluded, 1)
-    if fie.excluded_by_likelihood and gust_can_hide_vane_error:
-        for estimator_record in all_estimator_records[: isolation.config.n_estimators]:
-            estimator_record.weakly_excluded = max(estimator_record.weakly_excluded, 1)
+    fie.unlikely = statistical.excludes_loss(cfg, blocks, fies, of, s, True, abrupt)
+    fie.weak = max(fie.weak, 1)
+    if fie.unlikely and hidden:
+        for other in fies[: iso.config.n_estimators]:
+            other.weak = max(other.weak, 1)

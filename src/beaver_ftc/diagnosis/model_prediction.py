@@ -15,21 +15,16 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
-from beaver_ftc.diagnosis.bounds import (
-    additional_error_bound_at_travel_level,
-    changing_gyro_error_bound,
-    fill_uncertainty_bound_now,
-)
+from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro
 from beaver_ftc.scenario.declared import Declared
 
 
 @sized
 def frame_sums_dtype(n: int) -> np.dtype:
-    """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
+    """Means over the instants of a frame so far, n surfaces: F, G, G u, bounds; eG, eGu as in bounds.py."""
     return record(
-        f=3, G=(3, n), Gu=(3, n), eta_bar=3,
-        surface_term_error_bound_per_rad=(3, n), surface_term_error_bound_at_command=(3, n),
-        first_instant_Gu=(3, n),  # of the first instant alone
+        F=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
+        Gu_first=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
     )  # fmt: skip
@@ -39,12 +34,12 @@ def frame_sums_dtype(n: int) -> np.dtype:
 def frame_means_dtype(n: int) -> np.dtype:
     """Means over the elapsed frame, of an aircraft with n surfaces."""
     return record(
-        # rad/s2 per rad; rad/s2; see `fill_effect_tolerance_for_fault_change`, rad/s2
-        G=(3, n), Gu=(3, n), Gu_tolerance_for_fault_change=(3, n),
-        predicted_acceleration=3,  # f + G u, rad/s2
+        # rad/s2 per rad; rad/s2; see `fill_change_tolerance`, rad/s2
+        G=(3, n), Gu=(3, n), e_Gu=(3, n),
+        F=3,  # f + G u, rad/s2
         # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
-        previous_G=(3, n), Gu_with_previous_G=(3, n),
+        G_old=(3, n), Gu_old=(3, n),
         # If faults of every type are examined, extremes within the frame: of G on each surface's dominant
         # axis, and of the position of the healthy surface, rad.
         G_min=n, G_max=n, u_min=n, u_max=n,
@@ -56,220 +51,164 @@ def prediction_dtype(n: int) -> np.dtype:
     """The designer's model of an aircraft with n surfaces and its predictions; rad, rad/s, rad/s2."""
     return record(
         design=design_dtype(n), actuators=actuators_dtype(n),
-        frame_share_per_instant=float,  # one over the number of instants in a frame
+        w=float,  # one over the number of instants in a frame
         commanded=n,
-        u=n, u_before=n,  # positions of healthy surfaces under the command: now, and an instant before
+        u=n, u_old=n,  # positions of healthy surfaces under the command: now, and an instant before
         f=3, G=(3, n),  # at this instant
         x_before=3,  # rates measured at the start of the elapsed frame
-        sums=frame_sums_dtype(n), frame_means=frame_means_dtype(n),
-        acceleration_with_known_faults=3,  # mean acceleration of the elapsed frame, known faults included
-        innovation_after_known_faults=3,  # measured minus expected mean acceleration
+        sums=frame_sums_dtype(n), means=frame_means_dtype(n),
+        F_known=3,  # mean acceleration of the elapsed frame, known faults included
+        nu_known=3,  # measured minus expected mean acceleration
     )  # fmt: skip
 
 
-def configure_prediction(prediction: np.void, declared: Declared, travel: np.ndarray) -> None:
+def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
-    prediction["frame_share_per_instant"] = 1.0 / declared.substeps
-    prediction["design"] = design_of(declared.design_model, declared.aircraft)[0]
-    actuators, instant_interval_s = prediction["actuators"], 1.0 / declared.rate_hz / declared.substeps
-    actuators["real"] = not declared.servos.is_ideal
-    actuators["low"], actuators["high"] = travel
-    for s, surface_name in enumerate(declared.aircraft.surfaces):
-        actuator = getattr(declared.servos, surface_name)
-        bandwidth_rad_s, rate_limit_rad_s = actuator.bandwidth_rad_s, radians(actuator.rate_limit_deg_s)
-        actuators["approach"][s] = (
-            1.0 - exp(-bandwidth_rad_s * instant_interval_s) if bandwidth_rad_s else 1.0
-        )
-        actuators["step"][s] = rate_limit_rad_s * instant_interval_s if rate_limit_rad_s else np.inf
+    pred["w"] = 1.0 / declared.substeps
+    pred["design"] = design_of(declared.design_model, declared.aircraft)[0]
+    act, h = pred["actuators"], 1.0 / declared.rate_hz / declared.substeps
+    act["real"] = not declared.servos.is_ideal
+    act["low"], act["high"] = travel
+    for s, name in enumerate(declared.aircraft.surfaces):
+        servo = getattr(declared.servos, name)
+        omega, rate = servo.bandwidth_rad_s, radians(servo.rate_limit_deg_s)
+        act["approach"][s] = 1.0 - exp(-omega * h) if omega else 1.0
+        act["step"][s] = rate * h if rate else np.inf
 
 
 @kernel
-def evaluate_design_model(prediction, measured):
+def evaluate_design(pred, meas):
     """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model at this instant."""
-    response(prediction.design, measured.x, measured.y, prediction.f, prediction.G)
+    response(pred.design, meas.x, meas.y, pred.f, pred.G)
 
 
 @kernel
-def add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types):
-    """Add this instant to the sums over the frame and, for faults of `diagnoses_all_types`, to the
-    extremes."""
-    sums, G, u = prediction.sums, prediction.G, prediction.u
+def add_to_sums(pred, bound, layout, all_types):
+    """Add w times this instant to the means over the frame and, for faults of all types, to the extremes."""
+    sums, G, u, w, eG = pred.sums, pred.G, pred.u, pred.w, bound.declared_errors.eG
     for i in range(3):
-        sums.f[i] += prediction.f[i]
-        sums.eta_bar[i] += bound_record.eta_bar_now[i]
+        sums.F[i] += w * pred.f[i]
+        sums.eta_bar[i] += w * bound.eta_now[i]
         for s in range(u.size):
-            sums.G[i, s] += G[i, s]
-            sums.Gu[i, s] += G[i, s] * u[s]
-            if bound_record.has_surface_term_errors:
-                sums.surface_term_error_bound_per_rad[i, s] += (
-                    bound_record.declared_errors.acceleration_error_bound_per_rad[i, s]
-                )
-                sums.surface_term_error_bound_at_command[i, s] += (
-                    bound_record.declared_errors.acceleration_error_bound_per_rad[i, s] * abs(u[s])
-                )
-    if bound_record.error_map.one_surface_may_be_anywhere:
-        for j in range(bound_record.error_map.n_travel_levels):
-            for i in range(3):
-                bound_record.additional_error_bound_by_travel_level[j, i] += (
-                    prediction.frame_share_per_instant
-                    * additional_error_bound_at_travel_level(bound_record.error_map, j, i)
-                )
-    if diagnoses_all_types:
-        for s, axis in enumerate(layout.dominant_axis):
-            G_on_dominant_axis = G[axis, s]
-            sums.G_min[s] = min(sums.G_min[s], G_on_dominant_axis)
-            sums.G_max[s] = max(sums.G_max[s], G_on_dominant_axis)
+            sums.G[i, s] += w * G[i, s]
+            sums.Gu[i, s] += w * G[i, s] * u[s]
+            sums.F[i] += w * G[i, s] * u[s]
+            if bound.has_eG:
+                sums.eG[i, s] += w * eG[i, s]
+                sums.eGu[i, s] += w * eG[i, s] * abs(u[s])
+        if bound.error_map.one_free:
+            for j in range(bound.error_map.n_levels):
+                bound.extra[j, i] += w * extra_bound(bound.error_map, j, i)
+    if all_types:
+        for s, i in enumerate(layout.dominant_axis):
+            sums.G_min[s], sums.G_max[s] = min(sums.G_min[s], G[i, s]), max(sums.G_max[s], G[i, s])
             sums.u_min[s], sums.u_max[s] = min(sums.u_min[s], u[s]), max(sums.u_max[s], u[s])
 
 
 @kernel
-def fill_frame_means(prediction, bound_record):
-    """Fill the means over the elapsed frame: G, the effect G u of each surface, f + G u, and the bound."""
-    frame_share_per_instant = prediction.frame_share_per_instant
-    sums = prediction.sums
-    frame_means = prediction.frame_means
-    for i in range(3):
-        mean_predicted_acceleration = frame_share_per_instant * sums.f[i]
-        for s in range(prediction.u.size):
-            frame_means.previous_G[i, s] = frame_means.G[i, s]
-            frame_means.G[i, s] = frame_share_per_instant * sums.G[i, s]
-            frame_means.Gu[i, s] = frame_share_per_instant * sums.Gu[i, s]
-            mean_predicted_acceleration += frame_means.Gu[i, s]
-        frame_means.predicted_acceleration[i] = mean_predicted_acceleration
-        bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
-    frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
-    frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max
-    if bound_record.has_surface_term_errors:
-        bound_record.surface_term_error_bound_per_rad[:] = (
-            frame_share_per_instant * sums.surface_term_error_bound_per_rad
-        )
-        bound_record.surface_term_error_bound_at_command[:] = (
-            frame_share_per_instant * sums.surface_term_error_bound_at_command
-        )
-    if frame_share_per_instant < 1.0:
-        fill_effect_tolerance_for_fault_change(prediction)
+def fill_means(pred, bound):
+    """Fill the means over the elapsed frame: G, G u of each surface, F = f + G u, and the bound."""
+    sums, means = pred.sums, pred.means
+    means.G_old[:] = means.G
+    means.G[:], means.Gu[:], means.F[:], bound.eta_bar[:] = sums.G, sums.Gu, sums.F, sums.eta_bar
+    means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
+    means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
+    if bound.has_eG:
+        bound.eG[:], bound.eGu[:] = sums.eG, sums.eGu
+    if pred.w < 1.0:
+        fill_change_tolerance(pred)
 
 
 @kernel
-def fill_surface_effects_with_previous_G(frame_means):
-    """Fill `Gu_with_previous_G` (3, n) rad/s2: the effect of each surface with G of the frame before."""
+def fill_old_effects(means):
+    """Gu_old = (G_old / G) Gu, (3, n) rad/s2: the effect of each surface with G of the frame before."""
+    G_old, G, Gu = means.G_old, means.G, means.Gu
     for i in range(3):
-        for s in range(frame_means.G_min.size):
-            previous_over_present_G = (
-                frame_means.previous_G[i, s] / frame_means.G[i, s] if frame_means.G[i, s] != 0.0 else 0.0
-            )
-            frame_means.Gu_with_previous_G[i, s] = previous_over_present_G * frame_means.Gu[i, s]
+        for s in range(G.shape[1]):
+            means.Gu_old[i, s] = (G_old[i, s] / G[i, s] if G[i, s] != 0.0 else 0.0) * Gu[i, s]
 
 
 @kernel
-def fill_effect_tolerance_for_fault_change(prediction):
-    """Fill `Gu_tolerance_for_fault_change` (3, n) rad/s2: the error of the mean effect if a fault changes
-    within the frame.
+def fill_change_tolerance(pred):
+    """e_Gu = w |z0 - z|, (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
-    are the effects of a healthy surface in the first and in the other n - 1 steps. The mean effect of the
-    fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
+    are the effects of a healthy surface in the first and in the other n - 1 steps, w = 1 / n. The mean effect
+    of the fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
     """
-    frame_share_per_instant, sums = prediction.frame_share_per_instant, prediction.sums
+    w, Gu, first = pred.w, pred.sums.Gu, pred.sums.Gu_first
     for i in range(3):
-        for s in range(prediction.u.size):
-            first_instant_effect = sums.first_instant_Gu[i, s]
-            mean_effect_of_other_instants = (
-                (sums.Gu[i, s] - first_instant_effect)
-                * frame_share_per_instant
-                / (1.0 - frame_share_per_instant)
-            )
-            prediction.frame_means.Gu_tolerance_for_fault_change[i, s] = frame_share_per_instant * abs(
-                first_instant_effect - mean_effect_of_other_instants
-            )
+        for s in range(pred.u.size):
+            pred.means.e_Gu[i, s] = abs(first[i, s] - (Gu[i, s] - first[i, s]) * w / (1.0 - w))
 
 
 @kernel
-def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_index, dt):
+def evaluate_frame(pred, bound, meas, k, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
-    bound_record.error_map.time_s = frame_index * dt
-    fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
-    bound_record.eta_bar[:] = bound_record.eta_bar_now
-    if bound_record.declared_errors.has_declared_errors:
+    bound.error_map.time_s = k * dt
+    fill_bound(bound, pred.design, meas, pred.u)
+    bound.eta_bar[:] = bound.eta_now
+    if bound.declared_errors.given:
         for i in range(3):
-            bound_record.changing_gyro_error_bound[i] = changing_gyro_error_bound(
-                bound_record.declared_errors, i, measured.x[i]
-            )
-    if frame_index > 0:
-        fill_frame_means(prediction, bound_record)
+            bound.n_gyro[i] = n_gyro(bound.declared_errors, i, meas.x[i])
+    if k > 0:
+        fill_means(pred, bound)
 
 
 @kernel
-def begin_frame_with_instant(prediction, bound_record, layout, diagnoses_all_types, measured):
-    """Start the next frame's sums with this instant, at which the old command is still in effect."""
-    prediction.x_before[:] = measured.x
-    bound_record.changing_gyro_error_bound_before[:] = bound_record.changing_gyro_error_bound
-    sums = prediction.sums
-    sums.f[:], sums.eta_bar[:] = 0.0, 0.0
-    sums.G[:], sums.Gu[:] = 0.0, 0.0
+def begin_sums(pred, bound, layout, all_types, meas):
+    """Start the next frame's means with this instant, at which the old command is still in effect."""
+    sums = pred.sums
+    pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
+    sums.F[:], sums.eta_bar[:], sums.G[:], sums.Gu[:], bound.extra[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    sums.eG[:], sums.eGu[:] = 0.0, 0.0
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
-    if bound_record.has_surface_term_errors:
-        sums.surface_term_error_bound_per_rad[:], sums.surface_term_error_bound_at_command[:] = 0.0, 0.0
-    bound_record.additional_error_bound_by_travel_level[:] = 0.0
-    add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types)
-    sums.first_instant_Gu[:] = sums.Gu
+    add_to_sums(pred, bound, layout, all_types)
+    sums.Gu_first[:] = sums.Gu
 
 
 @kernel
-def redo_last_move_to_command(prediction, command):
+def redo_move(pred, command):
     """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
-    prediction.u[:] = prediction.u_before
-    store_command_and_move_healthy_surfaces(prediction, command)
+    pred.u[:] = pred.u_old
+    move_surfaces(pred, command)
 
 
 @kernel
-def add_instant_and_move_healthy_surfaces(prediction, bound_record, layout, diagnoses_all_types, measured):
+def add_instant(pred, bound, layout, all_types, meas):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
-    fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
-    add_instant_to_sums_and_extremes(prediction, bound_record, layout, diagnoses_all_types)
-    move(prediction.actuators, prediction.commanded, prediction.u)
+    fill_bound(bound, pred.design, meas, pred.u)
+    add_to_sums(pred, bound, layout, all_types)
+    move(pred.actuators, pred.commanded, pred.u)
 
 
 @kernel
-def fill_acceleration_with_known_faults(
-    prediction, include_known_faults, effectiveness, deflection_bias, include_biases
-):
-    """Fill `acceleration_with_known_faults` (3,) rad/s2: mean of f + G u over the elapsed frame, with the
-    faults if `include_known_faults`.
+def predict_known(pred, with_faults, effectiveness, bias, with_biases):
+    """F_known = F - Gu (1 - effectiveness) + G bias, (3,) rad/s2, over the elapsed frame.
 
-    effectiveness (n,): estimate for each surface; deflection_bias (n,) rad: its bias, used if
-    `include_biases`.
+    effectiveness (n,), bias (n,) rad: estimates for each surface, used if `with_faults` and `with_biases`.
     """
-    acceleration_with_known_faults = prediction.acceleration_with_known_faults
-    frame_means = prediction.frame_means
-    acceleration_with_known_faults[:] = frame_means.predicted_acceleration
-    if not include_known_faults:
-        return
-    for s in range(effectiveness.size):
-        lost_effectiveness_share = 1.0 - effectiveness[s]
+    F, means = pred.F_known, pred.means
+    F[:] = means.F
+    if with_faults:
         for i in range(3):
-            acceleration_with_known_faults[i] -= lost_effectiveness_share * frame_means.Gu[i, s]
-    if include_biases:
-        for s in range(deflection_bias.size):
-            for i in range(3):
-                acceleration_with_known_faults[i] += frame_means.G[i, s] * deflection_bias[s]
+            for s in range(bias.size):
+                F[i] -= (1.0 - effectiveness[s]) * means.Gu[i, s]
+                F[i] += means.G[i, s] * bias[s] if with_biases else 0.0
 
 
 @kernel
-def form_innovation_after_known_faults(prediction, measured_rates, dt):
-    """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; measured_rates
-    (3,) rad/s: now."""
+def innovation_known(pred, x, dt):
+    """nu_known = (x - x_old) / dt - F_known, (3,) rad/s2."""
     for i in range(3):
-        prediction.innovation_after_known_faults[i] = (
-            measured_rates[i] - prediction.x_before[i]
-        ) / dt - prediction.acceleration_with_known_faults[i]
+        pred.nu_known[i] = (x[i] - pred.x_before[i]) / dt - pred.F_known[i]
 
 
 @kernel
-def store_command_and_move_healthy_surfaces(prediction, command):
+def move_surfaces(pred, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     for s in range(command.size):
-        prediction.commanded[s] = command[s]
-    prediction.u_before[:] = prediction.u
-    move(prediction.actuators, prediction.commanded, prediction.u)
+        pred.commanded[s] = command[s]
+    pred.u_old[:] = pred.u
+    move(pred.actuators, pred.commanded, pred.u)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.diagnosis.detection.likelihood import N_ONSET_SLOTS
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
 
 
@@ -41,16 +41,16 @@ class LayoutOfAllSurfaces(NamedTuple):
 class FaultTypesConfig(NamedTuple):
     """How fault types are examined.
 
-    frame_shows_single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
-    released_surface_returns_via_actuator: a released surface returns by its actuator.
-    slowest_half_cycle_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
+    single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
+    returns_lagged: a released surface returns by its actuator.
+    half_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
     1 where every frame is examined by itself; block_duration_s: its duration.
     """
 
-    frame_shows_single_instant: bool
+    single_instant: bool
     n_substeps: int
-    released_surface_returns_via_actuator: bool
-    slowest_half_cycle_blocks: int
+    returns_lagged: bool
+    half_blocks: int
     frames_per_block: int
     block_duration_s: float
     dt_s: float
@@ -59,15 +59,15 @@ class FaultTypesConfig(NamedTuple):
 class Actuator(NamedTuple):
     """The actuator of a surface as fault types take it; rad, rad/s.
 
-    min_runaway_rate_rad_s: of a hardover. min_rate_limited_motion_per_substep_rad: of a rate limit, in an
-    instant. approach_share_per_substep: share of the way to the command that is made in an instant.
+    min_runaway_rate_rad_s: of a hardover. slow_step_rad: of a rate limit, in an
+    instant. approach_share: share of the way to the command that is made in an instant.
     """
 
     travel_low_rad: float
     travel_high_rad: float
     min_runaway_rate_rad_s: float
-    min_rate_limited_motion_per_substep_rad: float
-    approach_share_per_substep: float
+    slow_step_rad: float
+    approach_share: float
 
 
 class SurfaceFaultTypes(NamedTuple):
@@ -81,16 +81,16 @@ class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
     eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
-    changing part of a gyro's error. inertia_coupling_error_share, constant_part_of_error_bound_rad_s2: terms
+    changing part of a gyro's error. inertia_coupling_error_share, constant_error_rad_s2: terms
     of eta_bar. earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest +
-    gyro_error_bound_per_rate |rate|, of the first what does not change, constant_gyro_error_bound; zero where
+    gyro_error_bound_per_rate |rate|, of the first what does not change, steady; zero where
     none is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
     changing_gyro_error_bound_rad_s: np.ndarray
     inertia_coupling_error_share: np.ndarray
-    constant_part_of_error_bound_rad_s2: np.ndarray
+    constant_error_rad_s2: np.ndarray
     earth_rate_rad_s: float
     gyro_error_bound_at_rest_rad_s: np.ndarray
     constant_gyro_error_bound_rad_s: np.ndarray
@@ -130,7 +130,7 @@ class StatisticalHypothesis(NamedTuple):
 
 
 class HypothesisTestsByOnset(NamedTuple):
-    """By hypothesis and onset (hypotheses, N_ONSET_SLOTS): score, direction of the loss that is tested (0:
+    """By hypothesis and onset (hypotheses, N_SLOTS): score, direction of the loss that is tested (0:
     either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
 
     score: np.ndarray
@@ -159,41 +159,41 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
     residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
-    second of the sample. residual_per_gust_speed_change: effect on it of 1 m/s that a gust changes by.
-    filtered_residual_by_pole, filtered_bound_by_pole (poles,): through the filters.
+    second of the sample. gust_gain: effect on it of 1 m/s that a gust changes by.
+    filtered_residual, filtered_bound (poles,): through the filters.
     """
 
     residual: float
     bound_per_s: float
     bound_per_sample: float
-    residual_per_gust_speed_change: float
-    filtered_residual_by_pole: np.ndarray
-    filtered_bound_by_pole: np.ndarray
+    gust_gain: float
+    filtered_residual: np.ndarray
+    filtered_bound: np.ndarray
 
 
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; has_raised_alarm: an alarm of its own stands.
 
-    worst_test_index: of the test with the largest ratio of residual to bound; worst_residual_bound_ratio:
+    worst_test_index: of the test with the largest ratio of residual to bound; top_ratio:
     that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
     is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
-    filtered_gust_change_bound_by_pole_mps (poles,): bound on the changes of a gust through the filters.
-    predicted_reading, reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm,
+    gust_change_mps (poles,): bound on the changes of a gust through the filters.
+    predicted_reading, reading_bound (sensors,): SI. engine_commands (2,): engine speed rpm,
     manifold pressure inHg, which the engine's sensors should read.
     """
 
     enabled: bool
     has_raised_alarm: bool
     worst_test_index: int
-    worst_residual_bound_ratio: float
+    top_ratio: float
     worst_test: SensorTest
     isolated_sensor_index: int
     is_reading_unused: np.ndarray
     sample_time_s: float
-    filtered_gust_change_bound_by_pole_mps: np.ndarray
+    gust_change_mps: np.ndarray
     predicted_reading: np.ndarray
-    reading_error_bound: np.ndarray
-    commanded_engine_readings: np.ndarray
+    reading_bound: np.ndarray
+    engine_commands: np.ndarray
 
 
 class DiagnosisReadout:
@@ -235,8 +235,8 @@ class DiagnosisReadout:
     @cached_property
     def layout(self) -> LayoutOfAllSurfaces:
         """Axes and estimators of the surfaces."""
-        field_names = ("dominant_axis", "loss_estimator", "position_estimator")
-        return LayoutOfAllSurfaces(*(tuple(self._fdi["layout"][name].tolist()) for name in field_names))
+        names = ("dominant_axis", "loss", "position")
+        return LayoutOfAllSurfaces(*(tuple(self._fdi["layout"][name].tolist()) for name in names))
 
     @cached_property
     def is_estimator_excluded(self) -> np.ndarray:
@@ -251,18 +251,18 @@ class DiagnosisReadout:
     @cached_property
     def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
-        config = self._fdi["types"]["config"]
+        c = self._fdi["types"]["config"]
         return FaultTypesConfig(
-            bool(config["frame_shows_single_instant"]), int(config["n_substeps"]),
-            bool(config["released_surface_returns_via_actuator"]),
-            int(config["slowest_half_cycle_frames"]),
-            int(config["frames_per_block"]), float(config["block_duration_s"]), float(config["dt"]),
+            bool(c["single_instant"]), int(c["n_substeps"]),
+            bool(c["returns_lagged"]),
+            int(c["half_frames"]),
+            int(c["frames_per_block"]), float(c["block_duration_s"]), float(c["dt"]),
         )  # fmt: skip
 
     @cached_property
     def n_frames_in_block_so_far(self) -> int:
         """Frames that the block in progress has so far."""
-        return int(self._fdi["types"]["block"]["n_frames_so_far"])
+        return int(self._fdi["types"]["block"]["n_so_far"])
 
     @cached_property
     def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
@@ -272,56 +272,44 @@ class DiagnosisReadout:
     @cached_property
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
-        bound_record = self._fdi["bound"]
-        declared_errors = bound_record["declared_errors"]
-        has_declared_errors = bool(declared_errors["has_declared_errors"])
-        gyro_error_bound_at_rest, constant_gyro_error_bound, gyro_error_bound_per_rate = (
-            declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
-            for name in (
-                "signal_error_bound_at_zero",
-                "constant_gyro_error_bound",
-                "signal_error_bound_per_unit",
-            )
+        bound = self._fdi["bound"]
+        errors = bound["declared_errors"]
+        declared = bool(errors["given"])
+        at_rest, constant, per_rate = (
+            errors[name][:3].copy() if declared else np.zeros(3) for name in ("e0", "steady", "e1")
         )
         return DeclaredBounds(
-            eta_bar_rad_s2=bound_record["eta_bar"].copy(),
-            changing_gyro_error_bound_rad_s=bound_record["changing_gyro_error_bound"].copy(),
-            inertia_coupling_error_share=bound_record["inertia_coupling_error_share"].copy(),
-            constant_part_of_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
-            earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
-            gyro_error_bound_at_rest_rad_s=gyro_error_bound_at_rest,
-            constant_gyro_error_bound_rad_s=constant_gyro_error_bound,
-            gyro_error_bound_per_rate=gyro_error_bound_per_rate,
+            eta_bar_rad_s2=bound["eta_bar"].copy(),
+            changing_gyro_error_bound_rad_s=bound["n_gyro"].copy(),
+            inertia_coupling_error_share=bound["inertia_coupling_error_share"].copy(),
+            constant_error_rad_s2=bound["const"].copy(),
+            earth_rate_rad_s=float(bound["earth_rate_rad_s"]),
+            gyro_error_bound_at_rest_rad_s=at_rest,
+            constant_gyro_error_bound_rad_s=constant,
+            gyro_error_bound_per_rate=per_rate,
         )  # fmt: skip
 
     @cached_property
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        gust_output = self._fdi["statistical"]["gust"]["output"]
-        return GustReadout(
-            bool(gust_output["accounts_for_gusts"]),
-            bool(gust_output["is_gust_measured"]),
-            gust_output["angular_acceleration_by_gust"].copy(),
-        )
+        gust = self._fdi["statistical"]["gust"]["output"]
+        return GustReadout(bool(gust["gusty"]), bool(gust["measured"]), gust["acc"].copy())
 
     @cached_property
     def mapped_error(self) -> ModelErrorMapReadout:
         """The design model's error here, where the aircraft maps it."""
-        error_map = self._fdi["bound"]["error_map"]
-        return ModelErrorMapReadout(
-            not error_map["is_outside_all_boxes"],
-            error_map["error_bound_now"].copy(),
-        )
+        emap = self._fdi["bound"]["error_map"]
+        return ModelErrorMapReadout(not emap["outside"], emap["e_now"].copy())
 
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_by_input_noise"])
+        return np.array(self._fdi["statistical"]["noise"]["Q"])
 
     @cached_property
     def statistical_alarm_level(self) -> float:
         """Statistic at which the statistical detector raises its alarm, standard deviations."""
-        return float(self._fdi["statistical"]["test_config"]["alarm_level"])
+        return float(self._fdi["statistical"]["test"]["alarm_level"])
 
     @cached_property
     def statistical_filters(self) -> tuple[StatisticalBlock, ...]:
@@ -342,10 +330,10 @@ def estimator_records(fdi: np.void) -> np.ndarray:
 
 def switch_statistical_tests(fdi: np.void, is_enabled: bool) -> None:
     """Switch the statistical tests on or off, for every scheme."""
-    fdi["statistical"]["test_config"]["enabled"] = is_enabled
+    fdi["statistical"]["test"]["enabled"] = is_enabled
 
 
-def disable_surface_and_sensor_diagnosis(fdi: np.void) -> None:
+def disable_diagnosis(fdi: np.void) -> None:
     """Stop the built-in diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge
     then. A plug-in goes on."""
     if fdi["config"]["enabled"]:
@@ -353,150 +341,110 @@ def disable_surface_and_sensor_diagnosis(fdi: np.void) -> None:
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
-def certificate_arrays_of_every_frame(
-    fdi: np.void, n_estimators: int, diagnoses_all_types: bool
-) -> dict[str, np.ndarray]:
+def frame_arrays(fdi: np.void, n_estimators: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies.
 
     eta_bar, noise: as of `DeclaredBounds`. offset, slope, spread (n_estimators, 3): effect of each
     hypothesis' fault. excluded, types: what is excluded. Of faults of every type: least and greatest order to
     each surface, and position of a healthy one, rad.
     """
-    estimators, surface_records = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
-    array_by_name = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["changing_gyro_error_bound"],
-        "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
-        "slope": estimators["frame_mean_effect"]["regressor"],
-        "spread": estimators["frame_mean_effect"]["error_bound"], "excluded": estimators["excluded"],
-        "types": surface_records["feasible_sets"]["excluded"],
+    est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
+    arrays = {
+        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["n_gyro"],
+        "offset": est["effect"]["base"],
+        "slope": est["effect"]["regressor"],
+        "spread": est["effect"]["e"], "excluded": est["excluded"],
+        "types": srf["sets"]["excluded"],
     }  # fmt: skip
     if diagnoses_all_types:
-        command_records = surface_records["commands"]
-        array_by_name |= {
-            "command_low": command_records["min_command"],
-            "command_high": command_records["max_command"],
-        }
-        array_by_name |= {
-            "least": command_records["min_healthy_position"],
-            "greatest": command_records["max_healthy_position"],
-        }
-    return array_by_name
+        cmd = srf["commands"]
+        arrays |= {"command_low": cmd["cmd_min"], "command_high": cmd["cmd_max"]}
+        arrays |= {"least": cmd["u_min"], "greatest": cmd["u_max"]}
+    return arrays
 
 
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
 RECORDED_BLOCK_FIELDS = (
-    "drift_decay_factor", "uncertainty_change_over_bound_per_frame", "state", "P_xx", "P_xd", "P_dd",
-    "drift_intensity", "model_noise_variance", "gyro_noise_variance", "predictable_innovation_in_calm_air",
-    "coarse_gust_response", "regressor_filter_state", "regressor_response",
+    "a", "eta_rate", "state", "P_xx", "P_xd", "P_dd",
+    "Q_d", "Q_x", "R_y", "p",
+    "g_c", "x_Z", "g_Z",
 )  # fmt: skip
 
 
-def current_certificate_arrays(
-    fdi: np.void, n_estimators: int, has_statistical_detector: bool
-) -> dict[str, np.ndarray]:
+def alarm_arrays(fdi: np.void, n_estimators: int, has_statistical_detector: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants the frames up to the alarm, not copies.
 
     reach_low, reach_high: what each hypothesis' fault can have done to the detection filters. Of the
     statistical detector: RECORDED_BLOCK_FIELDS of each filter, signatures of its hypotheses, what is bounded
     besides, and the gust as the vanes see it.
     """
-    estimators = fdi["isolation"]["estimator"][:n_estimators]
-    array_by_name = {
-        "reach_low": estimators["reachable_bank_residual_low"],
-        "reach_high": estimators["reachable_bank_residual_high"],
-    }
+    est = fdi["isolation"]["estimator"][:n_estimators]
+    arrays = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
     if has_statistical_detector:
-        statistical_detector = fdi["statistical"]
-        block_records, gust_output = statistical_detector["block"], statistical_detector["gust"]["output"]
-        array_by_name |= {name: block_records[name] for name in RECORDED_BLOCK_FIELDS}
-        array_by_name |= {
-            "signature": block_records["hypothesis"]["signature"],
-            "bounded": statistical_detector["noise"]["uncertainty_bound"],
-        }
-        array_by_name |= {
-            "air": gust_output["mean_angular_acceleration_by_gust"],
-            "leap": gust_output["acceleration_variance_by_axes_turn"],
-        }
-    return array_by_name
+        stat = fdi["statistical"]
+        blk, gust = stat["block"], stat["gust"]["output"]
+        arrays |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
+        arrays |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["noise"]["eta"]}
+        arrays |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
+    return arrays
 
 
-def surface_and_sensor_alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
+def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     """(surfaces, sensors): whether the alarm of a surface fault stands, and that of the sensor monitor."""
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
 def _read_estimator(fie: np.void) -> IsolationEstimator:
-    active_axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
-    theta_range = float(fie["theta_min"]), float(fie["theta_max"])
+    axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
+    span = float(fie["theta_min"]), float(fie["theta_max"])
     return IsolationEstimator(
-        int(fie["hypothesis_kind"]),
-        *theta_range,
-        bool(fie["excluded"]),
-        active_axes,
-        fie["parity_direction"].copy(),
+        int(fie["hypothesis_kind"]), *span, bool(fie["excluded"]), axes, fie["parity_direction"].copy()
     )
 
 
-def _read_surface(surface_record: np.void) -> SurfaceFaultTypes:
-    actuator_field_names = (
-        "travel_low",
-        "travel_high",
-        "min_runaway_rate",
-        "min_rate_limited_motion_per_substep",
-        "approach_share_per_substep",
-    )
-    actuator = Actuator(*(float(surface_record["actuator"][name]) for name in actuator_field_names))
-    return SurfaceFaultTypes(actuator, surface_record["feasible_sets"]["excluded"].astype(bool))
+def _read_surface(srf: np.void) -> SurfaceFaultTypes:
+    names = ("stop_lo", "stop_hi", "runaway", "slow_step", "approach_share")
+    actuator = Actuator(*(float(srf["actuator"][name]) for name in names))
+    return SurfaceFaultTypes(actuator, srf["sets"]["excluded"].astype(bool))
 
 
-def _read_block(block_record: np.void) -> StatisticalBlock:
-    hypotheses = tuple(map(_read_hypothesis, block_record["hypothesis"][: block_record["n_hypotheses"]]))
-    n_hypotheses = len(hypotheses)
-    hypothesis_tests_by_onset = (
-        block_record["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
-        for name in (
-            "score",
-            "supporting_correlation_sign",
-            "correlation_by_calm_air",
-            "correlation_from_coarse_gust",
-        )
+def _read_block(blk: np.void) -> StatisticalBlock:
+    hypotheses = tuple(map(_read_hypothesis, blk["hypothesis"][: blk["n_h"]]))
+    n = len(hypotheses)
+    tests = (
+        blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy()
+        for name in ("score", "supporting_correlation_sign", "N_p", "correlation_from_coarse_gust")
     )
     return StatisticalBlock(
-        tuple(block_record["axes"][: block_record["n_axes"]].tolist()),
-        float(block_record["drift_correlation_length_m"]), float(block_record["gust_drift_intensity_factor"]),
-        block_record["regressor_tolerance"][: block_record["n_regressors"]].copy(),
-        hypotheses, HypothesisTestsByOnset(*hypothesis_tests_by_onset),
+        tuple(blk["axes"][: blk["n"]].tolist()),
+        float(blk["drift_correlation_length_m"]), float(blk["Q_scale"]),
+        blk["tol"][: blk["n_Z"]].copy(),
+        hypotheses, HypothesisTestsByOnset(*tests),
     )  # fmt: skip
 
 
-def _read_hypothesis(hypothesis_record: np.void) -> StatisticalHypothesis:
-    kind_surface_axis = (
-        int(hypothesis_record["kind"]),
-        int(hypothesis_record["surface"]),
-        int(hypothesis_record["axis"]),
-    )
-    return StatisticalHypothesis(
-        *kind_surface_axis, bool(hypothesis_record["raises_alarm"]), float(hypothesis_record["score"])
-    )
+def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
+    place = (int(hyp["kind"]), int(hyp["surface"]), int(hyp["axis"]))
+    return StatisticalHypothesis(*place, bool(hyp["alarms"]), float(hyp["score"]))
 
 
-def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
+def read_sensor_monitor(mon: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
-    output, redundancy = monitor["output"], monitor["redundancy"]
-    config, memory = redundancy["config"], redundancy["memory"]
-    worst_test_index = int(output["worst_test_index"])
-    worst_test_record = redundancy["test"][worst_test_index]
-    worst_sensor_test = SensorTest(
-        float(worst_test_record["residual"]), float(worst_test_record["bound_per_s"]),
-        float(worst_test_record["bound_per_sample"]),
-        float(worst_test_record["residual_per_gust_speed_change"]),
-        worst_test_record["filtered_residual"].copy(), worst_test_record["filtered_bound"].copy(),
+    o, red = mon["output"], mon["redundancy"]
+    c, M = red["config"], red["memory"]
+    j = int(o["worst_test_index"])
+    test = red["test"][j]
+    worst = SensorTest(
+        float(test["residual"]), float(test["bound_per_s"]),
+        float(test["bound_per_sample"]),
+        float(test["gust_gain"]),
+        test["r"].copy(), test["B"].copy(),
     )  # fmt: skip
     return SensorMonitor(
-        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,
-        float(output["worst_residual_bound_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
-        output["is_reading_unused"].astype(bool), float(config["sample_time_s"]),
-        config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
-        memory["reading_error_bound"].copy(), memory["commanded_engine_readings"].copy(),
+        bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
+        float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
+        o["is_reading_unused"].astype(bool), float(c["sample_time_s"]),
+        c["gust_change"].copy(), M["predicted_reading"].copy(),
+        M["reading_bound"].copy(), M["engine_commands"].copy(),
     )  # fmt: skip

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.readout import (
         FrameReadout,
         Instruments,
+        alarm_flags,
         command_power,
         end_outer_loops,
         hold_from_start,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
         recorded_until_alarm,
         set_ground,
         stop_diagnosis,
-        surface_and_sensor_alarm_flags,
     )
     from beaver_ftc.loop.simulation import Asked, Stepping
     from beaver_ftc.loop.stream import FLOW, Diagnosis

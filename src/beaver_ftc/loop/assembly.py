@@ -28,9 +28,9 @@ from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.parity import (
-    USUAL_RECORD_SIZE,
-    StatisticalRecordSize,
-    required_record_size,
+    USUAL_SIZE,
+    StatisticalSize,
+    required_size,
 )
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors import redundancy
@@ -196,7 +196,7 @@ LOGGED = record(estimators=int, sensor_monitor=int, sampled=int, power=int, test
 
 
 @sized
-def frame_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE, line: int = USUAL_LINE) -> np.dtype:
+def frame_dtype(n: int, size: StatisticalSize = USUAL_SIZE, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""
     return record(
@@ -270,15 +270,13 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     anchor(design, trim.x, trim.y, trim.u)
     redundancy.configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
     mass = mass_of(declared.design_model, declared.aircraft)
-    statistical.configure_statistical_detector(
-        fdi, declared.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz
-    )
+    statistical.configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
     """The record of a design, made again."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
-    frames = taken_empty((1,), frame_dtype(aircraft.n, required_record_size(aircraft), line))
+    frames = taken_empty((1,), frame_dtype(aircraft.n, required_size(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
     truth, channels = frame["truth"], truth_read(scenario)
@@ -306,7 +304,7 @@ def reads_accelerometers(frame: np.void) -> bool:
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
-    aircraft, tests = scenario.airframe, fdi["statistical"]["test_config"]
+    aircraft, tests = scenario.airframe, fdi["statistical"]["test"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["config"]["n_estimators"] if diagnoses_itself else 0
     watched = logged["sensor_monitor"] = columns_of_the_monitor(scenario)
@@ -316,6 +314,6 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     moved |= bool(frame["control"]["engines"]["config"]["n"])
     power = aircraft.power_setting if moved else ""
     logged["power"] = 1 + len(aircraft.effectors) if power else 0
-    logged["tests"] = tests["n_score_columns"] if tests["enabled"] else 0
+    logged["tests"] = tests["n_scores"] if tests["enabled"] else 0
     tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
     return ch.log_columns(aircraft, estimators, watched, power, columns, tested, sampled)

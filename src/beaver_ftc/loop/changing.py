@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.state import take_over
-from beaver_ftc.diagnosis.schemes import prepare_takeover_with_previous_maxima
+from beaver_ftc.diagnosis.schemes import prepare_takeover
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -137,5 +137,5 @@ def take_law(frame: np.void, new: np.void) -> None:
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     """Begin the diagnosis again with frame k, as configured in `new`."""
-    prepare_takeover_with_previous_maxima(new["fdi"], frame["fdi"], in_flight=k > 0)
+    prepare_takeover(new["fdi"], frame["fdi"], in_flight=k > 0)
     frame["fdi"], frame["since"] = new["fdi"], k

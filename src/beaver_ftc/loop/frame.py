@@ -30,27 +30,27 @@ from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
 from beaver_ftc.diagnosis.bounds import (
     N_MAP_COORDINATES,
-    error_map_time_row_index,
-    is_coordinate_outside_span_of_boxes,
+    map_row,
+    outside_span,
 )
 from beaver_ftc.diagnosis.conclusion import (
     assess_surfaces,
-    assess_unknown_acceleration_and_pitch,
+    assess_unknown,
     hold_assessment,
-    uses_statistical_estimates,
+    weighs_statistics,
 )
 from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
+from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.diagnosis.model_prediction import (
-    add_instant_and_move_healthy_surfaces,
-    begin_frame_with_instant,
-    evaluate_bound_and_frame_means,
-    evaluate_design_model,
-    fill_acceleration_with_known_faults,
-    store_command_and_move_healthy_surfaces,
+    add_instant,
+    begin_sums,
+    evaluate_design,
+    evaluate_frame,
+    move_surfaces,
+    predict_known,
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.schemes import built_in_detection_threshold_ratio, record_isolated_surfaces
+from beaver_ftc.diagnosis.schemes import detection_share, record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME_NUMBER
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.plant import channels as ch
@@ -155,7 +155,7 @@ def follow_guarantee(guarantee, bank, dt, share, k, t):
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
         for m in range(bank.config.n_filters):
-            effect = bank.config.decay_factor[m] * guarantee.effect[m, i] + dt * mean
+            effect = bank.config.a[m] * guarantee.effect[m, i] + dt * mean
             guarantee.effect[m, i] = effect
             certain = abs(effect) > 2.0 * bank.output.threshold[m, i] > 0.0
             if certain and guarantee.certain_after_s < 0.0:
@@ -218,14 +218,14 @@ def note_inconclusive(inconclusive, fdi, t):
     """Count this frame, and why nothing can be concluded in it; t s."""
     enabled, error_map = fdi.config.enabled, fdi.bound.error_map
     inconclusive.watched += 1
-    if enabled and (error_map.n_boxes == 0 or not error_map.is_outside_all_boxes):
+    if enabled and (error_map.n_boxes == 0 or not error_map.outside):
         return
     if inconclusive.frames == 0:
         inconclusive.from_s = t
     inconclusive.frames += 1
     if not enabled:
         inconclusive.undiagnosed += 1
-    elif error_map_time_row_index(error_map) < 0:
+    elif map_row(error_map) < 0:
         inconclusive.late += 1
     else:
         note_place(inconclusive, error_map)
@@ -236,7 +236,7 @@ def note_place(inconclusive, error_map):
     """Count the quantities in which this place is outside the map."""
     explained = False
     for i in range(error_map.coordinates.size):
-        if is_coordinate_outside_span_of_boxes(error_map, i):
+        if outside_span(error_map, i):
             now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
             inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
             inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
@@ -291,8 +291,8 @@ def record_estimator(fie, started, row, column):
     """Residuals between their limits, once the estimators have started; and whether the fault is excluded."""
     if started:
         for i in range(3):
-            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.lower_threshold[i]
-            row[column + 3 * i + 2] = fie.upper_threshold[i]
+            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.mu_lo[i]
+            row[column + 3 * i + 2] = fie.mu_hi[i]
     row[column + PER_ESTIMATOR - 1] = fie.excluded
 
 
@@ -300,7 +300,7 @@ def record_estimator(fie, started, row, column):
 def record_alarm(bank, row, column):
     """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
     for i in range(3):
-        m = filter_nearest_to_alarm(bank, i)
+        m = nearest_filter(bank, i)
         row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
     return column + 6
 
@@ -318,9 +318,9 @@ def record_used(effectiveness, used, row, column):
 def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if monitor.config.enabled and monitor.memory.start_stage:
+    if monitor.config.enabled and monitor.memory.stage:
         row[column], row[column + 1] = (
-            monitor.output.worst_residual_bound_ratio,
+            monitor.output.top_ratio,
             monitor.output.worst_test_index,
         )
     if columns > 2:
@@ -356,21 +356,24 @@ def monitor_sensors(frame):
     fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        sensor_monitor.set_expected_manifold_pressure(monitor, engine.command[0])
-    sensor_monitor.check_sensors_and_replace_readings(
+        sensor_monitor.expect_pressure(monitor, engine.command[0])
+    sensor_monitor.check_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
-    if monitor.output.alarmed and not (before or monitor.output.keeps_surface_conclusion):
+    att = fdi.statistical.attitude
+    if att.enabled:
+        sensor_monitor.add_turn(monitor, att, frame.measured.signal)
+        if fdi.verdict.detected and att.gyro >= 0 and monitor.output.isolated_sensor < 0:
+            sensor_monitor.name_gyro(monitor, fdi.verdict, att.gyro, t)
+    if monitor.output.alarmed and not (before or monitor.output.keeps_surface):
         reset_surface_diagnosis(fdi)
-    if fdi.statistical.attitude.enabled:
-        sensor_monitor.add_turn_beyond_gyros(monitor, fdi.statistical.attitude, frame.measured.signal)
 
 
 @kernel
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
-    conclusion.withdraw_conclusion_for_sensor_fault(fdi.verdict)
-    verdict.clear_all_accommodation_modes(fdi.types.surface)
+    conclusion.withdraw_conclusion(fdi.verdict)
+    verdict.clear_modes(fdi.types.surface)
     filters.reset_network(fdi.fdae.network)
 
 
@@ -383,7 +386,7 @@ def sense(frame):
         monitor_sensors(frame)
     status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
-        evaluate_design_model(prediction, measured)
+        evaluate_design(prediction, measured)
         effect_of_faults(frame.accounts.guarantee, truth, prediction, measured.y)
     return status
 
@@ -406,7 +409,7 @@ def begin(frame):
     start_clock(frame)
     status = sense(frame)
     if status != NOT_FINITE:
-        evaluate_bound_and_frame_means(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+        evaluate_frame(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     return status
 
 
@@ -420,21 +423,19 @@ def diagnose(frame):
     scheme = fdi.config.scheme_number
     diagnoses_all_types = fdi.config.diagnoses_all_types
     applied = frame.control.surfaces.output
-    monitors.disable_if_differential_thrust(fdi.engine_monitor, frame.control.power.output.command[1:])
+    monitors.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
         schemes.begin_scheme(scheme, fdi, prediction, measured)
     else:
-        fill_acceleration_with_known_faults(
+        predict_known(
             prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
         )
         schemes.advance_estimators_to_frame(scheme, fdi, prediction, measured, k, frame.t)
     schemes.update_verdict(scheme, fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
     schemes.prepare_next_frame(scheme, fdi, prediction, measured, k)
-    begin_frame_with_instant(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
-    follow_guarantee(
-        frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.frame_share_per_instant, k, frame.t
-    )
+    begin_sums(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
+    follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.w, k, frame.t)
     assess_faults(frame)
 
 
@@ -447,9 +448,7 @@ def assess_faults(frame):
         hold_assessment(assessment, types)
     else:
         assess_surfaces(assessment, config, found, types, layout, fdi.isolation.estimator, detector)
-    assess_unknown_acceleration_and_pitch(
-        assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound
-    )
+    assess_unknown(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
 
 
 @kernel
@@ -457,15 +456,13 @@ def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
     schemes.accumulate_substep(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
-    add_instant_and_move_healthy_surfaces(
-        frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured
-    )
+    add_instant(frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured)
 
 
 @kernel
-def estimated_theta_of_isolated_loss(fdi, s):
+def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: see conclusion.py."""
-    return assessed.estimated_theta_of_isolated_loss(
+    return assessed.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )
 
@@ -533,15 +530,13 @@ def fly_profile(frame, commanded):
 @kernel
 def note_beyond_threshold(accounts, fdi, t):
     """Note that a detector is beyond its threshold at t s. A plug-in says so itself."""
-    monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.alarm_authority
+    monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.authority
     if fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
-        uses_statistics = uses_statistical_estimates(detector.test_config, authority)
-        ratio = built_in_detection_threshold_ratio(fdi.bank, detector.alarm, authority, uses_statistics)
-        is_beyond = ratio > 1.0 or (
-            sensor_monitor.has_alarm(monitor) and monitor.output.worst_residual_bound_ratio > 1.0
-        )
+        uses_statistics = weighs_statistics(detector.test, authority)
+        ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
+        is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
     if is_beyond:
         accounts.beyond_threshold_at_s = t
 
@@ -556,8 +551,8 @@ def account(frame):
         if sums.beyond_threshold_at_s < 0.0:
             note_beyond_threshold(sums, frame.fdi, frame.t)
     else:
-        filters.update_max_residual_ratio_by_filter(frame.fdi.bank)
-        statistical.update_max_alarm_score_so_far(frame.fdi.statistical.alarm)
+        filters.keep_bank_peak(frame.fdi.bank)
+        statistical.keep_score_peak(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)
     note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
@@ -580,7 +575,7 @@ def record_row(frame, commanded, row):
     column = put(row, column, fdi.fdae.output.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
-    column = put(row, column, prediction.frame_means.predicted_acceleration)
+    column = put(row, column, prediction.means.F)
     for e in range(logged.estimators):
         if e < fdi.isolation.config.n_estimators:  # else another diagnosis has taken their place
             record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
@@ -597,11 +592,9 @@ def record_row(frame, commanded, row):
     if frame.autopilot.enabled:
         record_profile(frame.autopilot, row, column)
     detector = fdi.statistical
-    if logged.tests and detector.test_config.enabled:
+    if logged.tests and detector.test.enabled:
         views = detector.views[: detector.n_views]
-        statistical.write_alarm_scores_to_log_row(
-            detector.test_config, detector.block, views, detector.forces, detector.gust, row
-        )
+        statistical.write_scores(detector.test, detector.block, views, detector.forces, detector.gust, row)
 
 
 @kernel
@@ -615,7 +608,7 @@ def finish(frame, commanded, row):
     laws.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
     laws.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
-    store_command_and_move_healthy_surfaces(prediction, control.allocation.output.command)
+    move_surfaces(prediction, control.allocation.output.command)
     hand_over(frame.truth, prediction.commanded, control.power.output)
     advance_clock(frame)
     frame.row += 1

@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis import Measured
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.stepping import built_in_detection_threshold_ratio
+from beaver_ftc.loop.stepping import detection_share
 from beaver_ftc.plant.sensing import NOT_FINITE
 
 
@@ -30,8 +30,8 @@ def fly_and_note(frames, references, log, notes):
     at = put(row, 1, frame.measured.x)
     for i in range(4 + frame.truth.declared):
         row[at + i] = frame.measured.y[i]
-    means = frame.prediction.frame_means
-    at = put(row, at + 4 + frame.truth.declared, means.predicted_acceleration)
+    means = frame.prediction.means
+    at = put(row, at + 4 + frame.truth.declared, means.F)
     for axis in range(3):
         at = put(row, at, means.Gu[axis])
     at = put(row, put(row, at, frame.fdi.bound.eta_bar), frame.measured.attitude)
@@ -43,9 +43,9 @@ def fly_and_note(frames, references, log, notes):
     whole.command(frame)
     whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
     error_map = frame.fdi.bound.error_map
-    at = put(row, at, error_map.error_bound_now)
-    row[at] = not error_map.is_outside_all_boxes
-    row[at + 1] = built_in_detection_threshold_ratio(frames)
+    at = put(row, at, error_map.e_now)
+    row[at] = not error_map.outside
+    row[at + 1] = detection_share(frames)
     return status
 
 

@@ -41,7 +41,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
 from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_finding_dict
-from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
+from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.declared import (
@@ -107,7 +107,7 @@ def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
     error_map = frame["fdi"]["bound"]["error_map"]
     if not frame["fdi"]["config"]["enabled"]:
         return NO_DIAGNOSIS
-    if not error_map["n_boxes"] or not error_map["is_outside_all_boxes"]:
+    if not error_map["n_boxes"] or not error_map["outside"]:
         return ""
     spans, names = measured_spans(aircraft), quantities(aircraft)
     place = dict(zip(names, error_map["coordinates"].tolist(), strict=False)) | {
@@ -211,8 +211,8 @@ def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | No
 def _estimate(fdi: np.void, surface: int) -> float:
     """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
     takes a quarter of a second."""
-    if fdi["statistical"]["test_config"]["enabled"]:
-        return float(estimated_theta_of_isolated_loss(fdi, surface))
+    if fdi["statistical"]["test"]["enabled"]:
+        return float(isolated_theta(fdi, surface))
     axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated_estimator"])
     return float(fdi["isolation"]["estimator"][estimator]["theta"][axis])
 
@@ -233,11 +233,7 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
         left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
         if isolated == NOT_ISOLATED:  # a loss that is excluded is no damage excluded
             left += [
-                s
-                for s, taken in zip(
-                    surfaces, fdi["isolation"]["config"]["can_be_lost_by_damage"], strict=True
-                )
-                if taken
+                s for s, taken in zip(surfaces, fdi["isolation"]["config"]["losable"], strict=True) if taken
             ]
         said["candidates"] = tuple(dict.fromkeys(left))
     if isolated >= 0:
@@ -363,13 +359,13 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     """What the statistical detector made of the flight, if there was one."""
-    tests, alarm = fdi["statistical"]["test_config"], fdi["statistical"]["alarm"]
+    tests, alarm = fdi["statistical"]["test"], fdi["statistical"]["alarm"]
     if not tests["enabled"]:
         return None
     return {
         "time_s": _instant(alarm["detected_at_s"]),
         "alarm_level": float(tests["alarm_level"]),
-        "closest_approach": float(alarm["max_score_over_alarm_level_so_far"]),
+        "closest_approach": float(alarm["peak"]),
     }
 
 
@@ -378,7 +374,7 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
     verdict = fdi["verdict"]
     return {
         "detection_time_s": _instant(verdict["detected_at_s"]),
-        "detection_axis": AXES[int(verdict["detected_axis"])] if verdict["detected"] else None,
+        "detection_axis": AXES[int(verdict["axis"])] if verdict["detected"] else None,
     }
 
 
@@ -388,7 +384,7 @@ def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     broken = sensor_monitor_finding(fdi["sensor_monitor"], float(frame["t"]))
     if broken is not None:
         broken["so_far"] = False if broken["isolated"] else None
-        if not monitor["keeps_surface_conclusion"]:
+        if not monitor["keeps_surface"]:
             return {"detection_axis": None, **broken}
     alarm, said = _alarm(fdi), _isolation(fdi, surfaces)
     said["so_far"] = None if said["isolated"] is None else said["isolated"] in surfaces
@@ -413,10 +409,8 @@ _WHY_WITHDRAWN = {
 }
 
 
-def _withdrawn(fdi: np.void, surfaces: Sequence[str], what: str) -> tuple[dict[str, Any], ...]:
-    """What was named and is not any more, with the reason, as many as there is room for; what: `isolations`,
-    of surfaces, or `types`, of surfaces that are still named."""
-    gone = fdi["verdict"][f"withdrawn_{what}"][: int(fdi["verdict"][f"n_withdrawn_{what}"])]
+def _withdrawn(gone: np.ndarray, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
+    """What was named and is not any more, with the reason, as many as there is room for."""
     return tuple(
         {
             "fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]),
@@ -480,7 +474,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
     early = verdict["detected"] and is_before(verdict["detected_at_s"], fault_s)
     if (
         early
-        or fdi["config"]["alarm_authority"] == STATISTICAL_DETECTOR
+        or fdi["config"]["authority"] == STATISTICAL_DETECTOR
         or fdi["sensor_monitor"]["output"]["alarmed"]
     ):
         return None
@@ -507,14 +501,12 @@ def landing_of(
     what changes in flight have ended, `windows` what was found in each."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
     tracking, envelope, supervisor = accounts["tracking"], accounts["envelope"], frame["supervisor"]
-    surfaces, departed = scenario.airframe.surfaces, int(frame["departed"])
+    surfaces, departed, found = scenario.airframe.surfaces, int(frame["departed"]), fdi["verdict"]
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     closest = tuple(
         float(share)
-        for share in fdi["bank"]["output"]["max_residual_over_threshold_so_far"][
-            : max(int(fdi["bank"]["config"]["n_filters"]), 1)
-        ]
+        for share in fdi["bank"]["output"]["peak"][: max(int(fdi["bank"]["config"]["n_filters"]), 1)]
     )
     return Landing(
         scenario=scenario,
@@ -532,9 +524,7 @@ def landing_of(
         end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
-        worst_residual_ratio=max(
-            *closest, float(fdi["statistical"]["alarm"]["max_score_over_alarm_level_so_far"])
-        ),
+        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["peak"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),
@@ -544,8 +534,8 @@ def landing_of(
         arrival=_by_channel(frame, "mean_deviation"),
         limits=_limits(frame, surfaces),
         changes=replaced,
-        withdrawn=_withdrawn(fdi, surfaces, "isolations"),
-        withdrawn_types=_withdrawn(fdi, surfaces, "types"),
+        withdrawn=_withdrawn(found["gone"][: int(found["n_gone"])], surfaces),
+        withdrawn_types=_withdrawn(found["withdrawn_types"][: int(found["n_gone_types"])], surfaces),
         windows=windows,
         inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["actuator_travel"], strict=True)},

@@ -17,8 +17,8 @@ from beaver_ftc.control import Law, Reference, has_kernels, row_of
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds import declared_errors_for_plugin
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CASE_VARIANT_INDEX
+from beaver_ftc.diagnosis.bounds import plugin_errors
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_VARIANT
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
@@ -186,8 +186,8 @@ def measured_of(frame: np.void) -> Measured:
         float(frame["t"]),
         frame["measured"]["x"].copy(),
         frame["measured"]["y"][: len(y_places(frame))].copy(),
-        frame["prediction"]["frame_means"]["predicted_acceleration"].copy(),
-        frame["prediction"]["frame_means"]["Gu"].copy(),
+        frame["prediction"]["means"]["F"].copy(),
+        frame["prediction"]["means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),
         frame["measured"]["attitude"].copy(),
         frame["measured"]["force"].copy() if reads_accelerometers(frame) else np.full(3, nan),
@@ -199,7 +199,7 @@ def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapp
     """What a plug-in is given before the flight; trim: what is known of it."""
     frame, aircraft = frames[0], scenario.airframe
     layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["prediction"]["design"]
-    constant = bound["constant_error_bound"].copy()
+    constant = bound["const"].copy()
     if bound["error_map"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(
@@ -215,7 +215,7 @@ def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapp
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=declared_errors_for_plugin(Declared.of(scenario), design, trim.y, trim.command),
+        declared=plugin_errors(Declared.of(scenario), design, trim.y, trim.command),
     )
 
 
@@ -261,10 +261,10 @@ def plugged(
         fdi["config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = fdi["isolation"]["config"][
             "n_estimators"
         ] = 0
-        fdi["statistical"]["test_config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme_number"], fdi["config"]["isolation_variant"] = (
+        fdi["statistical"]["test"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
+        fdi["config"]["scheme_number"], fdi["config"]["variant"] = (
             PLUGIN_SCHEME_NUMBER,
-            PUBLISHED_WORST_CASE_VARIANT_INDEX,
+            PUBLISHED_VARIANT,
         )
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size

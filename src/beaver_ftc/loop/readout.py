@@ -86,12 +86,12 @@ class FrameReadout:
     @cached_property
     def mean_G(self) -> np.ndarray:
         """The same, mean over the elapsed frame."""
-        return np.array(self._frame["prediction"]["frame_means"]["G"])
+        return np.array(self._frame["prediction"]["means"]["G"])
 
     @cached_property
     def model_rad_s2(self) -> np.ndarray:
         """f + G u by the design model, mean over the elapsed frame, (3,) rad/s2."""
-        return np.array(self._frame["prediction"]["frame_means"]["predicted_acceleration"])
+        return np.array(self._frame["prediction"]["means"]["F"])
 
     @cached_property
     def inertia(self) -> InertiaCoefficients:
@@ -133,7 +133,7 @@ class FrameReadout:
     @cached_property
     def alarmed(self) -> bool:
         """Whether an alarm of the built-in diagnosis stands, of surfaces or of sensors."""
-        return any(map(bool, of_diagnosis.surface_and_sensor_alarm_flags(self._frame["fdi"])))
+        return any(map(bool, of_diagnosis.alarm_flags(self._frame["fdi"])))
 
     @cached_property
     def diagnosis(self) -> DiagnosisReadout:
@@ -162,23 +162,23 @@ class Instruments:
         return bool(self._measured["inertial"])
 
 
-def surface_and_sensor_alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:
+def alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:
     """Whether the alarm of the surfaces stands, and that of the sensor monitor."""
-    return of_diagnosis.surface_and_sensor_alarm_flags(frame["fdi"])
+    return of_diagnosis.alarm_flags(frame["fdi"])
 
 
 def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
     acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
     `diagnosis.readout.recorded_always`."""
-    means = frame["prediction"]["frame_means"]
-    own = {"x": frame["measured"]["x"], "model": means["predicted_acceleration"]}
-    return own | of_diagnosis.certificate_arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
+    means = frame["prediction"]["means"]
+    own = {"x": frame["measured"]["x"], "model": means["F"]}
+    return own | of_diagnosis.frame_arrays(frame["fdi"], n, diagnoses_all_types)
 
 
 def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
     """Those of which it wants the frames up to the alarm: see `diagnosis.readout.recorded_until_alarm`."""
-    return of_diagnosis.current_certificate_arrays(frame["fdi"], n, statistical)
+    return of_diagnosis.alarm_arrays(frame["fdi"], n, statistical)
 
 
 def switch_statistical_tests(frame: np.void, enabled: bool) -> None:
@@ -188,7 +188,7 @@ def switch_statistical_tests(frame: np.void, enabled: bool) -> None:
 
 def stop_diagnosis(frame: np.void) -> None:
     """Stop the diagnosis of surfaces and sensors from the next frame on."""
-    of_diagnosis.disable_surface_and_sensor_diagnosis(frame["fdi"])
+    of_diagnosis.disable_diagnosis(frame["fdi"])
 
 
 WITHHELD = {"verdict": ("uses_verdict", "reallocates"), "stand-in": ("reallocates",)}

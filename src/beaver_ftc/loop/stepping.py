@@ -20,10 +20,10 @@ from beaver_ftc.compiled import apart, borrows, kernel, row_of
 from beaver_ftc.compiled.cache import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
-from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
-from beaver_ftc.diagnosis.model_prediction import redo_last_move_to_command
+from beaver_ftc.diagnosis.conclusion import weighs_statistics
+from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
-from beaver_ftc.diagnosis.schemes import built_in_detection_threshold_ratio as largest_statistic
+from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
@@ -68,13 +68,11 @@ def finish(frames, references, log):
 
 
 @kernel
-def built_in_detection_threshold_ratio(frames):
-    """The built-in detection's statistic at this frame: see schemes.built_in_detection_threshold_ratio."""
+def detection_share(frames):
+    """The built-in detection's statistic at this frame: see schemes.detection_share."""
     fdi = frames[0].fdi
-    alarm, authority = fdi.statistical.alarm, fdi.config.alarm_authority
-    return largest_statistic(
-        fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.test_config, authority)
-    )
+    alarm, authority = fdi.statistical.alarm, fdi.config.authority
+    return largest_statistic(fdi.bank, alarm, authority, weighs_statistics(fdi.statistical.test, authority))
 
 
 @kernel
@@ -83,7 +81,7 @@ def hold(frames):
     frame = frames[0]
     prediction = frame.prediction
     frame.held = 1
-    redo_last_move_to_command(prediction, frame.held_rad)
+    redo_move(prediction, frame.held_rad)
     hand_over(frame.truth, prediction.commanded, frame.control.power.output)
 
 
@@ -145,7 +143,7 @@ def fly_on(frames, references, log, order):
 
 _ROW, _AXES = types.Array(types.float64, 1, "C"), types.NestedArray(types.float64, (3,))
 _NUMBERS = {
-    "k": types.int64, "mode": types.int64, "isolation_started_earlier": types.int64,
+    "k": types.int64, "mode": types.int64, "started": types.int64,
     "by_observer": types.boolean,
     "t": types.float64, "share": types.float64, "probe": types.float64,
     "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,
@@ -177,14 +175,12 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
         scheme.prepare_next_frame,
     )
     if scheme.advance_estimators_to_frame is adaptive_estimators.advance_estimators_to_frame:
-        faults = list(adaptive_estimators.ISOLATION_VARIANT_BY_CLASS_AND_AUTHORITY.values())[
-            fdi["config"]["isolation_variant"]
-        ]
+        faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["variant"]]
         yield from (faults.begin_at_alarm, faults.record_commands, faults.isolate)
-        if fdi["statistical"]["test_config"]["enabled"]:
+        if fdi["statistical"]["test"]["enabled"]:
             yield from (
-                adaptive_estimators.update_statistical_tests,
-                adaptive_estimators.update_gusts_and_prepare_tests,
+                adaptive_estimators.update_tests,
+                adaptive_estimators.prepare_gusts,
             )
     if fdi["sensor_monitor"]["config"]["enabled"]:
         yield whole.monitor_sensors

@@ -171,8 +171,8 @@ class Diagnosis:
         predictions of the design model.
         """
         innovation = self._fdi["bank"]["output"]["innovation"]
-        bound = self._fdi["bound"]["frame_innovation_bound"]
-        return innovation.copy(), bound.copy(), self._frame["prediction"]["frame_means"]["Gu"].copy()
+        bound = self._fdi["bound"]["nu_max"]
+        return innovation.copy(), bound.copy(), self._frame["prediction"]["means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:
         """The design model xdot = f + G u at the last sample, as the tuple (f, G): f (3,) rad/s², G (3,

@@ -8,11 +8,11 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import isolated_surface
 from beaver_ftc.diagnosis.model_prediction import (
-    evaluate_bound_and_frame_means,
-    evaluate_design_model,
-    store_command_and_move_healthy_surfaces,
+    evaluate_design,
+    evaluate_frame,
+    move_surfaces,
 )
-from beaver_ftc.loop.frame import accommodate, advance_clock, estimated_theta_of_isolated_loss, start_clock
+from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
@@ -31,10 +31,10 @@ def take(frames, x, y, command, attitude):
     prediction, measured = frame.prediction, frame.measured
     start_clock(frame)
     if frame.k > 0:
-        store_command_and_move_healthy_surfaces(prediction, command)
+        move_surfaces(prediction, command)
     take_sample(measured, x, y, attitude)
-    evaluate_design_model(prediction, measured)
-    evaluate_bound_and_frame_means(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
+    evaluate_design(prediction, measured)
+    evaluate_frame(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
 
 
@@ -59,7 +59,7 @@ def accommodate_and_advance(frames):
 def theta(frames):
     """The estimate of the isolated loss of effectiveness, of the published class."""
     fdi = frames[0].fdi
-    return estimated_theta_of_isolated_loss(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
+    return isolated_theta(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
 
 
 @kernel
@@ -72,33 +72,27 @@ def news(frames, known):
     changed = replace(known, 0, fdi.verdict.detected)
     if not fdi.verdict.detected:
         return changed
-    changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(
-        known, 2, fdi.verdict.isolated_estimator
-    )
+    changed |= replace(known, 1, fdi.verdict.axis) | replace(known, 2, fdi.verdict.isolated_estimator)
     excluded = 0
     for i in range(fdi.isolation.config.n_estimators):
         excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
     changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.fault_type)
     if fdi.config.diagnoses_all_types:
-        for plane in range(fdi.types.pair.group_has_alarm.size):
-            changed |= replace(known, 5 + plane, fdi.types.pair.group_has_alarm[plane])
+        for plane in range(fdi.types.pair.group_alarm.size):
+            changed |= replace(known, 5 + plane, fdi.types.pair.group_alarm[plane])
         for s in range(fdi.types.surface.size):
-            changed |= news_of(
-                fdi.types.surface[s], fdi.types.config.slowest_half_cycle_frames, known[8 + 5 * s :]
-            )
+            changed |= news_of(fdi.types.surface[s], fdi.types.config.half_frames, known[8 + 5 * s :])
     return changed
 
 
 @kernel
-def news_of(surface, slowest_half_cycle_frames, known):
+def news_of(surface, half_frames, known):
     """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
-    for kind in range(surface.feasible_sets.excluded.size):
-        bits = 2 * bits + surface.feasible_sets.excluded[kind]
-    early = surface.evidence.n_anomalous_frames - surface.evidence.n_rest_frames < slowest_half_cycle_frames
-    changed = replace(known, 0, surface.status.is_isolated) | replace(
-        known, 1, surface.status.can_be_at_fault_basis
-    )
+    for kind in range(surface.sets.excluded.size):
+        bits = 2 * bits + surface.sets.excluded[kind]
+    early = surface.evidence.n_anomalous - surface.evidence.n_rest < half_frames
+    changed = replace(known, 0, surface.status.is_isolated) | replace(known, 1, surface.status.basis)
     changed |= replace(known, 2, surface.status.fault_type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)
 

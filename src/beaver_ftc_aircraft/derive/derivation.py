@@ -30,7 +30,7 @@ from beaver_ftc.aircraft import (
     read_aircraft,
 )
 from beaver_ftc.design import design_record
-from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL_NAME
+from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL
 from beaver_ftc.documents import BadInput, SimulationFailed, put_folder
 from beaver_ftc.plant import (
     AT_IDLE,
@@ -285,7 +285,7 @@ def _derived(
     first = sample_all(plant, about, SAMPLES, 1, properties, FRESH, moves)
     if not declared:
         wanted = engine_signals(first, flown, plant.aircraft)
-        wanted += [THRUST_SIGNAL_NAME] if plant.aircraft.effectors else []
+        wanted += [THRUST_SIGNAL] if plant.aircraft.effectors else []
         useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")

@@ -18,9 +18,9 @@ from scipy.linalg import lstsq
 from beaver_ftc.aircraft import AXES, MOMENTS, Aircraft, MassProperties
 from beaver_ftc.design import inertia_coefficients, inertial
 from beaver_ftc.diagnosis.monitors import (
-    ENGINE_YAWING_MOMENT_SIGNAL_NAME,
-    THRUST_SIGNAL_NAME,
-    healthy_yawing_moment_per_thrust,
+    THRUST_SIGNAL,
+    YAW_SIGNAL,
+    yaw_per_thrust,
 )
 from beaver_ftc.plant import ENGINE_SIGNALS
 from beaver_ftc.studies.engine import Forks
@@ -312,10 +312,7 @@ def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike
     """Fill in how unlike engines pull in each box, if they are mirrored; alike: states with all their levers
     where one is. Of others nobody has measured what they do while levers move: a c310's alarmed."""
     of = alike.signals
-    apart = np.abs(
-        of[ENGINE_YAWING_MOMENT_SIGNAL_NAME]
-        - healthy_yawing_moment_per_thrust(aircraft) * of[THRUST_SIGNAL_NAME]
-    )
+    apart = np.abs(of[YAW_SIGNAL] - yaw_per_thrust(aircraft) * of[THRUST_SIGNAL])
     for i, box in enumerate(boxes if apart.max() < MIRRORED else ()):
         box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)
 

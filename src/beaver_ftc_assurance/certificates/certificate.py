@@ -17,7 +17,7 @@ import numpy as np
 from beaver_ftc.design import AXES
 from beaver_ftc.diagnosis import LOSS, scheme_number
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis.detection import filter_poles_per_s
+from beaver_ftc.diagnosis.detection import filter_poles
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import LogSink
 from beaver_ftc.results import Log, ParquetLog, StoredLog
@@ -340,7 +340,7 @@ def _type_statements(scenario: Scenario, tape: Tape, history: History, alarm: in
             "what": kinds.exclusion_name(surface, kind), "column": kinds.exclusion_column(surface, kind),
             "frame": kinds.exclusion_row(frames[0], s, kind),
         }  # fmt: skip
-        followed = bool(TYPES[kind].multi_frame_exclusion_test_name)
+        followed = bool(TYPES[kind].frames_test)
         if because is None and not followed and TYPES[kind].deflection_relation is None:
             because = kinds.UNKNOWN_TYPE
         if because is not None:
@@ -372,7 +372,7 @@ def _statement(found: Found, history: History, because: str, **about: Any) -> Do
 
 def _detection_poles(scenario: Scenario) -> list[float]:
     """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
-    return list(filter_poles_per_s(scenario.fdi, Declared.of(scenario)))
+    return list(filter_poles(scenario.fdi, Declared.of(scenario)))
 
 
 def _alarm_inequality(scenario: Scenario, tape: Tape, history: History, k: int) -> Found:

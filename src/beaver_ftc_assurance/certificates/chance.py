@@ -19,11 +19,11 @@ from beaver_ftc.diagnosis import (
     StatisticalHypothesis,
 )
 from beaver_ftc.diagnosis.detection import (
-    NOISE_SHARE_OF_ALARM_LEVEL,
+    LEVEL_NOISE_SHARE,
     advance_block,
     new_filter_block,
-    onset_slot_restarting_at_frame,
     response_of_block,
+    restarting_slot,
     whiten_frame,
 )
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
@@ -49,9 +49,7 @@ def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: in
     """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
     diagnosis = tape.alarm.diagnosis
     b, h, slot = _largest_score(diagnosis.statistical_filters)
-    first = next(
-        (r for r in range(k, tape.first, -1) if onset_slot_restarting_at_frame(r - tape.since) == slot), None
-    )
+    first = next((r for r in range(k, tape.first, -1) if restarting_slot(r - tape.since) == slot), None)
     if first is None or k - first > MAX_WRITTEN_FRAMES:
         return None
     hypothesis = diagnosis.statistical_filters[b].hypotheses[h]
@@ -183,19 +181,19 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axis_indices[i] for i in felt]
     square = np.ix_(range(len(rows)), felt, felt)
     known = [j for j in np.flatnonzero(block.regressor_coefficient_error_bound > 0.0).tolist()
-             if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
-    drift = dt * then["drift_intensity"][square]  # which is felt a frame later
+             if now["g_Z"][:, j][:, felt].any()]  # fmt: skip
+    drift = dt * then["Q_d"][square]  # which is felt a frame later
     drift[1:], drift[0] = drift[:-1].copy(), 0.0
-    before = then["regressor_filter_state"][:, known][..., states]
-    response = now["regressor_response"][:, known][..., felt]
+    before = then["x_Z"][:, known][..., states]
+    response = now["g_Z"][:, known][..., felt]
     its = {
         "signature": now["signature"][:, h][:, felt],
-        "jitter": dt * dt * then["model_noise_variance"][:, felt],
+        "jitter": dt * dt * then["Q_x"][:, felt],
         "drift": drift, "bounded": tape.filters["bounded"][here][:-1][:, axes],
-        "pace": then["uncertainty_change_over_bound_per_frame"],
+        "pace": then["eta_rate"],
     }  # fmt: skip
     if block.drift_correlation_length_m > 0.0:
-        its["keep"] = then["drift_decay_factor"]
+        its["keep"] = then["a"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
     if diagnosis.gust.is_turbulence_declared:
@@ -206,8 +204,8 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         )
     tests_by_onset = block.hypothesis_tests_by_onset
     sense, explained = tests_by_onset.supporting_correlation_sign[h, slot], {
-        "predictable_innovation_in_calm_air": tests_by_onset.correlation_predictable_in_calm_air,
-        "coarse_gust_response": tests_by_onset.correlation_from_coarse_gust,
+        "p": tests_by_onset.correlation_predictable_in_calm_air,
+        "g_c": tests_by_onset.correlation_from_coarse_gust,
     }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss
@@ -221,7 +219,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     return {
         "level": diagnosis.statistical_alarm_level, "axes": axes, "sense": "less" if sense else "either",
         "tolerance": [float(block.regressor_coefficient_error_bound[j]) for j in known],
-        "R": of["gyro_noise_variance"][0, felt].tolist(), "Y": Y.tolist(),
+        "R": of["R_y"][0, felt].tolist(), "Y": Y.tolist(),
         "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart
         "first": rows[0], "frames": frames,
     }  # fmt: skip
@@ -229,9 +227,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
 
 def _affected_axes(of: Mapping[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
     """The axes of a block of n that the fault moves; both where what is not known moves them together."""
-    together = n > 1 and any(
-        of[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "drift_intensity")
-    )
+    together = n > 1 and any(of[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "Q_d"))
     return [i for i in range(n) if together or signature[:, i].any()]
 
 
@@ -314,7 +310,7 @@ def _run_filter(said: Document, frames: _FilterInputs, P: np.ndarray, R: np.ndar
 def add_whitened_frames(blocks, inputs, drift, frame_parameters, states, sums, room, dt):
     """Run a filter, blocks (1,), over `_FilterInputs`, and add w.g of each frame to `sums` (columns,): g, the
     whitened innovation of each column, w = S^-1 g of the second, the signature. See
-    `likelihood.whiten_signatures_and_accumulate_sums`.
+    `likelihood.accumulate_tests`.
 
     states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
     pace, in the last frame, as it stays; and of the first of `sums` the prediction for calm air.
@@ -322,24 +318,24 @@ def add_whitened_frames(blocks, inputs, drift, frame_parameters, states, sums, r
     block, g, w = blocks[0], np.zeros((len(states), 2)), np.zeros(2)
     for k in range(len(inputs)):
         given = frame_parameters[k]
-        block.drift_decay_factor = given[DRIFT_COLUMN, 0]
-        for i in range(block.n_axes):
-            block.model_noise_variance[i] = given[MODEL_NOISE_COLUMN, i]
-            for j in range(block.n_axes):
+        block.a = given[DRIFT_COLUMN, 0]
+        for i in range(block.n):
+            block.Q_x[i] = given[MODEL_NOISE_COLUMN, i]
+            for j in range(block.n):
                 block.P_dd[i, j] += drift[k, i, j]
         advance_block(block, dt)
         response_of_block(block, given[BOUNDED_ERROR_COLUMN], dt)
         for c in range(len(states)):
             whiten_frame(block, states[c], inputs[k, c], dt, g[c])
         room[2] = 0.0
-        for i in range(block.n_axes):
+        for i in range(block.n):
             before, w[i] = w[i], 0.0
-            for j in range(block.n_axes):
-                w[i] += block.S_inverse[i, j] * g[1, j]
-            room[0] += block.transient_response_sum_bound[i] * abs(w[i] - before)
-            room[1] += given[DRIFT_COLUMN, 1] * block.transient_response_sum_bound[i] * abs(w[i])
-            room[2] += block.transient_response_sum_bound[i] * abs(w[i])
-            room[3] += block.settled_uncertainty_response_bound[i] * abs(w[i])
+            for j in range(block.n):
+                w[i] += block.S_inv[i, j] * g[1, j]
+            room[0] += block.eta_r[i] * abs(w[i] - before)
+            room[1] += given[DRIFT_COLUMN, 1] * block.eta_r[i] * abs(w[i])
+            room[2] += block.eta_r[i] * abs(w[i])
+            room[3] += block.eta_0[i] * abs(w[i])
             room[4] += w[i] * given[CALM_PREDICTION_COLUMN, i]
             for c in range(len(states)):
                 sums[c] += w[i] * g[c, i]
@@ -350,7 +346,7 @@ def _evidence_and_limit(said: Document, sums: _WhitenedSums) -> tuple[float, flo
     N, D, *R = sums.totals.tolist()
     root = said["level"] * sqrt(D) if D >= 0.0 else nan
     of_swings, of_pace = (
-        room + NOISE_SHARE_OF_ALARM_LEVEL * root for room in (sums.room_by_swings, sums.room_by_change_rate)
+        room + LEVEL_NOISE_SHARE * root for room in (sums.room_by_swings, sums.room_by_change_rate)
     )
     decides = (
         LIMIT_BY_NOISE

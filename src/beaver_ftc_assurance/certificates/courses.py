@@ -144,7 +144,7 @@ def _exclude_runaway(
     """A runaway at its least rate or faster: a later frame shows less travel. In a frame of several instants
     the lower bound may hold from its last instant on only: a frame less counts."""
     rate, high_stop = actuator.min_runaway_rate_rad_s, bounds.stops[1]
-    step, late_frames = rate * config.block_duration_s, int(not config.frame_shows_single_instant)
+    step, late_frames = rate * config.block_duration_s, int(not config.single_instant)
     # lower bound of each frame, traced back to frame 0 at the least rate
     traced_back = np.where(
         bounds.is_unexplained,
@@ -171,9 +171,7 @@ def _exclude_oscillation(
     period."""
     for axis, lower in enumerate(bounds.lower.T):
         starts = run_starts(bounds.is_unexplained & (lower > bounds.command + MIN_POSITION_DIFFERENCE_RAD))
-        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.slowest_half_cycle_blocks)[
-            :1
-        ].tolist():
+        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.half_blocks)[:1].tolist():
             run = range(int(starts[k]), k + 1)
             half_period_frames = pi / bounds.slowest_oscillation_rad_s / config.dt_s
             pairs = [(k - run[0], half_period_frames), *_positive_pairs(lower - bounds.command, run)]
@@ -185,11 +183,9 @@ def _exclude_rate_limit(
 ) -> Iterator[Exclusion]:
     """A surface that approaches its order by its least step in every instant, until its lag makes the steps
     smaller: in a run of frames beyond all orders, a later one shows a position farther away."""
-    min_step = actuator.min_rate_limited_motion_per_substep_rad
+    min_step = actuator.slow_step_rad
     min_approach = config.n_substeps * config.frames_per_block * min_step  # of a frame, rad
-    lag_distance = (
-        min_step / actuator.approach_share_per_substep
-    )  # from the order, within which the steps are smaller
+    lag_distance = min_step / actuator.approach_share  # from the order, within which the steps are smaller
     for axis, lower in enumerate(bounds.lower.T):
         is_beyond = bounds.is_unexplained & (lower > bounds.max_order + MIN_POSITION_DIFFERENCE_RAD)
         starts = run_starts(is_beyond)
@@ -240,7 +236,7 @@ def statement_by_course(
         TYPES[fault_type].stop_direction,
         diagnosis.surface_fault_types[surface].actuator,
     )
-    rule = RULES[TYPES[fault_type].multi_frame_exclusion_test_name]
+    rule = RULES[TYPES[fault_type].frames_test]
     slowest_rad_s = scenario.fdi.slowest_oscillation_rad_s
     for sign in (direction,) if direction else (1, -1):
         bounds = _surface_bounds(tape, history, held, surface, alarm_frame, sign, slowest_rad_s)
@@ -261,7 +257,7 @@ def _surface_bounds(
     """The bounds of the frames from the alarm on that the diagnosis has tested types with."""
     frames = np.arange(alarm_frame, tape.end - 1)
     here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
-    frame_shows_single_instant = history.instant_share == 1.0
+    single_instant = history.instant_share == 1.0
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)
     if sign < 0:
         lower, upper = -upper, -lower
@@ -270,14 +266,12 @@ def _surface_bounds(
     command = axis_commands[:, np.abs(slope).sum(axis=0).argmax()]
     orders = tape.command_high if sign > 0 else -tape.command_low
     reach = np.column_stack([tape.least[here, surface, 0], tape.greatest[here, surface, 0]])[:, ::sign] * sign
-    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (
-        not frame_shows_single_instant
-    )
+    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not single_instant)
     actuator = tape.last.diagnosis.surface_fault_types[surface].actuator
     stops = np.sort(sign * np.array([actuator.travel_low_rad, actuator.travel_high_rad]))
     next_frames = slice(here.start + 1, here.stop + 1)
     max_order = np.maximum(
-        orders[next_frames, surface, 2], orders[next_frames, surface, 2 if frame_shows_single_instant else 1]
+        orders[next_frames, surface, 2], orders[next_frames, surface, 2 if single_instant else 1]
     )
     is_unexplained = is_unexplained_by_health(history, frames)
     return SurfaceBounds(

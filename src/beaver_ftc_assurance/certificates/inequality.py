@@ -135,7 +135,7 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
     )
     return DeclaredErrors(
         inertia_coupling=bound.inertia_coupling_error_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
-        constant_rad_s2=bound.constant_part_of_error_bound_rad_s2,
+        constant_rad_s2=bound.constant_error_rad_s2,
         earth_rad_s=bound.earth_rate_rad_s, earth_gain=np.maximum(gains, 1.0),
         gyro_offset_rad_s=bound.gyro_error_bound_at_rest_rad_s,
         gyro_constant_rad_s=bound.constant_gyro_error_bound_rad_s,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from beaver_ftc.diagnosis import SensorMonitor
-from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_TESTS_WITH_EQUATION, RPM_TEST
+from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_EQUATIONS, RPM_TEST
 from beaver_ftc.plant import ENGINE_SPEED, SENSORS
 from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.inequality import Document
@@ -26,8 +26,8 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
 
     monitor: at the alarm.
     """
-    number, failed = monitor.worst_test_index, monitor.worst_residual_bound_ratio > 1.0
-    if failed and number >= N_TESTS_WITH_EQUATION:
+    number, failed = monitor.worst_test_index, monitor.top_ratio > 1.0
+    if failed and number >= N_EQUATIONS:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
         looks = [look for look in _looks(monitor) if any(look)]
@@ -57,20 +57,20 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     last sample; then what the filter and its bound keep of all samples before."""
     test, number = monitor.worst_test, monitor.worst_test_index
     if number >= RPM_TEST:
-        predicted = float(monitor.commanded_engine_readings[number - RPM_TEST])
-        bound = float(monitor.reading_error_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING
+        predicted = float(monitor.engine_commands[number - RPM_TEST])
+        bound = float(monitor.reading_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING
         yield [predicted + test.residual, predicted, bound]
         return
     reading = TESTS[number]
     predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
-    pole = int(np.argmax(np.abs(test.filtered_residual_by_pole) / test.filtered_bound_by_pole))
+    pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s
         + test.bound_per_sample
-        + test.residual_per_gust_speed_change * monitor.filtered_gust_change_bound_by_pole_mps[pole]
+        + test.gust_gain * monitor.gust_change_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
-    filtered, bound = test.filtered_residual_by_pole[pole], test.filtered_bound_by_pole[pole]
+    filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]
     earlier = np.array([filtered - test.residual, bound - sample_bound])
     earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(filtered), bound])] = 0.0
     yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

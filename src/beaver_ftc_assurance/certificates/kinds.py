@@ -28,7 +28,7 @@ OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
 HELD_ANYWHERE = DeflectionRelation(
-    command_gain=0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
+    command_gain=0.0, theta_is_share=False, theta_span=lambda low, high: (low, high)
 )
 
 
@@ -45,12 +45,10 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 def reason_not_certified(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm.diagnosis.types_config
-    if TYPES[kind].has_shown is not None and not config.frame_shows_single_instant:
+    if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
     return (
-        RETURNING_SURFACE
-        if config.released_surface_returns_via_actuator and TYPES[kind].on_possible_release is not None
-        else None
+        RETURNING_SURFACE if config.returns_lagged and TYPES[kind].on_possible_release is not None else None
     )
 
 
@@ -69,14 +67,12 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}
-    if row.multi_frame_exclusion_test_name:
-        return {f"{name}_course_{row.multi_frame_exclusion_test_name.replace(' ', '_')}": row.stop_direction}
+    if row.frames_test:
+        return {f"{name}_course_{row.frames_test.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
     actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
-    low, high = row.deflection_relation.theta_range_for_travel(
-        actuator.travel_low_rad, actuator.travel_high_rad
-    )
+    low, high = row.deflection_relation.theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
     return {
         f"{name}_gain": row.deflection_relation.command_gain,
         f"{name}_theta_is_share": float(row.deflection_relation.theta_is_share),
@@ -114,7 +110,7 @@ def _effect_of_relation(
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     actuator = diagnosis.surface_fault_types[surface].actuator
-    low, high = relation.theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
+    low, high = relation.theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
     offset, slope = (relation.command_gain - 1.0) * Gu, Gu if relation.theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0

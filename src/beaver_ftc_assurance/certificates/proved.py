@@ -65,7 +65,7 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
             shares |= {
-                "watch_share": monitor.worst_residual_bound_ratio,
+                "watch_share": monitor.top_ratio,
                 "watch_test": monitor.worst_test_index,
             }
         values = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]  # as in a log of ours

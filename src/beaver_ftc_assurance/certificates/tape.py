@@ -9,22 +9,22 @@ import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis import estimator_names
-from beaver_ftc.diagnosis.detection import N_ONSET_SLOTS
+from beaver_ftc.diagnosis.detection import N_SLOTS
 from beaver_ftc.loop import (
     FrameReadout,
     Loop,
+    alarm_flags,
     copy_memory,
     fly,
     give_back_memory,
     recorded_always,
     recorded_until_alarm,
-    surface_and_sensor_alarm_flags,
     take_memory,
 )
 from beaver_ftc.scenario import Scenario
 
 FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
-STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_ONSET_SLOTS + 2  # with the statistical detector: its oldest onset
+STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
 KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
 MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm
 FIRST_ROOM_AFTER_ALARM = 1 << 10  # frames for which there is room at first; doubled when it is used up
@@ -103,7 +103,7 @@ class Recorder:
         config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
         self._always = _RecordWords(recorded_always(numbers[0], n, config.fault_class == "all"))
         self._early = _RecordWords(recorded_until_alarm(numbers[0], n, config.statistical is not None))
-        self._state = np.array([0, -1, 0, *surface_and_sensor_alarm_flags(numbers[0])])
+        self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
         ring = 1 + (FRAMES_BEFORE_ALARM if config.statistical is None else STATISTICAL_FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)

@@ -135,7 +135,7 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ({}, {}), ({"projection": 0}, {"least": -np.inf, "most": np.inf, "weight_limit": np.inf}),
+        ({}, {}), ({"projection": 0}, {"least": -np.inf, "most": np.inf, "w_max": np.inf}),
         ({"network": 0}, {"networks": 0}), ({"adaptation": 0}, {"adapts": 0}),
         ({"hand_over": 0}, {"reallocates": 0}),
     ],
@@ -153,17 +153,17 @@ def test_every_option_of_the_published_law_is_in_its_record(options, expected):
     feedback = control["zhang2005"]["feedback"]["config"]
     found = {name: law[name].item() for name in law.dtype.names} | {
         "Kp": feedback["Kp"], "Ki": feedback["Ki"], "network_gain": network["gain"],
-        "weight_limit": network["weight_limit"], "reallocates": control["config"]["reallocates"],
+        "w_max": network["w_max"], "reallocates": control["config"]["reallocates"],
         "uses_verdict": control["config"]["uses_verdict"],
     }  # fmt: skip
     usual = {
         "adapts": 1, "networks": 1, "gain": 30.0, "integral_weight": 3.1 / (5.0 * 0.7 + 1.0), "least": 0.15,
-        "most": 1.0, "Kp": 3.1, "Ki": 0.7, "network_gain": 70.0, "weight_limit": 8.0, "reallocates": 1,
+        "most": 1.0, "Kp": 3.1, "Ki": 0.7, "network_gain": 70.0, "w_max": 8.0, "reallocates": 1,
         "uses_verdict": 1,
     }  # fmt: skip
     assert found == pytest.approx(usual | expected)
-    assert network["first_centre"][:, 2].tolist() == [-0.3, -0.5, -0.4]
-    assert network["centre_spacing"][:, 2] == pytest.approx([0.325, 0.525, 0.425])
+    assert network["c0"][:, 2].tolist() == [-0.3, -0.5, -0.4]
+    assert network["dc"][:, 2] == pytest.approx([0.325, 0.525, 0.425])
 
 
 INTEGRAL, UNKNOWN, LEARNT, FOUND = (

@@ -91,8 +91,7 @@ class TestTheDiagnosisIsNotDisturbed:
         for rows in loop.chunks():
             memory.write(rows)
             behind = np.abs(
-                loop.frames[0]["prediction"]["u_before"]
-                - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4]
+                loop.frames[0]["prediction"]["u_old"] - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4]
             )
         assert behind.max() < 1e-9
 

@@ -297,8 +297,8 @@ class TestVerdict:
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
         surface, frame["fdi"]["config"]["diagnoses_all_types"] = frame["fdi"]["types"]["surface"][RUDDER], 1
-        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["last_observation"]
-        elapsed["healthy_position"], elapsed["position_low"], elapsed["position_high"] = 0.1, 0.02, 0.06
+        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["last"]
+        elapsed["u"], elapsed["lo"], elapsed["hi"] = 0.1, 0.02, 0.06
         assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
         assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
 

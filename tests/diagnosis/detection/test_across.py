@@ -38,7 +38,7 @@ def test_a_flight_has_them_or_not(substeps):
     detector = loop.frames["fdi"]["statistical"][0]
     assert detector["n_views"] == (13 if substeps == 1 else 0)
     # one share of the false alarms each, of a tone as of a step: exp(-l^2 / 2) beyond a level l of two parts
-    share = NormalDist().cdf(-detector["test_config"]["alarm_level"]) if substeps == 1 else 1.0
+    share = NormalDist().cdf(-detector["test"]["alarm_level"]) if substeps == 1 else 1.0
     assert np.exp(-(detector["tone_test_config"]["alarm_level"] ** 2) / 2.0) == pytest.approx(share, rel=1e-6)
     loop.release()
 
@@ -47,7 +47,7 @@ def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():
     """A law that goes by the vanes moves the elevator before the gyros feel a gust."""
     loop = Loop(scenario(duration_s=1, **declared("light")))
     views = loop.frames["fdi"]["statistical"]["views"][0]
-    assert [int(view["block"]["n_hypotheses"]) for view in views[:5]] == [1, 3, 3, 2, 2]
+    assert [int(view["block"]["n_h"]) for view in views[:5]] == [1, 3, 3, 2, 2]
     loop.release()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds import detection_poles_for_delays
+from beaver_ftc.diagnosis.bounds import poles_for_delays
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -17,19 +17,17 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
     noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
-        fdi["bound"]["changing_gyro_error_bound"] = noise[k + 1]
-        on(filters.update_innovation_and_filter_bank, fdi, x[k + 1], x[k], believed[k])
+        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta[k], noise[k]
+        fdi["bound"]["n_gyro"] = noise[k + 1]
+        on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
-    assert fdi["bound"]["frame_innovation_bound"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
+    assert fdi["bound"]["nu_max"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
     for m, decay in enumerate(np.exp(-POLES * DT)):
         w = weights(decay, frames)
         assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        assert fdi["bank"]["memory"]["threshold_uncertainty_part"][m] == pytest.approx(DT * w @ eta)
-        assert fdi["bank"]["memory"]["threshold_gyro_error_part"][m] == pytest.approx(
-            (1.0 - decay) * w @ noise[:-1]
-        )
+        expected = DT * w @ eta + (1.0 - decay) * w @ noise[:-1]
+        assert fdi["bank"]["memory"]["e"][m] == pytest.approx(expected)
         whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
         assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
 
@@ -47,30 +45,28 @@ CALM, LEAVES = [[0.1, -0.2, 0.3]] * 3, [[0.1, 0.5, 0.2], [0.3, -1.5, 0.1], [0.4,
 
 
 def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
-    assert on(filters.bank_alarm_axis, with_shares(*CALM)) == -1
-    assert (
-        on(filters.bank_alarm_axis, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1
-    )  # at its bound is within
-    assert on(filters.bank_alarm_axis, with_shares(*LEAVES)) == 1
-    assert [filters.filter_nearest_to_alarm(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
-    assert on(filters.max_residual_threshold_ratio, with_shares(*LEAVES)) == pytest.approx(1.5)
+    assert on(filters.bank_axis, with_shares(*CALM)) == -1
+    assert on(filters.bank_axis, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1  # at its bound is within
+    assert on(filters.bank_axis, with_shares(*LEAVES)) == 1
+    assert [filters.nearest_filter(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
+    assert on(filters.bank_share, with_shares(*LEAVES)) == pytest.approx(1.5)
 
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3], alarm["score_over_alarm_level"] = (
+    fdi["bank"]["output"]["peak"][:3], alarm["ratio"] = (
         (0.6, 0.0, 0.0),
         0.4,
     )
-    filters.update_max_residual_ratio_by_filter(fdi["bank"])
-    statistical.update_max_alarm_score_so_far(alarm)
-    assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert alarm["max_score_over_alarm_level_so_far"] == 0.4
+    filters.keep_bank_peak(fdi["bank"])
+    statistical.keep_score_peak(alarm)
+    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.6, 1.5, 1.2])
+    assert alarm["peak"] == 0.4
     silent = new_fdi()
-    filters.update_max_residual_ratio_by_filter(silent["bank"])
-    assert not silent["bank"]["output"]["max_residual_over_threshold_so_far"].any()
-    assert on(filters.max_residual_threshold_ratio, silent) == 0.0
+    filters.keep_bank_peak(silent["bank"])
+    assert not silent["bank"]["output"]["peak"].any()
+    assert on(filters.bank_share, silent) == 0.0
 
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
@@ -78,7 +74,7 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
     fdi["isolation"]["config"]["n_estimators"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(filters.set_estimator_parity_directions, fdi, G)
+    on(filters.set_directions, fdi, G)
     assert fdi["isolation"]["estimator"]["parity_direction"][0] == pytest.approx([-0.8, 0.0, -0.6])
     assert fdi["isolation"]["estimator"]["parity_direction"][0] @ G[:, 2] == pytest.approx(0.0)
     assert not fdi["isolation"]["estimator"]["parity_direction"][1].any()
@@ -88,9 +84,9 @@ def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
     fdi = new_fdi()
     fie = estimator(fdi, low=low, high=high)
     (
-        fie["frame_mean_effect"]["acceleration_at_zero_theta"],
-        fie["frame_mean_effect"]["regressor"],
-        fie["frame_mean_effect"]["error_bound"],
+        fie["effect"]["base"],
+        fie["effect"]["regressor"],
+        fie["effect"]["e"],
     ) = (
         offset,
         Z,
@@ -106,15 +102,15 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     rng = np.random.default_rng(seed)
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
-        on(filters.advance_reachable_residuals, fdi, fie)
-    effect, across = fie["frame_mean_effect"], np.vstack([np.eye(3), fie["parity_direction"]])
-    at_ends = [effect["acceleration_at_zero_theta"] + theta * effect["regressor"] for theta in (-1.0, 0.5)]
+        on(filters.advance_reach, fdi, fie)
+    effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
+    at_ends = [effect["base"] + theta * effect["regressor"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
-    spread = np.abs(across) @ effect["error_bound"]
+    spread = np.abs(across) @ effect["e"]
     for m, decay in enumerate(np.exp(-POLES * DT)):
         kept = DT * weights(decay, 3).sum()
-        assert fie["reachable_bank_residual_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
-        assert fie["reachable_bank_residual_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
+        assert fie["reach_lo"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
+        assert fie["reach_hi"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
 
 
 @pytest.mark.parametrize("m", range(3))
@@ -124,18 +120,18 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     def explained(beyond, ignored_axes=False):
         fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
         (
-            fie["reachable_bank_residual_low"],
-            fie["reachable_bank_residual_high"],
+            fie["reach_lo"],
+            fie["reach_hi"],
             fdi["bank"]["output"]["threshold"],
         ) = (
             -0.3,
             0.5,
             0.1,
         )
-        fie["ignored_axes"][axis] = ignored_axes
+        fie["skip"][axis] = ignored_axes
         limit = -0.4 if side < 0 else 0.6
         fdi["bank"]["output"]["residual"][m, axis] = limit + side * beyond
-        return bool(on(filters.are_residuals_reachable, fdi, fie, True))
+        return bool(on(filters.is_reachable, fdi, fie, True))
 
     assert explained(-1e-9)
     assert not explained(1e-9)
@@ -145,16 +141,16 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
 @pytest.mark.parametrize("side", [-1, 1])
 def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     fdi, fie = reach_of(0.0, 0.0, 0.0)
-    fie["reachable_bank_residual_low"][:, :3], fie["reachable_bank_residual_high"][:, :3] = -9.0, 9.0
-    fie["reachable_bank_residual_low"][:, 3], fie["reachable_bank_residual_high"][:, 3] = -0.2, 0.3
+    fie["reach_lo"][:, :3], fie["reach_hi"][:, :3] = -9.0, 9.0
+    fie["reach_lo"][:, 3], fie["reach_hi"][:, 3] = -0.2, 0.3
     fdi["bank"]["output"]["threshold"][:3] = 0.1
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
         fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie[
             "parity_direction"
         ]  # a unit vector
-        assert bool(on(filters.are_residuals_reachable, fdi, fie, True)) == within
-        assert on(filters.are_residuals_reachable, fdi, fie, False)
+        assert bool(on(filters.is_reachable, fdi, fie, True)) == within
+        assert on(filters.is_reachable, fdi, fie, False)
 
 
 def test_a_filter_without_a_bound_has_no_share_of_it():
@@ -162,17 +158,17 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     fdi = with_shares(*LEAVES)
     fdi["bank"]["output"]["threshold"][0] = 0.0
     with np.errstate(divide="ignore"):
-        assert on(filters.max_residual_threshold_ratio, fdi) == pytest.approx(1.5)
-        assert [filters.filter_nearest_to_alarm(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.update_max_residual_ratio_by_filter(fdi["bank"])
-    assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.0, 1.5, 1.2])
-    assert on(filters.bank_alarm_axis, fdi) == 0
+        assert on(filters.bank_share, fdi) == pytest.approx(1.5)
+        assert [filters.nearest_filter(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
+        filters.keep_bank_peak(fdi["bank"])
+    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.0, 1.5, 1.2])
+    assert on(filters.bank_axis, fdi) == 0
 
 
 def test_of_filters_that_are_equally_near_the_published_one_is_named():
-    assert filters.filter_nearest_to_alarm(new_fdi()["bank"], 0) == 0
-    assert filters.filter_nearest_to_alarm(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
-    assert filters.filter_nearest_to_alarm(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
+    assert filters.nearest_filter(new_fdi()["bank"], 0) == 0
+    assert filters.nearest_filter(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
+    assert filters.nearest_filter(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
 
 
 @pytest.mark.parametrize("size", [9.0, 0.3])
@@ -180,9 +176,9 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
     fie = estimator(fdi)
     G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(filters.set_estimator_parity_directions, fdi, G)
+    on(filters.set_directions, fdi, G)
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(filters.set_estimator_parity_directions, fdi, np.zeros((3, 4)))
+    on(filters.set_directions, fdi, np.zeros((3, 4)))
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
 
 
@@ -195,13 +191,13 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     asked |= {"sharpen": {"pole_bank": several}}
     scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
     config = scenario.fdi
-    fdi["bank"]["config"]["decay_factor"] = 0.0
-    filters.fill_bank_decay_factors(fdi["bank"], config, Declared.of(scenario), DT)
+    fdi["bank"]["config"]["a"] = 0.0
+    filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = detection_poles_for_delays(SensorErrors(config.bounds.sensors), bound)
+    for_noise = poles_for_delays(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy
     poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
     apart(poles=poles)
     assert fdi["bank"]["config"]["n_filters"] == len(poles)
-    assert fdi["bank"]["config"]["decay_factor"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
-    assert not fdi["bank"]["config"]["decay_factor"][len(poles) :].any()
+    assert fdi["bank"]["config"]["a"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
+    assert not fdi["bank"]["config"]["a"][len(poles) :].any()

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis.detection import likelihood
-from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_ONSET_SLOTS, STEP_FAULT
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_SLOTS, STEP_FAULT
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
 
@@ -32,7 +32,7 @@ def _shown(block, nu, signatures, regressors=None, first=0, keep=1.0):
     frames, n = nu.shape
     wide = np.zeros((frames, signatures.shape[1], 2))
     wide[:, :, :n] = signatures
-    known = np.zeros((frames, int(block["n_regressors"]), 2))
+    known = np.zeros((frames, int(block["n_Z"]), 2))
     if regressors is not None:
         known[:, :, :n] = regressors
     weigh_all(block, nu, wide, known, first, keep, regressors is not None, DT)
@@ -43,8 +43,8 @@ def _onsets(frames):
     """By slot, the frame at which it last began anew: slot j at odd multiples of 2^j."""
     starts = {}
     for k in range(frames):
-        twos = N_ONSET_SLOTS - 1 if k == 0 else (k & -k).bit_length() - 1
-        starts[min(twos, N_ONSET_SLOTS - 1)] = k
+        twos = N_SLOTS - 1 if k == 0 else (k & -k).bit_length() - 1
+        starts[min(twos, N_SLOTS - 1)] = k
     return starts
 
 
@@ -53,7 +53,7 @@ def _onsets(frames):
 def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case, frames):
     rng = np.random.default_rng(frames)
     block = _block(case, LOSS, STEP_FAULT, tolerance=(0.1, 0.2, 0.3))
-    n = int(block["n_axes"])
+    n = int(block["n"])
     inverse = np.linalg.inv(covariance(block, frames, DT))
     signatures, regressors = rng.normal(size=(frames, 2, n)), rng.normal(size=(frames, 3, n))
     nu = drawn(block, frames, DT, rng, start=1.0)
@@ -65,9 +65,7 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
             assert information[slot, h] == pytest.approx(s @ inverse @ s, rel=1e-6)
             assert correlation[slot, h] == pytest.approx(s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9)
             overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
-            assert by_onset(block, "regressor_correlation")[:3, slot, h] == pytest.approx(
-                overlap, rel=1e-6, abs=1e-9
-            )
+            assert by_onset(block, "R")[:3, slot, h] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
 
 
 def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
@@ -76,7 +74,7 @@ def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
     normal, estimate, information = [], [], []
     for _ in range(flights):
         block = _block(case, STEP_FAULT)
-        n = int(block["n_axes"])
+        n = int(block["n"])
         signature = scale * rng.normal(size=(frames, 1, n))
         nu = drawn(block, frames, DT, rng, start=1.0) + theta * signature[:, 0]
         _shown(block, nu, signature)
@@ -127,8 +125,8 @@ def test_errors_of_coefficients_within_their_tolerance_never_add_to_a_score(case
     for h in range(3):
         before, after = clean["hypothesis"][h], careful["hypothesis"][h]
         assert after["score"] <= before["score"] + 1e-9
-        assert after["llr_lower_bound"] <= before["llr_lower_bound"] + 1e-9
-        assert after["llr_upper_bound"] >= before["llr_upper_bound"] - 1e-9
+        assert after["llr_lo"] <= before["llr_lo"] + 1e-9
+        assert after["llr_hi"] >= before["llr_hi"] - 1e-9
 
 
 def test_the_worst_corner_takes_all_of_the_allowance():
@@ -139,12 +137,12 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     nu = drawn(_block("two axes"), frames, DT, rng)
     clean = by_onset(_shown(_block("two axes", STEP_FAULT), nu, signatures), "correlation")[-1, 0]
     blank = _shown(_block("two axes", STEP_FAULT, tolerance=tolerance), nu, signatures, regressors)
-    worst = np.sign(clean) * np.sign(by_onset(blank, "regressor_correlation")[:2, -1, 0]) * tolerance
+    worst = np.sign(clean) * np.sign(by_onset(blank, "R")[:2, -1, 0]) * tolerance
     wrong = nu + np.einsum("j,kjn->kn", worst, regressors)
     block = _shown(_block("two axes", STEP_FAULT, tolerance=tolerance), wrong, signatures, regressors)
     seen, slack = (
         by_onset(block, "correlation")[-1, 0],
-        by_onset(block, "max_correlation_by_coefficient_errors")[-1, 0],
+        by_onset(block, "e_R")[-1, 0],
     )
     assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
@@ -159,8 +157,8 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
     """Any d within its bound, long after the filter has settled; the worst one goes with the signs of w."""
     rng, settled, frames, eta_bar = np.random.default_rng(seed), 600, 90, 0.02
     block = _block(case, STEP_FAULT)
-    n = int(block["n_axes"])
-    block["alarm_level"], block["uncertainty_change_over_bound_per_frame"] = 6.6, np.inf
+    n = int(block["n"])
+    block["alarm_level"], block["eta_rate"] = 6.6, np.inf
     signature = np.zeros((settled + frames, 1, n))
     signature[settled:] = np.cumsum(rng.normal(size=(frames, 1, n)), axis=0)
     size = {"bang-bang": np.sign(rng.normal(size=(settled + frames, n))), "constant": np.ones(n)}.get(
@@ -178,19 +176,14 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
 def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
     return np.array(
-        [
-            likelihood.max_correlation_by_uncertainty(
-                block["onset_tests"][0], k, *block["transient_response_sum_bound"]
-            )
-            for k in range(N_ONSET_SLOTS)
-        ]
+        [likelihood.uncertain_share(block["tests"][0], k, *block["eta_r"]) for k in range(N_SLOTS)]
     )
 
 
 def test_the_allowance_is_not_absurdly_wide():
     """A step against a step at its onset: the difference of two bounds, and what the ringing is given."""
     block = _block("one axis", STEP_FAULT)
-    block["alarm_level"], block["uncertainty_change_over_bound_per_frame"] = 6.6, np.inf
+    block["alarm_level"], block["eta_rate"] = 6.6, np.inf
     signature = np.zeros((800, 1, 1))
     signature[640:] = 1.0
     d = 0.02 * np.ones((800, 1))
@@ -203,10 +196,10 @@ def test_the_allowance_is_not_absurdly_wide():
 
 def test_there_is_always_an_onset_of_about_every_age():
     """Within a factor of two, up to as many frames as the slots can tell apart."""
-    frames, oldest = 3000, 2 ** (N_ONSET_SLOTS - 1)
-    onset = np.zeros(N_ONSET_SLOTS, int)
+    frames, oldest = 3000, 2 ** (N_SLOTS - 1)
+    onset = np.zeros(N_SLOTS, int)
     for k in range(frames):
-        onset[likelihood.onset_slot_restarting_at_frame(k)] = k
+        onset[likelihood.restarting_slot(k)] = k
         ages = k - onset
         age = np.arange(1, min(k, oldest) + 1)[:, None]
         assert np.any((ages >= age / 2) & (ages <= 2 * age), axis=1).all(), k
@@ -223,7 +216,7 @@ def test_each_frame_counts_keep_times_what_the_next_one_counts():
         block = _block("one axis", STEP_FAULT, tolerance=(0.1, 0.2))
         _shown(block, nu[:k], signatures[:k], regressors[:k], keep=keep)
         N, D = by_onset(block, "correlation")[-1, 0], by_onset(block, "information")[-1, 0]
-        return np.array([N, D, *by_onset(block, "regressor_correlation")[:2, -1, 0]])
+        return np.array([N, D, *by_onset(block, "R")[:2, -1, 0]])
 
     each = np.diff([np.zeros(4), *(after(k, 1.0) for k in range(1, frames + 1))], axis=0)
     assert after(frames, keep) == pytest.approx(keep ** np.arange(frames)[::-1] @ each, rel=1e-9)
@@ -235,15 +228,15 @@ GUSTS, QUIET_RAD_S, FRAME_S = np.array([[18.0]]), 1.7e-3, 1 / 229
 def _beside(block):
     """The block with the filter that reckons with no gust, as it begins."""
     for name in (
-        "n_axes",
-        "drift_decay_factor",
-        "gyro_noise_variance",
-        "model_noise_variance",
+        "n",
+        "a",
+        "R_y",
+        "Q_x",
         "P_xx",
         "P_dd",
     ):
-        block["no_gust_filter"][name] = block[name]
-    block["no_gust_filter"]["drift_intensity"][0, 0] = 0.01
+        block["calm"][name] = block[name]
+    block["calm"]["Q_d"][0, 0] = 0.01
     return block
 
 
@@ -252,11 +245,11 @@ def _largest_share(block, innovations, moments, shown=None):
     gust, by the vanes."""
     block["alarm_level"], most = 0.0, 0.0
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
-        block["coarse_gust_response"][0] = 0.0 if shown is None else shown[k]
-        likelihood.reset_onset_slot(block, likelihood.onset_slot_restarting_at_frame(k))
-        block["frame_innovation"][0], block["hypothesis"][0]["signature"][0] = nu, moment
-        if block["no_gust_filter"]["n_axes"]:
-            likelihood.whiten_by_no_gust_filter(block, FRAME_S)
+        block["g_c"][0] = shown[k] if block["has_coarse"] else 0.0
+        likelihood.reset_slot(block, likelihood.restarting_slot(k))
+        block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
+        if block["calm"]["n"]:
+            likelihood.whiten_calm(block, FRAME_S)
         likelihood.update_block(block, np.zeros(3), False, FRAME_S, 1.0)
         most = max(most, block["hypothesis"][0]["score"])
     return most
@@ -290,7 +283,7 @@ def _answers_the_vanes(shown):
         flow = lfilter([1.0], [1.0, -np.exp(-FRAME_S / 2.0)], rng.standard_normal(601))
         pitching = 10.0 * lfilter([1.0 - lag], [1.0, -lag], np.diff(flow))
         block = with_hypotheses(block_of(GUSTS, [QUIET_RAD_S]), LOSS)
-        block["has_coarse_gust_estimate"] = shown
+        block["has_coarse"] = shown
         noise = np.diff(QUIET_RAD_S * rng.standard_normal(601)) / FRAME_S
         innovations = pitching + noise
         shares.append(_largest_share(block, innovations, -flow[:-1], pitching))

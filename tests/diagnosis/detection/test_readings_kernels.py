@@ -56,11 +56,11 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
     alone, design, flown_there = at(state, sensors=BIASES)
     declared_errors = alone.fdi["bound"]["declared_errors"]
     for which in range(N_INPUT_READINGS):
-        found = moved(design, *flown_there, which, float(declared_errors["power_error_kw_per_density_ratio"]))
-        error = STEADY[which] if which < POWER else float(declared_errors["power_error_kw_by_instruments"])
+        found = moved(design, *flown_there, which, float(declared_errors["kw1"]))
+        error = STEADY[which] if which < POWER else float(declared_errors["kw0"])
         for block in alone.blocks:
-            n, axes = int(block["n_regressors"]) - N_INPUT_READINGS + which, block["axes"][: block["n_axes"]]
-            assert block["regressor_tolerance"][n] == pytest.approx(error)
+            n, axes = int(block["n_Z"]) - N_INPUT_READINGS + which, block["axes"][: block["n"]]
+            assert block["tol"][n] == pytest.approx(error)
             assert block["regressor"][n, : len(axes)] == pytest.approx(found[axes], rel=1e-5, abs=1e-9)
 
 
@@ -68,30 +68,28 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
     thin, detector = (
-        float(alone.fdi["bound"]["declared_errors"]["power_error_kw_per_density_ratio"]),
+        float(alone.fdi["bound"]["declared_errors"]["kw1"]),
         alone.detector,
     )
-    expected = detector["noise"]["acceleration_variance_without_air_data"].copy()
+    expected = detector["noise"]["Q0"].copy()
     for which in range(N_INPUT_READINGS):
-        expected += (
-            moved(design, *flown_there, which, thin) * detector["noise"]["reading_noise_std"][which]
-        ) ** 2
-    assert detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(expected, rel=1e-5)
+        expected += (moved(design, *flown_there, which, thin) * detector["noise"]["sigma"][which]) ** 2
+    assert detector["noise"]["Q"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
-        axes = block["axes"][: block["n_axes"]]
-        assert block["model_noise_variance"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
+        axes = block["axes"][: block["n"]]
+        assert block["Q_x"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
 
 
 def test_without_errors_of_the_air_data_nothing_is_read():
     alone = Detector(100.0, bounds={"coefficients": 0.05})
-    assert alone.detector["noise"]["has_reading_errors"] == 0
-    assert Detector(100.0).detector["test_config"]["uses_regressors"] == 0
+    assert alone.detector["noise"]["noisy"] == 0
+    assert Detector(100.0).detector["test"]["regress"] == 0
     gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
     record = alone.detector
     declared_errors = alone.fdi["bound"]["declared_errors"]
-    before = record["block"]["n_regressors"].copy()
-    statistical.configure_reading_regressors(record, SensorErrors(gyros), declared_errors)
-    assert list(record["block"]["n_regressors"]) == list(before)
+    before = record["block"]["n_Z"].copy()
+    statistical.configure_readings(record, SensorErrors(gyros), declared_errors)
+    assert list(record["block"]["n_Z"]) == list(before)
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 
 
@@ -102,11 +100,11 @@ def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():
     kept = []
     for mean in (np.zeros(3), gust):
         alone = Detector(100.0, bounds={"turbulence": "light"})
-        alone.detector["gust"]["output"]["mean_angular_acceleration_by_gust"] = mean
+        alone.detector["gust"]["output"]["acc_mean"] = mean
         alone.watch(innovations + mean, Gu, np.ones(2))
-        kept.append([block["onset_tests"] for block in alone.blocks])
+        kept.append([block["tests"] for block in alone.blocks])
     still, moving = kept
-    assert any(np.abs(lane["signature_at_loss_end"]).max() > 0.01 for lane in still)
+    assert any(np.abs(lane["s"]).max() > 0.01 for lane in still)
     for one, other in zip(still, moving, strict=True):
         for name in one.dtype.names:
             assert other[name] == pytest.approx(one[name], abs=1e-9), name

@@ -11,7 +11,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, KW_TO_DPT, design_record, evaluate, regressors, response
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import statistical
-from beaver_ftc.diagnosis.detection.likelihood import N_ONSET_SLOTS, PITCH_BLOCK
+from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import SIGNALS
@@ -33,11 +33,11 @@ SETTINGS = {
 @pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
 def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
     alone = Detector(rate_hz, bounds={"turbulence": turbulence})
-    hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_hypotheses"]]]
-    tests = sum(N_ONSET_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["raises_alarm"])
-    tail = norm.sf(alone.detector["test_config"]["alarm_level"])
+    hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_h"]]]
+    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
+    tail = norm.sf(alone.detector["test"]["alarm_level"])
     assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
-    margin = np.sqrt(2 * alone.detector["test_config"]["isolation_llr_margin"])
+    margin = np.sqrt(2 * alone.detector["test"]["margin"])
     assert norm.sf(margin) * tests * rate_hz == pytest.approx(1e-4, rel=1e-6)
 
 
@@ -48,8 +48,8 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
     so: tests of neighbouring onsets and frames go together."""
     alone = Detector(rate_hz, bounds=SETTINGS[setting])
-    tests = statistical.n_tests_per_frame(load())
-    alone.detector["test_config"]["alarm_level"] = statistical.derive_alarm_level(per_h, rate_hz, tests)
+    tests = statistical.count_tests(load())
+    alone.detector["test"]["alarm_level"] = statistical.derive_alarm_level(per_h, rate_hz, tests)
     hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
     frames = round(hours * 3600.0 * rate_hz)
     scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)
@@ -146,9 +146,7 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
     aircraft, table = load(), design["moments"]
-    tolerance = bound_kernels.equivalent_coefficient_error_bounds(
-        declared_in(bounds, aircraft), design, MASS, y, np.zeros(4)
-    )
+    tolerance = bound_kernels.coefficient_bounds(declared_in(bounds, aircraft), design, MASS, y, np.zeros(4))
     axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
     for _ in range(50):
         x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
@@ -170,10 +168,10 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
     aircraft, design = load(), design_record()[0]
-    tolerance = bound_kernels.equivalent_coefficient_error_bounds(
+    tolerance = bound_kernels.coefficient_bounds(
         declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
-    inertia = bound_kernels.equivalent_coefficient_error_bounds(
+    inertia = bound_kernels.coefficient_bounds(
         declared_in(Bounds.model_validate({"inertia": 0.05}), aircraft), design, MASS, *LEVEL_FLIGHT[1:]
     )
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)
@@ -188,22 +186,20 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     x, y, u = LEVEL_FLIGHT
     sensors = Bounds.model_validate(TACTICAL).sensors
     square, around = np.zeros(3), np.concatenate([x, y[:4]])
-    thin_kw = float(alone.fdi["bound"]["declared_errors"]["power_error_kw_per_density_ratio"])
+    thin_kw = float(alone.fdi["bound"]["declared_errors"]["kw1"])
     for i, name in enumerate(SIGNALS):
         moved, error = around.copy(), getattr(sensors, name).noise_bias_quantum[0]
         moved[i] += error if i < 3 else 0.0
         told = misread(y, i - 3, error, thin_kw) if i >= 3 else y
         square += (_rates(design, moved[:3], told, u) - _rates(design, x, y, u)) ** 2
-    by_power = np.append(
-        y[:4], y[4] + KW_TO_DPT * float(alone.detector["noise"]["reading_noise_std"][4]) / (y[3] * y[2])
-    )
+    by_power = np.append(y[:4], y[4] + KW_TO_DPT * float(alone.detector["noise"]["sigma"][4]) / (y[3] * y[2]))
     square += (_rates(design, x, by_power, u) - _rates(design, x, y, u)) ** 2
-    assert alone.detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(square, rel=0.02)
+    assert alone.detector["noise"]["Q"] == pytest.approx(square, rel=0.02)
     for block in alone.blocks:
-        n = block["n_axes"]
-        assert block["model_noise_variance"][:n] == pytest.approx(square[block["axes"][:n]], rel=0.02)
+        n = block["n"]
+        assert block["Q_x"][:n] == pytest.approx(square[block["axes"][:n]], rel=0.02)
     half_a_degree = np.abs(_rates(design, x, y, u) - _rates(design, x, y, u + np.deg2rad([0, 0.5, 0, 0])))[1]
-    assert alone.detector["noise"]["deflection_error_effect_bound"][1] >= half_a_degree
+    assert alone.detector["noise"]["eta_u"][1] >= half_a_degree
     calm = Detector(100.0, bounds=TACTICAL)
-    assert alone.blocks[0]["drift_intensity"][0, 0] > calm.blocks[0]["drift_intensity"][0, 0]
+    assert alone.blocks[0]["Q_d"][0, 0] > calm.blocks[0]["Q_d"][0, 0]
     assert PITCH_BLOCK == 0

@@ -13,10 +13,10 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.parity import (
     AXIS_VIEW,
-    N_TONE_FREQUENCIES,
-    ORTHOGONAL_TO_VANE_ERROR,
-    TONE_FREQUENCIES_RAD_S,
+    N_TONES,
     TONE_MEMORY_S,
+    TONES_RAD_S,
+    VANE_VIEW,
 )
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
@@ -35,20 +35,20 @@ def view(rng):
     view = new_fdi()["statistical"]["views"][0]
     block = view["block"]
     (
-        block["n_axes"],
-        block["n_regressors"],
-        block["drift_decay_factor"],
-        block["noise_share_of_alarm_level"],
+        block["n"],
+        block["n_Z"],
+        block["a"],
+        block["noise_share"],
     ) = 1, 3, 1.0, 0.5
-    block["S_inverse"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
-    block["regressor_tolerance"][:3], view["uncertainty_bound"] = rng.uniform(0.1, 0.2, 3), 0.05
+    block["S_inv"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
+    block["tol"][:3], view["eta"] = rng.uniform(0.1, 0.2, 3), 0.05
     return view
 
 
 @pytest.fixture
 def tone_test_config():
     tone_test_config = new_fdi()["statistical"]["tone_test_config"]
-    parity.configure_tone_tests(tone_test_config, CHANCE, V, PACE, DT)
+    parity.configure_tones(tone_test_config, CHANCE, V, PACE, DT)
     return tone_test_config
 
 
@@ -56,43 +56,37 @@ def listen(
     view, tone_test_config, samples, regressors=None, heard=True, uses_regressors=False, alarm_level=6.0
 ):
     for k, sample in enumerate(samples):
-        view["block"]["unscaled_white_innovation_rad_s"][0] = sample
+        view["block"]["g"][0] = sample
         if regressors is not None:
-            view["block"]["regressor_response"][:3, 0] = regressors[k]
-        parity.update_tone_tests(view, tone_test_config, alarm_level, heard, uses_regressors, DT)
+            view["block"]["g_Z"][:3, 0] = regressors[k]
+        parity.update_tones(view, tone_test_config, alarm_level, heard, uses_regressors, DT)
 
 
 def resonance(samples):
     """The sums written out: of every two samples, the last one fresh, for each frequency."""
     sums = np.asarray(samples).reshape(-1, EVERY).sum(axis=1)
     age_s = EVERY * DT * np.arange(len(sums))[::-1]
-    return np.exp(np.multiply.outer(1j * TONE_FREQUENCIES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
-
-
-def as_complex(pair):
-    return pair[0] + 1j * pair[1]
+    return np.exp(np.multiply.outer(1j * TONES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
 
 
 def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_test_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
     listen(view, tone_test_config, samples, regressors, uses_regressors=True)
-    found = view["tone_tests"]
-    assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
+    found = view["tones"]
+    assert found["N"] == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
-        assert as_complex(found["regressor_correlation"][j]) == pytest.approx(
-            resonance(2.0 * regressors[:, j])
-        )
+        assert found["R"][j] == pytest.approx(resonance(2.0 * regressors[:, j]))
     faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
-    assert found["correlation_variance"] == pytest.approx(EVERY * faded)
-    assert not found["regressor_correlation"][3:].any()
+    assert found["D"] == pytest.approx(EVERY * faded)
+    assert not found["R"][3:].any()
 
 
 def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_test_config):
     listen(view, tone_test_config, [50.0])
-    assert (view["tone_tests"]["score"], view["tone_tests"]["correlation_variance"]) == (0.0, 0.0)
+    assert (view["tones"]["score"], view["tones"]["D"]) == (0.0, 0.0)
     listen(view, tone_test_config, [50.0])
-    assert view["tone_tests"]["score"] > 0.0
-    assert (view["tone_tests"]["frames_since_update"], view["tone_tests"]["normalised_innovation_sum"]) == (
+    assert view["tones"]["score"] > 0.0
+    assert (view["tones"]["n_new"], view["tones"]["sum_g"]) == (
         0,
         0.0,
     )
@@ -101,21 +95,19 @@ def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_test_config):
 def test_what_is_not_heard_lets_the_rest_fade(view, tone_test_config, rng):
     samples = rng.normal(size=20)
     listen(view, tone_test_config, samples)
-    then = np.abs(as_complex(view["tone_tests"]["correlation"]))
+    then = np.abs(view["tones"]["N"])
     listen(view, tone_test_config, np.full(10, 1e6), heard=False)
-    assert np.abs(as_complex(view["tone_tests"]["correlation"])) == pytest.approx(
-        then * exp(-10 * DT / TONE_MEMORY_S)
-    )
+    assert np.abs(view["tones"]["N"]) == pytest.approx(then * exp(-10 * DT / TONE_MEMORY_S))
 
 
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
 def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
     block = view["block"]
-    block["K_x"][0, 0], block["K_d"][0, 0], block["drift_decay_factor"] = K_x, K_d, keep
+    block["K_x"][0, 0], block["K_d"][0, 0], block["a"] = K_x, K_d, keep
     out, response = np.zeros(2), []
     for k in range(6000):
-        likelihood.advance_whitening_filter(
+        likelihood.whiten_step(
             block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out
         )
         response.append(out[0])
@@ -125,26 +117,22 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = parity.whitened_unit_tone_amplitude(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = parity.tone_gain(K_x, K_d, keep, np.exp(1j * angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
 def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_test_config):
     bounds = [0.05, 0.02, 0.0, 0.09] * 8
     for bound in bounds:
-        view["uncertainty_bound"] = bound
+        view["eta"] = bound
         listen(view, tone_test_config, np.zeros(EVERY))
-    angle = TONE_FREQUENCIES_RAD_S * DT
-    passed = np.array(
-        [parity.whitened_unit_tone_amplitude(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle]
-    )
+    angle = TONES_RAD_S * DT
+    passed = parity.tone_gain(0.3, 0.8, 1.0, np.exp(1j * angle), DT)
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
-    beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)
-    mean = parity.derive_max_tone_mean_of_uncertainty(TONE_FREQUENCIES_RAD_S, PACE)
-    assert view["tone_tests"]["max_correlation_by_uncertainty"] == pytest.approx(
-        2.0 * passed * mean * (faded.sum() + beat)
-    )
+    beat = np.abs(np.exp(np.multiply.outer(2j * TONES_RAD_S, age_s)) @ faded)
+    mean = parity.max_tone_mean(TONES_RAD_S, PACE)
+    assert view["tones"]["eta"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
@@ -170,7 +158,7 @@ def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, 
     triangle = np.arcsin(np.cos(phase))  # of slope one
     wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
     assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        parity.derive_max_tone_mean_of_uncertainty(np.array([x]), 1.0)[0], rel=1e-6
+        parity.max_tone_mean(np.array([x]), 1.0)[0], rel=1e-6
     )
 
 
@@ -184,37 +172,25 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = parity.derive_max_tone_mean_of_uncertainty(np.array([x]), 1.0)[0]
+    most = parity.max_tone_mean(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
-    record = new_fdi()["statistical"]["views"][0]["tone_tests"]
-    record["regressor_correlation"][0, :, 4], size = parts, np.hypot(*parts)
-    parity.fill_max_correlation_by_coefficient_errors(record, np.array([0.3]), 1)
-    assert (
-        0.3 * size * (1.0 - 1e-12)
-        <= record["max_correlation_by_coefficient_errors"][4]
-        <= 0.3 * 1.0825 * size + 1e-300
-    )
-    assert record["max_correlation_by_coefficient_errors"][5] == 0.0
+    record = new_fdi()["statistical"]["views"][0]["tones"]
+    record["R"][0, 4], size = complex(*parts), np.hypot(*parts)
+    parity.bound_coefficients(record, np.array([0.3]), 1)
+    assert 0.3 * size * (1.0 - 1e-12) <= record["e_R"][4] <= 0.3 * 1.0825 * size + 1e-300
+    assert record["e_R"][5] == 0.0
 
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
-    record = view["tone_tests"]
-    record["regressor_correlation"][:] = 9.0
-    (
-        record["regressor_correlation"][:2, 0],
-        record["regressor_correlation"][:2, 1],
-        record["max_correlation_by_coefficient_errors"],
-    ) = (
-        -3.0,
-        0.0,
-        7.0,
-    )
-    parity.fill_max_correlation_by_coefficient_errors(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["max_correlation_by_coefficient_errors"] == pytest.approx(np.full(N_TONE_FREQUENCIES, 0.9))
+    record = view["tones"]
+    record["R"][:] = 9.0 + 9.0j
+    record["R"][:2], record["e_R"] = -3.0, 7.0
+    parity.bound_coefficients(record, np.array([0.1, 0.2, 0.4]), 2)
+    assert record["e_R"] == pytest.approx(np.full(N_TONES, 0.9))
 
 
 def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_test_config, rng):
@@ -222,11 +198,7 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
     noise = rng.normal(size=(4000, 300))
     loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
     age_s = EVERY * DT * np.arange(150)
-    root = np.sqrt(
-        tone_test_config["larger_complex_part_variance_share"]
-        * EVERY
-        * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
-    )
+    root = np.sqrt(tone_test_config["v_share"] * EVERY * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum())
     for x in (1.0, 2.0, 3.0):
         share = np.mean(loud / root > x, axis=0)
         assert (share < exp(-0.5 * x * x) + 3.0 * sqrt(exp(-0.5 * x * x) / 4000)).all()
@@ -234,41 +206,29 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
 
 
 def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_test_config):
-    record = view["tone_tests"]
-    record["correlation_variance"], record["correlation"][0, 3], record["correlation"][1, 3] = (
-        100.0,
-        60.0,
-        80.0,
-    )
-    (
-        record["max_correlation_by_coefficient_errors"][3],
-        record["correlation"][0, 7],
-        tone_test_config["larger_complex_part_variance_share"][:],
-    ) = (
-        10.0,
-        12.0,
-        0.6,
-    )
-    parity.fill_max_tone_score(record, tone_test_config, 6.0)
-    root = sqrt(100.0 * tone_test_config["larger_complex_part_variance_share"][3])
+    record = view["tones"]
+    record["D"], record["N"][3], record["N"][7] = 100.0, 60.0 + 80.0j, 12.0
+    record["e_R"][3], tone_test_config["v_share"] = 10.0, 0.6
+    parity.score_tones(record, tone_test_config, 6.0)
+    root = sqrt(100.0 * tone_test_config["v_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["max_correlation_by_uncertainty"][3] = 200.0
-    parity.fill_max_tone_score(record, tone_test_config, 6.0)
+    record["eta"][3] = 200.0
+    parity.score_tones(record, tone_test_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
-    record["correlation"][:] = 0.0
-    parity.fill_max_tone_score(record, tone_test_config, 6.0)
+    record["N"][:] = 0.0
+    parity.score_tones(record, tone_test_config, 6.0)
     assert record["score"] == 0.0
 
 
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
 def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequency_rad_s):
-    view["uncertainty_bound"] = 0.0
+    view["eta"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
     listen(view, tone_test_config, samples, alarm_level=LEVEL)
     whole = (
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation
-    assert 0.6 * whole < view["tone_tests"]["score"] < 1.1 * whole
+    assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
 
 
 def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_test_config):
@@ -277,7 +237,7 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone
         y[AIRSPEED] = V
         for place, value in changed.items():
             y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
-        return parity.is_within_envelope(tone_test_config, y)
+        return parity.within_limits(tone_test_config, y)
 
     assert flow()
     assert flow(V=23.0)
@@ -296,11 +256,11 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone
 
 
 def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
-    view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 2, 3.0
-    view["tone_tests"]["score"] = 2.0
-    assert parity.max_test_score_of_view(view) == 3.0
-    view["tone_tests"]["score"] = 4.0
-    assert parity.max_test_score_of_view(view) == 4.0
+    view["block"]["n_h"], view["block"]["hypothesis"]["score"] = 2, 3.0
+    view["tones"]["score"] = 2.0
+    assert parity.view_score(view) == 3.0
+    view["tones"]["score"] = 4.0
+    assert parity.view_score(view) == 4.0
 
 
 @pytest.mark.parametrize(
@@ -311,14 +271,14 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
         (0, (0, SIDE_FORCE), {SIDE_FORCE: -0.95, 0: 0.3}, 0, 9.0),
         (0, (0, SIDE_FORCE), {SIDE_FORCE: 0.85, 0: 0.5}, 0, 0.0),
         (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (ORTHOGONAL_TO_VANE_ERROR, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
+        (VANE_VIEW, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
     ],
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
     statistical = new_fdi()["statistical"]
     (
-        statistical["test_config"]["alarm_level"],
-        statistical["test_config"]["isolation_llr_margin"],
+        statistical["test"]["alarm_level"],
+        statistical["test"]["margin"],
         statistical["n_views"],
     ) = (
         5.0,
@@ -327,24 +287,24 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
     )
     statistical["gust"]["output"]["uses_accelerometers"] = statistical["forces"]["in_use"] = 1
     view, clearing = statistical["views"][:2]
-    clearing["is_immune_to_vane_error"], clearing["plane_axes"], clearing["decaying_peak_score"] = (
+    clearing["vane_free"], clearing["plane_pair"], clearing["peak"] = (
         1,
         (YAW, SIDE_FORCE),
         50.0,
     )
-    view["confirming_force_component"], view["decaying_peak_score"] = SIDE_FORCE, 9.0
+    view["confirmer"], view["peak"] = SIDE_FORCE, 9.0
     (
-        view["orthogonal_to_surface"],
-        view["plane_axes"],
-        view["uses_inertial_flow_angle"],
-        view["tone_tests"]["score"],
+        view["nulled"],
+        view["plane_pair"],
+        view["by_inertia"],
+        view["tones"]["score"],
     ) = (
         surface,
         plane,
         inertial,
         4.0,
     )
-    view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
+    view["block"]["n_h"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():
         view["direction"][i] = share
     assert Across.alarm(statistical, view) == expected

@@ -22,14 +22,12 @@ WALKS = ("one axis", "two axes")
 def _whitened(block, innovations, dt):
     out = np.zeros((len(innovations), 2))
     filter_all(block, innovations, dt, out)
-    return out[:, : block["n_axes"]]
+    return out[:, : block["n"]]
 
 
 def _parts(block):
-    n = int(block["n_axes"])
-    return {
-        name: np.array(block[name][:n, :n]) for name in ("P_xx", "P_xd", "P_dd", "S_inverse", "K_x", "K_d")
-    }
+    n = int(block["n"])
+    return {name: np.array(block[name][:n, :n]) for name in ("P_xx", "P_xd", "P_dd", "S_inv", "K_x", "K_d")}
 
 
 @settings(max_examples=samples(25))
@@ -42,16 +40,16 @@ def test_it_is_the_textbook_filter_while_noise_and_drift_change(case, rate_hz, s
     rate = np.zeros(n)
     for _ in range(60):
         root = rng.normal(size=(n, n))
-        block["drift_intensity"][:n, :n] = 0.1 * root @ root.T
-        block["model_noise_variance"][:n] = rng.uniform(0, 0.01, n)
-        plain.Q[:n, :n] = np.diag(dt**2 * block["model_noise_variance"][:n])
-        plain.Q[n:, n:] = dt * block["drift_intensity"][:n, :n]
+        block["Q_d"][:n, :n] = 0.1 * root @ root.T
+        block["Q_x"][:n] = rng.uniform(0, 0.01, n)
+        plain.Q[:n, :n] = np.diag(dt**2 * block["Q_x"][:n])
+        plain.Q[n:, n:] = dt * block["Q_d"][:n, :n]
         acceleration = rng.normal(size=n)
         rate = rate + dt * acceleration
         expected = plain.step(rate)
         assert _whitened(block, acceleration[None], dt)[0] == pytest.approx(expected, rel=1e-7, abs=1e-13)
         parts = _parts(block)
-        assert np.linalg.inv(parts["S_inverse"]) == pytest.approx(plain.S, rel=1e-8)
+        assert np.linalg.inv(parts["S_inv"]) == pytest.approx(plain.S, rel=1e-8)
         assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(plain.K, rel=1e-7, abs=1e-9)
         assert parts["P_dd"] == pytest.approx(plain.P[n:, n:], rel=1e-7, abs=1e-12)
         assert parts["P_xd"] == pytest.approx(plain.P[:n, n:], rel=1e-7, abs=1e-14)
@@ -66,7 +64,7 @@ def test_after_a_million_frames_it_is_where_the_riccati_equation_says(case, rate
     P = solve_discrete_are(plain.F.T, plain.H.T, plain.Q, plain.R)
     _whitened(block, np.zeros((1_000_000, n)), dt)
     parts = _parts(block)
-    assert np.linalg.inv(parts["S_inverse"]) == pytest.approx(P[:n, :n] + plain.R, rel=1e-6)
+    assert np.linalg.inv(parts["S_inv"]) == pytest.approx(P[:n, :n] + plain.R, rel=1e-6)
     K = P @ plain.H.T @ np.linalg.inv(P[:n, :n] + plain.R)
     assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(K, rel=1e-5, abs=1e-9)
 
@@ -78,7 +76,7 @@ def test_innovations_of_the_model_come_out_white_and_of_the_covariance_said(case
     block, dt, frames = block_of(drift, noise, jitter, keep=keep), 0.01, 200_000
     white = _whitened(block, drawn(block, frames, dt, np.random.default_rng(5), start=1.0), dt)[1000:]
     n = len(drift)
-    unit = white @ np.linalg.cholesky(block["S_inverse"][:n, :n])
+    unit = white @ np.linalg.cholesky(block["S_inv"][:n, :n])
     assert unit.T @ unit / len(unit) == pytest.approx(np.eye(n), abs=5 * np.sqrt(2 / frames))
     for lag in (1, 2, 5, 20, 100, 500):
         across = unit[lag:].T @ unit[:-lag] / len(unit)
@@ -98,7 +96,7 @@ def test_from_the_first_frame_on_the_covariance_is_as_said(case):
     block = block_of(drift, noise, keep=keep)
     for k in range(frames):
         likelihood.advance_covariance(block, dt)
-        whole = np.linalg.cholesky(block["S_inverse"][:n, :n])
+        whole = np.linalg.cholesky(block["S_inv"][:n, :n])
         assert whole.T @ (squares[k] / flights) @ whole == pytest.approx(
             np.eye(n), abs=6 * np.sqrt(2 / flights)
         )
@@ -124,4 +122,4 @@ def test_gyros_without_noise_are_believed_at_once(case):
     nu = drawn(block, 5000, dt, np.random.default_rng(3), start=1.0)
     white = _whitened(block, nu, dt)
     assert white[1:] == pytest.approx(dt * np.diff(nu, axis=0), abs=1e-12)
-    assert np.linalg.inv(block["S_inverse"][:n, :n]) == pytest.approx(dt**3 * drift, rel=1e-6)
+    assert np.linalg.inv(block["S_inv"][:n, :n]) == pytest.approx(dt**3 * drift, rel=1e-6)

@@ -17,7 +17,7 @@ def test_thrust_on_the_right_turns_the_nose_to_the_left(named, arm):
     apart(engines=list(ENGINES.values()))
     effectors = {name: SimpleNamespace(share=ENGINES[name][0], right_m=ENGINES[name][1]) for name in named}
     aircraft = SimpleNamespace(effectors=effectors, geometry=SimpleNamespace(span_m=12.0, chord_m=2.0))
-    assert monitors.healthy_yawing_moment_per_thrust(aircraft) == pytest.approx(arm / 12.0)
+    assert monitors.yaw_per_thrust(aircraft) == pytest.approx(arm / 12.0)
 
 
 def aircraft(signals, knows_engines=True):
@@ -34,8 +34,8 @@ def aircraft(signals, knows_engines=True):
 )
 def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(signals, thrust, turning):
     """y has alpha, beta, airspeed and dynamic pressure first."""
-    config = np.zeros(1, monitors.ENGINE_MONITOR_CONFIG_RECORD)[0]
-    monitors.configure_engine_monitor(config, aircraft(signals))
+    config = np.zeros(1, monitors.BALANCE_CONFIG)[0]
+    monitors.configure_balance(config, aircraft(signals))
     assert config.tolist() == pytest.approx((3, thrust, turning, -0.95 / 12.0, 0.05 / 12.0))
 
 
@@ -45,6 +45,6 @@ def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(si
      (("engines_n",), True)],
 )  # fmt: skip
 def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(signals, knows_engines):
-    config = np.zeros(1, monitors.ENGINE_MONITOR_CONFIG_RECORD)[0]
-    monitors.configure_engine_monitor(config, aircraft(signals, knows_engines))
+    config = np.zeros(1, monitors.BALANCE_CONFIG)[0]
+    monitors.configure_balance(config, aircraft(signals, knows_engines))
     assert not any(config.tolist())

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.diagnosis.monitors.redundancy import (
     SENSOR_MONITOR_RECORD,
-    UNANTICIPATED_VERDICT_DELAY_S,
+    UNANTICIPATED_DELAY_S,
     sensor_monitor_finding,
 )
 from beaver_ftc.plant.instruments import SENSORS
@@ -17,7 +17,7 @@ def monitor():
     record = np.zeros(1, SENSOR_MONITOR_RECORD)[0]
     said = record["output"]
     said["alarmed"], said["alarmed_at_s"], said["isolated_sensor"] = 1, 4.0, -1
-    said["is_suspect"][[0, 2]] = 1
+    said["suspect"][[0, 2]] = 1
     return record
 
 
@@ -26,7 +26,7 @@ def test_nothing_is_said_without_an_alarm(monitor):
     assert sensor_monitor_finding(monitor, 4.5) is None
 
 
-@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + UNANTICIPATED_VERDICT_DELAY_S])
+@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + UNANTICIPATED_DELAY_S])
 def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
     said = sensor_monitor_finding(monitor, t_s)
     assert said["candidates"] == (sensor_words(SENSORS[0]), sensor_words(SENSORS[2]))
@@ -34,9 +34,9 @@ def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
 
 
 def test_what_cannot_be_named_by_then_is_unanticipated(monitor):
-    said = sensor_monitor_finding(monitor, 4.01 + UNANTICIPATED_VERDICT_DELAY_S)
+    said = sensor_monitor_finding(monitor, 4.01 + UNANTICIPATED_DELAY_S)
     assert said["isolated"] == said["isolation_type"] == "unanticipated"
-    assert said["isolation_time_s"] == 4.0 + UNANTICIPATED_VERDICT_DELAY_S
+    assert said["isolation_time_s"] == 4.0 + UNANTICIPATED_DELAY_S
     assert said["candidates"] == ()
 
 

@@ -70,8 +70,8 @@ def started(declared=None, **options):
 def test_the_air_is_a_first_order_process_of_each_axis():
     air, none = TurbulenceModel(context(GUSTY)), TurbulenceModel(context())
     keep = np.exp(-DT / GUSTY.gust_time_s)
-    assert (air.n_states, none.n_states, none.decay_factor.size, none.rate_effect.shape) == (3, 0, 0, (3, 0))
-    assert air.decay_factor == pytest.approx(keep)
+    assert (air.n_states, none.n_states, none.a.size, none.rate_effect.shape) == (3, 0, 0, (3, 0))
+    assert air.a == pytest.approx(keep)
     assert air.initial_variance == pytest.approx(GUSTY.gust_rad_s**2)
     # In the long run as large as it was at the start.
     assert keep**2 * air.initial_variance + air.process_noise_variance == pytest.approx(air.initial_variance)

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from kernels import new_fdi
 
 from beaver_ftc.diagnosis.conclusion import (
-    MAX_WITHDRAWN_ISOLATIONS,
+    MAX_WITHDRAWN,
     SENSOR_BROKEN,
     TYPES_REFUTED,
     reset_conclusion,
-    update_isolation_interval,
+    update_interval,
 )
 from beaver_ftc.diagnosis.schemes import (
     fdi_dtype,
-    prepare_takeover_with_previous_maxima,
+    prepare_takeover,
     record_isolated_surfaces,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
@@ -28,7 +28,7 @@ AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 
 def nameless():
     fdi = new_fdi()
-    fdi["verdict"]["isolated_from_s"], fdi["verdict"]["isolated_estimator"] = -1.0, NOT_ISOLATED
+    fdi["verdict"]["from_s"], fdi["verdict"]["isolated_estimator"] = -1.0, NOT_ISOLATED
     fdi["isolation"]["estimator"]["surface"][:4] = range(4)
     return fdi
 
@@ -49,16 +49,16 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
     conclusion = nameless()["verdict"]
     for k, named in enumerate(frames):
         for s, is_named in zip((ELEVATOR, FLAP), named, strict=True):
-            update_isolation_interval(conclusion, s, is_named, float(k), -1, SENSOR_BROKEN)
+            update_interval(conclusion, s, is_named, float(k), -1, SENSOR_BROKEN)
     expected = sorted(
         (to, s, start)
         for s, column in zip((ELEVATOR, FLAP), zip(*frames, strict=True), strict=False)
         for start, to in spells(column)
     )
-    assert conclusion["n_withdrawn_isolations"] == len(expected)
-    if len(expected) > MAX_WITHDRAWN_ISOLATIONS:
-        expected = [*expected[: MAX_WITHDRAWN_ISOLATIONS - 1], expected[-1]]
-    kept = conclusion["withdrawn_isolations"][: len(expected)]
+    assert conclusion["n_gone"] == len(expected)
+    if len(expected) > MAX_WITHDRAWN:
+        expected = [*expected[: MAX_WITHDRAWN - 1], expected[-1]]
+    kept = conclusion["gone"][: len(expected)]
     assert [(one["to_s"], one["surface"], one["from_s"]) for one in kept] == expected
 
 
@@ -69,9 +69,7 @@ def test_every_spell_of_a_type_is_kept_unless_the_name_ends_with_it(frames):
     reset_conclusion(conclusion)
     for k, kind in enumerate(frames):
         open_or_kind = -1 if kind is None else kind
-        update_isolation_interval(
-            conclusion, FLAP, kind is not None, float(k), open_or_kind, TYPES_REFUTED + k % 2
-        )
+        update_interval(conclusion, FLAP, kind is not None, float(k), open_or_kind, TYPES_REFUTED + k % 2)
     ends, start = [], 0
     for k in range(1, len(frames)):
         if frames[k] != frames[k - 1]:
@@ -79,10 +77,10 @@ def test_every_spell_of_a_type_is_kept_unless_the_name_ends_with_it(frames):
             start = k
     of_types = [(a, b, kind) for a, b, kind, then in ends if kind in (3, 5) and then is not None]
     of_names = [(b, kind) for _, b, kind, then in ends if then is None and kind is not None]
-    assert conclusion["n_withdrawn_types"] == len(of_types)
-    kept = conclusion["withdrawn_types"][: min(len(of_types), MAX_WITHDRAWN_ISOLATIONS)][:-1]
+    assert conclusion["n_gone_types"] == len(of_types)
+    kept = conclusion["withdrawn_types"][: min(len(of_types), MAX_WITHDRAWN)][:-1]
     assert [(t["from_s"], t["to_s"], t["fault_type"]) for t in kept] == of_types[: len(kept)]
-    names = conclusion["withdrawn_isolations"][: min(len(of_names), MAX_WITHDRAWN_ISOLATIONS)][:-1]
+    names = conclusion["gone"][: min(len(of_names), MAX_WITHDRAWN)][:-1]
     assert [(n["to_s"], n["fault_type"]) for n in names] == of_names[: len(names)]
     assert all(one["reason"] == TYPES_REFUTED + one["to_s"] % 2 for one in (*kept, *names))
 
@@ -105,7 +103,7 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
     (
         fdi["sensor_monitor"]["config"]["enabled"],
         fdi["sensor_monitor"]["output"]["alarmed"],
-        fdi["sensor_monitor"]["output"]["keeps_surface_conclusion"],
+        fdi["sensor_monitor"]["output"]["keeps_surface"],
     ) = (
         1,
         alarmed,
@@ -114,7 +112,7 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
     record_isolated_surfaces(fdi, 2.5)
     since = np.full(4, -1.0)
     since[named] = 2.5
-    assert fdi["verdict"]["isolated_from_s"].tolist() == since.tolist()
+    assert fdi["verdict"]["from_s"].tolist() == since.tolist()
 
 
 @pytest.mark.parametrize(("filters", "in_flight"), [(2, True), (3, False)])
@@ -122,17 +120,13 @@ def test_of_a_diagnosis_before_only_how_close_it_came_goes_on_and_by_the_same_fi
     fdi, before = (fill(np.zeros(1, fdi_dtype(3))[0], seed=seed) for seed in (0, 1))
     fdi["bank"]["config"]["n_filters"], before["bank"]["config"]["n_filters"] = filters, 2
     expected = fdi.copy()
-    expected["statistical"]["alarm"]["max_score_over_alarm_level_so_far"] = before["statistical"]["alarm"][
-        "max_score_over_alarm_level_so_far"
-    ]
+    expected["statistical"]["alarm"]["peak"] = before["statistical"]["alarm"]["peak"]
     if filters == 2:
-        expected["bank"]["output"]["max_residual_over_threshold_so_far"] = before["bank"]["output"][
-            "max_residual_over_threshold_so_far"
-        ]
-    for gust in ("gust", "inertial_gust"):
+        expected["bank"]["output"]["peak"] = before["bank"]["output"]["peak"]
+    for gust in ("gust", "vaneless"):
         expected["statistical"][gust]["config"]["starts_in_flight"] = in_flight
     expected["sensor_monitor"]["memory"]["substep"] = 0
     given = bits(before)
-    prepare_takeover_with_previous_maxima(fdi, before, in_flight)
+    prepare_takeover(fdi, before, in_flight)
     assert bits(fdi) == bits(expected)
     assert bits(before) == given

@@ -18,12 +18,12 @@ POLE, DT = 10.0, 0.01
 
 def network(gain=60.0, limit=20.0):
     new = np.zeros(1, published_scheme.STATE_NETWORK_RECORD).view(np.recarray)[0]
-    published_scheme.configure_state_network(new, gain, limit, TRAVEL)
+    published_scheme.configure_network(new, gain, limit, TRAVEL)
     return new
 
 
 def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
-    published_scheme.fill_state_network_basis_and_output(
+    published_scheme.evaluate_state_network(
         new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u)
     )
     return new
@@ -67,15 +67,15 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
     dead_zone, detected, residual, learns
 ):
     published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
-    published.config.uses_dead_zone = dead_zone
-    published_scheme.configure_state_network(published.network, 60.0, 20.0, TRAVEL)
+    published.config.waits = dead_zone
+    published_scheme.configure_network(published.network, 60.0, 20.0, TRAVEL)
     at(published.network)
     fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
-    published_scheme.train_fdae_network_if_due(published, fdae, detected, DT)
+    published_scheme.train_if_due(published, fdae, detected, DT)
     expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
     np.testing.assert_allclose(
-        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES_PER_AXIS))
+        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES))
     )
 
 
@@ -85,7 +85,7 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
 def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
     fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = residual, 0.01
-    assert published_scheme.fdae_alarm_axis(fdae) == (-1 if axis is None else axis)
+    assert published_scheme.fdae_axis(fdae) == (-1 if axis is None else axis)
 
 
 @given(
@@ -97,27 +97,27 @@ def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
 def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
     """However it adapts: the term Om ths' of the estimator sees to that."""
     records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
-    records.config.filter_decay[:], records.config.adapts_by_gradient, records.config.gradient_gain = (
+    records.config.a[:], records.config.gradient, records.config.gain = (
         published_scheme.euler_decay(POLE, DT),
         1,
         gain,
     )
     fie = records.estimator[0]
-    fie.theta_min, fie.theta_max, fie.feasible_theta_min[:], fie.feasible_theta_max[:] = (
+    fie.theta_min, fie.theta_max, fie.set_lo[:], fie.set_hi[:] = (
         -1.0,
         0.0,
         -np.inf,
         np.inf,
     )
     if projects:
-        fie.feasible_theta_min[:], fie.feasible_theta_max[:] = -1.0, 0.0
+        fie.set_lo[:], fie.set_hi[:] = -1.0, 0.0
     rate, bound = np.zeros(3), np.zeros(1, bound_dtype(4))[0]
     for z in Z:
         fie.residual[:] = rate - fie.xhat
-        assert fie.residual == pytest.approx(fie.filtered_regressor * (theta - fie.theta), abs=1e-9)
-        fie.frame_mean_effect.regressor[:] = z, -z, 0.5 * z
+        assert fie.residual == pytest.approx(fie.Om * (theta - fie.theta), abs=1e-9)
+        fie.effect.regressor[:] = z, -z, 0.5 * z
         before = rate.copy()
-        rate = before + DT * theta * fie.frame_mean_effect.regressor
+        rate = before + DT * theta * fie.effect.regressor
         isolation.advance_estimator(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()

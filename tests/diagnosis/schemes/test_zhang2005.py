@@ -106,30 +106,28 @@ def test_every_option_is_in_the_record_of_its_part(options, projects, adaptive, 
     travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
     for record in (fdi, before):
         record["layout"]["main"] = (2, 0, 1)
-        record["bank"]["config"]["decay_factor"][:3] = 0.5, 0.6, 0.7
-        record["isolation"]["config"]["threshold_kind"] = 1
+        record["bank"]["config"]["a"][:3] = 0.5, 0.6, 0.7
+        record["isolation"]["config"]["mu_kind"] = 1
     given = load_scenario({"name": "x", "rate_hz": 50, "fdi": config})
-    published_scheme.reconfigure_diagnosis_as_published(fdi, given, travel)
+    published_scheme.reconfigure_published(fdi, given, travel)
     found = fdi["published"]["network"]["config"]
-    assert (found["gain"], found["weight_limit"]) == (70.0, 8.0 if projects else np.inf)
+    assert (found["gain"], found["w_max"]) == (70.0, 8.0 if projects else np.inf)
     middle = [(low + high) / 2.0 for low, high in travel.T[[2, 0, 1]]]
-    assert found["first_centre"].tolist() == [
+    assert found["c0"].tolist() == [
         [angle, -0.3, low] for angle, low in zip((-0.4, -0.1, -0.4), travel[0, [2, 0, 1]], strict=True)
     ]
     spacing = [[0.1, 0.3, at - low] for at, low in zip(middle, travel[0, [2, 0, 1]], strict=True)]
     spacing[1][0] = 0.6 / 8.0
-    assert found["centre_spacing"] == pytest.approx(np.array(spacing))
-    assert fdi["published"]["config"]["uses_dead_zone"] == waits
-    assert fdi["published"]["config"]["constant_threshold"] == (0.0 if adaptive else 0.004)
-    assert fdi["fdae"]["config"]["decay_factor"] == pytest.approx(1.0 - 4.0 / 50.0)
-    assert fdi["bank"]["config"]["decay_factor"][:3] == pytest.approx([1.0 - 4.0 / 50.0, 0.6, 0.7])
+    assert found["dc"] == pytest.approx(np.array(spacing))
+    assert fdi["published"]["config"]["waits"] == waits
+    assert fdi["published"]["config"]["mu0"] == (0.0 if adaptive else 0.004)
+    assert fdi["fdae"]["config"]["a"] == pytest.approx(1.0 - 4.0 / 50.0)
+    assert fdi["bank"]["config"]["a"][:3] == pytest.approx([1.0 - 4.0 / 50.0, 0.6, 0.7])
     isolating = fdi["isolation"]["config"]
-    assert isolating["filter_decay"] == pytest.approx(
-        np.full_like(isolating["filter_decay"], 1.0 - 6.0 / 50.0)
-    )
-    assert (isolating["adapts_by_gradient"], isolating["gradient_gain"]) == (1, 900.0)
-    assert isolating["projection_disabled"] == (not projects)
-    assert isolating["threshold_kind"] == (1 if adaptive else CONSTANT_THRESHOLD) != 0
+    assert isolating["a"] == pytest.approx(np.full_like(isolating["a"], 1.0 - 6.0 / 50.0))
+    assert (isolating["gradient"], isolating["gain"]) == (1, 900.0)
+    assert isolating["free"] == (not projects)
+    assert isolating["mu_kind"] == (1 if adaptive else CONSTANT_THRESHOLD) != 0
     estimators = fdi["isolation"]["estimator"]
     assert (estimators["theta"] == -0.15).all()
     assert np.flatnonzero(estimators["excluded"]).tolist() == ([] if left_out is None else [left_out])

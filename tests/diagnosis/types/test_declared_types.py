@@ -69,7 +69,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     plant = fly(seed, noisy, kind, surface, at, share, 700)
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][code]
     said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
@@ -80,14 +80,8 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["types"]["surface"][0]
-    assert (
-        known["feasible_sets"]["low"][fault_kinds.STUCK]
-        <= -0.26
-        <= known["feasible_sets"]["high"][fault_kinds.STUCK]
-    )
-    assert known["feasible_sets"]["high"][fault_kinds.STUCK] - known["feasible_sets"]["low"][
-        fault_kinds.STUCK
-    ] < np.deg2rad(4)
+    assert known["sets"]["low"][fault_kinds.STUCK] <= -0.26 <= known["sets"]["high"][fault_kinds.STUCK]
+    assert known["sets"]["high"][fault_kinds.STUCK] - known["sets"]["low"][fault_kinds.STUCK] < np.deg2rad(4)
     assert fault_finding_dict(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
@@ -96,17 +90,10 @@ def test_blocks_see_what_frames_do_not():
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
     known, estimator = (
         plant.fdi["types"]["surface"][2],
-        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_estimator"][2]],
+        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position"][2]],
     )
-    of_a_frame = (
-        2
-        * plant.fdi["bound"]["frame_innovation_bound"][2]
-        / abs(estimator["frame_mean_effect"]["regressor"][2])
-    )
-    assert (
-        known["last_observation"]["position_high"] - known["last_observation"]["position_low"]
-        < 0.5 * of_a_frame
-    )
+    of_a_frame = 2 * plant.fdi["bound"]["nu_max"][2] / abs(estimator["effect"]["regressor"][2])
+    assert known["last"]["hi"] - known["last"]["lo"] < 0.5 * of_a_frame
 
 
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():
@@ -130,4 +117,4 @@ def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(
     fault.plant = plant
     plant.fly(at + lasting + 100, None)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][fault.code]

@@ -119,7 +119,7 @@ def fly(case, kind, surface, at, share, uncertainty, frames=FRAMES, gone=None):
 def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][code]
 
 
 @pytest.mark.parametrize("kind", ["constant loss", "stuck", "float", "bias", "hardover up", "oscillatory"])
@@ -128,7 +128,7 @@ def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncerta
 def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 40)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][code]
 
 
 @pytest.mark.parametrize("kind", TYPES)

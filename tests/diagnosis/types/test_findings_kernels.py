@@ -5,7 +5,7 @@ import pytest
 from kernels import put
 
 from beaver_ftc.diagnosis.schemes import fdi_dtype
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_SURFACE_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, DEDUCED_HEALTHY
@@ -26,21 +26,21 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
         -1,
     )
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
-    fdi["types"]["pair"]["first_pitch_fault_surface"] = -1
-    fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
-    fdi["layout"]["group"] = 1 - PITCH_SURFACE_GROUP
-    fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_SURFACE_GROUP
+    fdi["types"]["pair"]["first_pitch"] = -1
+    fdi["layout"]["position"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
+    fdi["layout"]["group"] = 1 - PITCH_GROUP
+    fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
     (
-        fdi["types"]["surface"]["position_estimator_excluded"],
-        fdi["types"]["surface"]["feasible_sets"]["excluded"],
+        fdi["types"]["surface"]["not_at_position"],
+        fdi["types"]["surface"]["sets"]["excluded"],
     ) = 1, 1
     (
         fdi["types"]["surface"]["status"]["fault_type"],
-        fdi["types"]["surface"]["status"]["type_decided_at_s"],
+        fdi["types"]["surface"]["status"]["typed_at_s"],
     ) = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["types"]["surface"]["position_estimator_excluded"][s] = 0
-        fdi["types"]["surface"]["feasible_sets"]["excluded"][s][list(kinds)] = 0
+        fdi["types"]["surface"]["not_at_position"][s] = 0
+        fdi["types"]["surface"]["sets"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
 
@@ -82,16 +82,16 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     fdi = new({RUDDER: [STUCK]})
     (
         fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
-        fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][RUDDER],
+        fdi["types"]["surface"]["status"]["basis"][RUDDER],
     ) = named, standing
-    fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = excluded
+    fdi["types"]["surface"]["not_at_position"][RUDDER] = excluded
     assert (
         f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_finding_dict(fdi, SURFACES)["candidates"]
     ) == possible
 
 
 @pytest.mark.parametrize(
-    ("constant", "evidence", "has_surface_term_errors", "kept"),
+    ("constant", "evidence", "has_eG", "kept"),
     [
         (BIAS, 30, 0, {VARYING_LOSS, SLOW}), (BIAS, 50, 0, set()), (BIAS, 51, 0, set()),
         (STUCK, 30, 0, {VARYING_LOSS, SLOW}), (STUCK, 50, 0, {SLOW}), (FLOAT, 51, 0, {SLOW}),
@@ -100,17 +100,17 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     ],
 )  # fmt: skip
 def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
-    constant, evidence, has_surface_term_errors, kept
+    constant, evidence, has_eG, kept
 ):
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
-    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, slowest_half_cycle_frames=40)
+    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, half_frames=40)
     (
-        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][RUDDER],
-        fdi["types"]["surface"]["evidence"]["n_rest_frames"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_anomalous"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_rest"][RUDDER],
     ) = evidence, 10
-    fdi["types"]["config"]["has_surface_term_errors"] = has_surface_term_errors
-    types = verdict._remaining_type_names(fdi, RUDDER)
+    fdi["types"]["config"]["has_eG"] = has_eG
+    types = verdict._type_names(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))
 
@@ -123,7 +123,7 @@ def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
     assert set(found["candidates"]) == set(said(STUCK, FLOAT))
     assert found["estimate"] is None
     assert found["frequency_rad_s"] is None
-    fdi["verdict"]["fault_type"], fdi["verdict"]["type_decided_at_s"] = 0, 14.0
+    fdi["verdict"]["fault_type"], fdi["verdict"]["typed_at_s"] = 0, 14.0
     found = verdict.fault_finding_dict(fdi, SURFACES)
     assert (found["isolation_type"], found["type_time_s"], found["candidates"]) == (
         TYPE_NAMES[0],
@@ -150,7 +150,7 @@ def several(named=(), alarmed=(0, 0), left=None):
             1,
             at_s,
         )
-    fdi["types"]["pair"]["group_has_alarm"] = alarmed
+    fdi["types"]["pair"]["group_alarm"] = alarmed
     return verdict.fault_finding_dict(fdi, SURFACES)
 
 
@@ -167,7 +167,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
     surface = fdi["types"]["surface"]
     for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
         surface["status"]["is_isolated"][s], surface["status"]["isolated_at_s"][s] = 1, named_at_s
-        surface["status"]["fault_type"][s], surface["status"]["type_decided_at_s"][s] = kind, type_at_s
+        surface["status"]["fault_type"][s], surface["status"]["typed_at_s"][s] = kind, type_at_s
     apart(instants=[9.0, 11.5, 7.0])
     elevator, rudder = verdict.fault_finding_dict(fdi, SURFACES)["faults"]
     keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
@@ -177,7 +177,7 @@ def test_each_of_several_faults_has_instants_of_its_own():
 
 def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     alarmed = [0, 0]
-    alarmed[PITCH_SURFACE_GROUP] = 1
+    alarmed[PITCH_GROUP] = 1
     found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
     assert found["isolated"] is None
     (plane,) = found["faults"]
@@ -198,10 +198,10 @@ def test_where_no_plane_is_alarmed_both_stay_open():
 def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
     fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
     every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
-    assert set(verdict._remaining_type_names(fdi, ELEVATOR)) == every
-    assert set(verdict._remaining_type_names(fdi, RUDDER)) == set(said(kind))
-    assert set(verdict._remaining_type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
-    assert set(verdict._remaining_type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
+    assert set(verdict._type_names(fdi, ELEVATOR)) == every
+    assert set(verdict._type_names(fdi, RUDDER)) == set(said(kind))
+    assert set(verdict._type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
+    assert set(verdict._type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])
@@ -211,9 +211,9 @@ def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     sets = fdi["types"]["surface"]
     for surface in range(4):
         fill(sets[surface], seed=surface + 1)
-    apart(low=sets["feasible_sets"]["low"], high=sets["feasible_sets"]["high"])
+    apart(low=sets["sets"]["low"], high=sets["sets"]["high"])
     for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
-        low, high = sets["feasible_sets"]["low"][s, kind] - off, sets["feasible_sets"]["high"][s, kind] - off
+        low, high = sets["sets"]["low"][s, kind] - off, sets["sets"]["high"][s, kind] - off
         assert TYPES[kind].estimate_parameter_interval(fdi, s, kind) == pytest.approx((low, high))
-    middle = 0.5 * (sets["feasible_sets"]["low"][s, STUCK] + sets["feasible_sets"]["high"][s, STUCK])
+    middle = 0.5 * (sets["sets"]["low"][s, STUCK] + sets["sets"]["high"][s, STUCK])
     assert TYPES[STUCK].estimate_parameter(fdi, s, STUCK) == pytest.approx(middle)

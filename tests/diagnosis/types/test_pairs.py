@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.pairs import locate_lateral_and_flag_unreachable
+from beaver_ftc.diagnosis.types.pairs import locate_lateral
 from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
@@ -57,8 +57,8 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
     for surface, one, _, _ in faults:
-        assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][TYPES[one][1]]
-    assert not plant.fdi["types"]["pair"]["lateral_fault_outside_class"]
+        assert not plant.fdi["types"]["surface"][surface]["sets"]["excluded"][TYPES[one][1]]
+    assert not plant.fdi["types"]["pair"]["lateral_outside"]
 
 
 @settings(max_examples=samples(40), deadline=None)
@@ -107,30 +107,30 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
     frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
     for column, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]["frame_mean_effect"]
-        effect["regressor"][[0, 2]], effect["error_bound"][[0, 2]] = Z[:, column], spread[:, column]
-        fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = 0.02
-    fdi["bound"]["frame_innovation_bound"][[0, 2]] = frame
+        effect = fdi["isolation"]["estimator"][fdi["layout"]["position"][s]]["effect"]
+        effect["regressor"][[0, 2]], effect["e"][[0, 2]] = Z[:, column], spread[:, column]
+        fdi["types"]["surface"][s]["last"]["u"] = 0.02
+    fdi["bound"]["nu_max"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    locate_lateral_and_flag_unreachable(
+    locate_lateral(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],
         fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["frame_innovation_bound"],
+        fdi["bound"]["nu_max"],
     )
     e = frame + spread.sum(axis=1)
     signs = product((-1, 1), repeat=2)
     corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
     for column, s in enumerate((AILERON, RUDDER)):
         surface, ends = fdi["types"]["surface"][s], corners[:, column]
-        assert surface["last_observation"]["position_low"] == pytest.approx(
-            max(surface["actuator"]["travel_low"], 0.02 + ends.min()), abs=1e-9
+        assert surface["last"]["lo"] == pytest.approx(
+            max(surface["actuator"]["stop_lo"], 0.02 + ends.min()), abs=1e-9
         )
-        assert surface["last_observation"]["position_high"] == pytest.approx(
-            min(surface["actuator"]["travel_high"], 0.02 + ends.max()), abs=1e-9
+        assert surface["last"]["hi"] == pytest.approx(
+            min(surface["actuator"]["stop_hi"], 0.02 + ends.max()), abs=1e-9
         )
-        assert surface["last_observation"]["is_anomalous"] == (ends.min() > 0 or ends.max() < 0)
+        assert surface["last"]["anomalous"] == (ends.min() > 0 or ends.max() < 0)
 
 
 @pytest.mark.parametrize("thresholds", ["published", "interval"])

@@ -8,7 +8,7 @@ from kernels import new_fdi, on, put, put_on
 
 from beaver_ftc.diagnosis import types
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
-from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, layout_dtype
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH_GROUP, layout_dtype
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
@@ -34,7 +34,7 @@ ALL = set(range(N_TYPES))
 def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
     fdi = new_fdi()
-    put(fdi, whole=1, slowest_half_cycle_frames=20, instants=1)
+    put(fdi, whole=1, half_frames=20, instants=1)
     (
         fdi["types"]["config"]["frames_per_block"],
         fdi["types"]["config"]["block_duration_s"],
@@ -46,74 +46,74 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     )
     surface = fdi["types"]["surface"][0]
     (
-        surface["actuator"]["travel_low"],
-        surface["actuator"]["travel_high"],
-        surface["actuator"]["approach_share_per_substep"],
-        surface["actuator"]["max_motion_per_substep"],
+        surface["actuator"]["stop_lo"],
+        surface["actuator"]["stop_hi"],
+        surface["actuator"]["approach_share"],
+        surface["actuator"]["step"],
     ) = LOW, HIGH, 0.5, 0.1
-    surface["actuator"]["reachable_low"], surface["actuator"]["reachable_high"] = (
+    surface["actuator"]["reach_lo"], surface["actuator"]["reach_hi"] = (
         min(LOW, 0.0),
         max(HIGH, 0.0),
     )
-    registry.restart_surface_sets_and_evidence(surface)
-    surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, np.inf
+    registry.restart_surface(surface)
+    surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS] = -np.inf, np.inf
     (
-        surface["judged_observation"]["position_low"],
-        surface["judged_observation"]["position_high"],
-        surface["judged_observation"]["healthy_position"],
+        surface["judged"]["lo"],
+        surface["judged"]["hi"],
+        surface["judged"]["u"],
     ) = low, high, command
-    surface["feasible_sets"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
+    surface["sets"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
     put_on(surface, **fields)
     return fdi, surface
 
 
 def judged(judge, fdi, surface, kind, *given):
     """Take in what a type's row makes of the judged frame."""
-    types.intersect_set_or_exclude_type(surface, kind, on(judge, fdi, surface, kind, *given))
+    types.intersect_set(surface, kind, on(judge, fdi, surface, kind, *given))
 
 
 def restore_sets(surface):
     """Take in what a jam was before the earliest release still possible."""
-    types.set_feasible_set(surface, STUCK, held_surface.stuck_set_after_frame(surface, STUCK))
+    types.put_set(surface, STUCK, held_surface.stuck_after(surface, STUCK))
 
 
 def test_what_is_known_of_a_surface_as_it_begins():
     _, surface = new_surface(left=())
     (
-        surface["evidence"]["n_anomalous_frames"],
-        surface["evidence"]["n_rest_frames"],
-        surface["evidence"]["first_anomalous_frame"],
+        surface["evidence"]["n_anomalous"],
+        surface["evidence"]["n_rest"],
+        surface["evidence"]["k_first"],
     ) = (
         3,
         4,
         5,
     )
-    surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
-    registry.restart_surface_sets_and_evidence(surface)
-    assert not surface["feasible_sets"]["excluded"].any()
+    surface["last"]["lo"], surface["last"]["hi"] = 0.1, 0.2
+    registry.restart_surface(surface)
+    assert not surface["sets"]["excluded"].any()
     assert (
-        surface["evidence"]["n_anomalous_frames"],
-        surface["evidence"]["n_rest_frames"],
-        surface["evidence"]["first_anomalous_frame"],
+        surface["evidence"]["n_anomalous"],
+        surface["evidence"]["n_rest"],
+        surface["evidence"]["k_first"],
     ) == (0, 0, -1)
-    assert (surface["last_observation"]["position_low"], surface["last_observation"]["position_high"]) == (
+    assert (surface["last"]["lo"], surface["last"]["hi"]) == (
         LOW,
         HIGH,
     )
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (LOW, HIGH)
+    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (LOW, HIGH)
     assert (
-        surface["feasible_sets"]["low"][CONSTANT_LOSS],
-        surface["feasible_sets"]["high"][CONSTANT_LOSS],
+        surface["sets"]["low"][CONSTANT_LOSS],
+        surface["sets"]["high"][CONSTANT_LOSS],
     ) == (
         0.0,
         1.0,
     )
-    assert (surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS]) == (
+    assert (surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS]) == (
         -np.inf,
         np.inf,
     )
-    assert surface["rate_limit"]["last_known_frame"] == -2
-    assert surface["oscillatory"]["n_half_cycles"] == 0
+    assert surface["rate_limit"]["k_last"] == -2
+    assert surface["oscillatory"]["n_half"] == 0
 
 
 @pytest.mark.parametrize(
@@ -125,40 +125,40 @@ def test_what_is_known_of_a_surface_as_it_begins():
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    judged(commanded_surface.consistent_loss_interval, fdi, surface, CONSTANT_LOSS, 5)
-    judged(commanded_surface.varying_loss_unlimited_or_empty_set, fdi, surface, VARYING_LOSS, 5)
+    judged(commanded_surface.loss_interval, fdi, surface, CONSTANT_LOSS, 5)
+    judged(commanded_surface.varying_loss_set, fdi, surface, VARYING_LOSS, 5)
     assert (
-        surface["feasible_sets"]["excluded"][CONSTANT_LOSS]
-        == surface["feasible_sets"]["excluded"][VARYING_LOSS]
+        surface["sets"]["excluded"][CONSTANT_LOSS]
+        == surface["sets"]["excluded"][VARYING_LOSS]
         == (expected is None)
     )
     if expected:
         assert (
-            surface["feasible_sets"]["low"][CONSTANT_LOSS],
-            surface["feasible_sets"]["high"][CONSTANT_LOSS],
+            surface["sets"]["low"][CONSTANT_LOSS],
+            surface["sets"]["high"][CONSTANT_LOSS],
         ) == pytest.approx(expected)
 
 
 def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
     for least, greatest, excluded in ((-0.1, 0.2, 0), (0.0, 0.2, 1), (-0.1, 0.0, 1)):
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
-        fdi["types"]["config"]["frames_per_block"], surface["commands"]["min_healthy_position"][1] = 5, least
-        surface["commands"]["max_healthy_position"][1] = greatest
-        judged(commanded_surface.varying_loss_unlimited_or_empty_set, fdi, surface, VARYING_LOSS, 5)
-        assert surface["feasible_sets"]["excluded"][VARYING_LOSS] == excluded
+        fdi["types"]["config"]["frames_per_block"], surface["commands"]["u_min"][1] = 5, least
+        surface["commands"]["u_max"][1] = greatest
+        judged(commanded_surface.varying_loss_set, fdi, surface, VARYING_LOSS, 5)
+        assert surface["sets"]["excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    types.intersect_set_or_exclude_type(surface, STUCK, (-0.1, 0.2))
-    types.intersect_set_or_exclude_type(surface, STUCK, (0.0, 0.9))
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
-    assert types.feasible_set_midpoint(surface, STUCK) == 0.1
-    assert not surface["feasible_sets"]["excluded"][STUCK]
-    types.intersect_set_or_exclude_type(surface, STUCK, (0.2, 0.9))  # one point is not nothing
-    assert not surface["feasible_sets"]["excluded"][STUCK]
-    types.intersect_set_or_exclude_type(surface, STUCK, (0.21, 0.9))
-    assert surface["feasible_sets"]["excluded"][STUCK]
+    types.intersect_set(surface, STUCK, (-0.1, 0.2))
+    types.intersect_set(surface, STUCK, (0.0, 0.9))
+    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.0, 0.2)
+    assert types.set_middle(surface, STUCK) == 0.1
+    assert not surface["sets"]["excluded"][STUCK]
+    types.intersect_set(surface, STUCK, (0.2, 0.9))  # one point is not nothing
+    assert not surface["sets"]["excluded"][STUCK]
+    types.intersect_set(surface, STUCK, (0.21, 0.9))
+    assert surface["sets"]["excluded"][STUCK]
 
 
 @pytest.mark.parametrize(
@@ -168,80 +168,76 @@ def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
 )
 def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval, stands):
     _, surface = new_surface()
-    types.set_feasible_set(surface, STUCK, (0.0, 0.2))
-    types.intersect_set_or_exclude_type(surface, STUCK, interval)
-    assert surface["feasible_sets"]["excluded"][STUCK]
+    types.put_set(surface, STUCK, (0.0, 0.2))
+    types.intersect_set(surface, STUCK, interval)
+    assert surface["sets"]["excluded"][STUCK]
     for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             place - 1e-3,
             place + 1e-3,
         )
-        assert registry.judged_position_agrees_with_rest_position(surface) == (
-            stands and 0.0 <= place <= 0.2
-        ), place
+        assert registry.agrees_at_rest(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
-    _, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert commanded_surface.offset_interval_of_judged_frame(surface) == pytest.approx((-0.2, -0.15))
-    surface["judged_observation"]["position_high"] = HIGH
-    assert commanded_surface.offset_interval_of_judged_frame(surface) == (pytest.approx(-0.2), np.inf)
-    surface["judged_observation"]["position_low"] = LOW
-    assert commanded_surface.offset_interval_of_judged_frame(surface)[0] == -np.inf
+    fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == pytest.approx((-0.2, -0.15))
+    surface["judged"]["hi"] = HIGH
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == (pytest.approx(-0.2), np.inf)
+    surface["judged"]["lo"] = LOW
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
 def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
-    fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
+    fdi, surface = new_surface(low=low, high=high, command=0.2, stop_lo=0.1)
     for kind, judge in (
-        (BIAS, commanded_surface.bias_interval_of_judged_frame),
-        (GROWING_BIAS, commanded_surface.update_growing_bias_returning_consistent_interval),
+        (BIAS, commanded_surface.bias_of_frame),
+        (GROWING_BIAS, commanded_surface.update_growing),
     ):
         judged(judge, fdi, surface, kind, 5)
-        assert surface["feasible_sets"]["excluded"][kind]
+        assert surface["sets"]["excluded"][kind]
 
 
 @pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
 def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
     fdi["types"]["config"]["frames_per_block"] = length
-    surface["commands"]["min_healthy_position"][1], surface["commands"]["max_healthy_position"][1] = (
+    surface["commands"]["u_min"][1], surface["commands"]["u_max"][1] = (
         -0.4,
         0.34,
     )
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert commanded_surface.offset_interval_of_judged_frame(surface) == pytest.approx((0.1, 0.15))
-    surface["commands"]["max_healthy_position"][1] = 0.36
-    assert commanded_surface.offset_interval_of_judged_frame(surface)[1] == np.inf
-    surface["commands"]["min_healthy_position"][1] = -0.51
-    assert commanded_surface.offset_interval_of_judged_frame(surface)[0] == -np.inf
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS) == pytest.approx((0.1, 0.15))
+    surface["commands"]["u_max"][1] = 0.36
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[1] == np.inf
+    surface["commands"]["u_min"][1] = -0.51
+    assert on(commanded_surface.bias_of_frame, fdi, surface, BIAS)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    judged(commanded_surface.bias_interval_of_judged_frame, fdi, surface, BIAS, 5)
+    judged(commanded_surface.bias_of_frame, fdi, surface, BIAS, 5)
     (
-        surface["judged_observation"]["position_low"],
-        surface["judged_observation"]["position_high"],
-        surface["judged_observation"]["healthy_position"],
+        surface["judged"]["lo"],
+        surface["judged"]["hi"],
+        surface["judged"]["u"],
     ) = 0.23, 0.4, 0.4
-    judged(commanded_surface.bias_interval_of_judged_frame, fdi, surface, BIAS, 6)
-    assert (surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS]) == pytest.approx(
-        (-0.17, -0.15)
-    )
-    surface["last_observation"]["healthy_position"] = 0.05
-    assert on(commanded_surface.bias_deflection_range, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
-    commands, surface["last_observation"]["healthy_position"] = surface["commands"], -0.2
-    commands["min_healthy_position"][0], commands["max_healthy_position"][0] = (
+    judged(commanded_surface.bias_of_frame, fdi, surface, BIAS, 6)
+    assert (surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS]) == pytest.approx((-0.17, -0.15))
+    surface["last"]["u"] = 0.05
+    assert on(commanded_surface.bias_range, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    commands, surface["last"]["u"] = surface["commands"], -0.2
+    commands["u_min"][0], commands["u_max"][0] = (
         -0.24,
         -0.1,
     )  # where it was meanwhile: to -0.41 and to -0.25
-    assert on(commanded_surface.bias_deflection_range, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
-    commands["min_healthy_position"][0] = commands["max_healthy_position"][0] = 0.0
+    assert on(commanded_surface.bias_range, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
+    commands["u_min"][0] = commands["u_max"][0] = 0.0
     assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
-    assert types.midpoint_parameter_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
-    surface["feasible_sets"]["high"][BIAS] = np.inf
+    assert types.middle_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
+    surface["sets"]["high"][BIAS] = np.inf
     assert commanded_surface.bias_interval(fdi, 0, BIAS) is None
 
 
@@ -256,23 +252,19 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     """Each known to within 0.01."""
     fdi, surface = new_surface()
     for offset in offsets:
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             offset - 0.01,
             offset + 0.01,
         )
-        judged(
-            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
-        )
-    assert surface["feasible_sets"]["excluded"][GROWING_BIAS] == excluded
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
+    assert surface["sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(
-            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
-        )
-        assert surface["growing_bias"]["min_growth_up"] == surface["growing_bias"]["min_growth_down"] == 0.0
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -285,58 +277,56 @@ def test_at_a_stop_a_growing_bias_says_nothing():
     ],
 )  # fmt: skip
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
-    fdi, surface = new_surface(min_runaway_rate=0.05 / DT)
+    fdi, surface = new_surface(runaway=0.05 / DT)
     for place in places:
-        on(commanded_surface.widen_offset_interval, fdi, surface, GROWING_BIAS)
+        on(commanded_surface.widen_offset, fdi, surface, GROWING_BIAS)
         if place == "well":
-            on(commanded_surface.forget_bias_offset_interval, fdi, surface, GROWING_BIAS)
+            on(commanded_surface.forget_growing, fdi, surface, GROWING_BIAS)
         elif place is not None:
-            surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            surface["judged"]["lo"], surface["judged"]["hi"] = (
                 place - 0.01,
                 min(place + 0.01, HIGH),
             )
             judged(
-                commanded_surface.update_growing_bias_returning_consistent_interval,
+                commanded_surface.update_growing,
                 fdi,
                 surface,
                 GROWING_BIAS,
                 5,
             )
-    assert surface["growing_bias"]["has_run_towards_stop"].tolist() == ran
+    assert surface["growing_bias"]["has_run"].tolist() == ran
 
 
 def test_of_several_instants_a_mean_may_be_that_of_the_last():
-    fdi, surface = new_surface(min_runaway_rate=0.05 / DT)
-    fdi["types"]["config"]["frame_shows_single_instant"] = 0
+    fdi, surface = new_surface(runaway=0.05 / DT)
+    fdi["types"]["config"]["single_instant"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
-        on(commanded_surface.widen_offset_interval, fdi, surface, GROWING_BIAS)
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        on(commanded_surface.widen_offset, fdi, surface, GROWING_BIAS)
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             place - 0.01,
             place + 0.01,
         )
-        judged(
-            commanded_surface.update_growing_bias_returning_consistent_interval, fdi, surface, GROWING_BIAS, 5
-        )
-        assert surface["growing_bias"]["has_run_towards_stop"][1] == ran
+        judged(commanded_surface.update_growing, fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["has_run"][1] == ran
 
 
 def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
-    fdi["types"]["config"]["frame_shows_single_instant"] = whole
-    surface["commands"]["min_command"], surface["commands"]["max_command"] = commands[0], commands[1]
+    fdi["types"]["config"]["single_instant"] = whole
+    surface["commands"]["cmd_min"], surface["commands"]["cmd_max"] = commands[0], commands[1]
     for k, place in enumerate(places):
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             place - 0.01,
             place + 0.01,
         )
         judged(
-            commanded_surface.update_rate_limit_returning_consistent_interval,
+            commanded_surface.update_creep,
             fdi,
             surface,
             SLOW,
             (frames or range(99))[k],
         )
-    return surface["feasible_sets"]["excluded"][SLOW]
+    return surface["sets"]["excluded"][SLOW]
 
 
 def test_a_slow_surface_never_moves_away_from_its_command():
@@ -371,29 +361,29 @@ def test_which_side_of_its_orders_a_surface_stands_on():
     fdi, surface = new_surface(low=0.1, high=0.2)
     commands = surface["commands"]
     for newest, whole in ((1, 0), (2, 1)):
-        fdi["types"]["config"]["frame_shows_single_instant"] = whole
+        fdi["types"]["config"]["single_instant"] = whole
         for low, high, side in (
             (-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0), (-0.1, 0.1, 0), (0.2, 0.3, 0),
         ):  # fmt: skip
-            commands["min_command"], commands["max_command"] = 9.0, -9.0
-            commands["min_command"][newest], commands["max_command"][newest] = low, high
-            commands["min_command"][2] = min(commands["min_command"][2], low)
-            commands["max_command"][2] = max(commands["max_command"][2], high)
-            assert on(commanded_surface.surface_side_of_commands, fdi, surface) == side
+            commands["cmd_min"], commands["cmd_max"] = 9.0, -9.0
+            commands["cmd_min"][newest], commands["cmd_max"][newest] = low, high
+            commands["cmd_min"][2] = min(commands["cmd_min"][2], low)
+            commands["cmd_max"][2] = max(commands["cmd_max"][2], high)
+            assert on(commanded_surface.side_of_commands, fdi, surface) == side
 
 
-def swung(signs, slowest_half_cycle_frames=20):
+def swung(signs, half_frames=20):
     fdi, surface = new_surface()
-    fdi["types"]["config"]["slowest_half_cycle_frames"] = slowest_half_cycle_frames
+    fdi["types"]["config"]["half_frames"] = half_frames
     for frame, sign in enumerate(signs):
         fdi["types"]["frame_index"] = frame + 1
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             0.1 * sign - 0.02,
             0.1 * sign + 0.02,
         )
-        on(commanded_surface.add_squared_deflection_error, fdi, surface, OSCILLATORY)
+        on(commanded_surface.add_square, fdi, surface, OSCILLATORY)
         judged(
-            commanded_surface.update_oscillation_returning_consistent_interval,
+            commanded_surface.update_swing,
             fdi,
             surface,
             OSCILLATORY,
@@ -405,58 +395,48 @@ def swung(signs, slowest_half_cycle_frames=20):
 def test_an_oscillation_is_counted_by_half_cycles():
     fdi, surface = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
     swing = surface["oscillatory"]
-    assert swing["n_half_cycles"] == 3
-    assert (swing["first_half_cycle_end_frame"], swing["last_half_cycle_end_frame"]) == (5, 15)
-    assert commanded_surface.oscillation_has_shown(surface)
-    assert not commanded_surface.oscillation_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
-    assert commanded_surface.oscillation_frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(
-        2 * np.pi / (10 * DT)
-    )
+    assert swing["n_half"] == 3
+    assert (swing["first_end"], swing["last_end"]) == (5, 15)
+    assert commanded_surface.swing_has_shown(surface)
+    assert not commanded_surface.swing_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
+    assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
-    assert swing["earlier_error_square_sum"] == pytest.approx(10 * 0.01)
+    assert swing["square_past"] == pytest.approx(10 * 0.01)
 
 
 def test_the_amplitude_is_that_of_the_mean_square():
     fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
-    assert commanded_surface.oscillation_amplitude_rad(fdi, 0, OSCILLATORY) == pytest.approx(
-        np.sqrt(2.0 * 0.01)
-    )
+    assert commanded_surface.swing_amplitude(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
 
 
 def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
-    assert not swung([1] * 21)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert swung([1] * 22)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert swung([-1] * 22)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert not swung([1] * 21)[1]["sets"]["excluded"][OSCILLATORY]
+    assert swung([1] * 22)[1]["sets"]["excluded"][OSCILLATORY]
+    assert swung([-1] * 22)[1]["sets"]["excluded"][OSCILLATORY]
+    assert not swung([1] * 15 + [0] + [1] * 15)[1]["sets"]["excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    on(commanded_surface.restart_error_sign_duration, fdi, surface, OSCILLATORY)
-    assert surface["oscillatory"]["sign_since_frame"] == 20
+    on(commanded_surface.restart_sign, fdi, surface, OSCILLATORY)
+    assert surface["oscillatory"]["since"] == 20
 
 
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(
-        first_anomalous_frame=3,
-        first_anomalous_position_low=0.1,
-        first_anomalous_position_high=0.2,
-        min_runaway_rate=1.0,
+        k_first=3,
+        first_lo=0.1,
+        first_hi=0.2,
+        runaway=1.0,
     )
     fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert on(held_surface.min_runaway_distance, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.runaway_up_lower_limit, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(held_surface.runaway_down_upper_limit, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(held_surface.runaway_up_lower_limit, fdi, surface, 99) == HIGH
-    assert on(held_surface.runaway_down_upper_limit, fdi, surface, 99) == LOW
-    surface["evidence"]["first_anomalous_frame"] = -1
-    assert (
-        on(held_surface.runaway_up_lower_limit, fdi, surface, 9),
-        on(held_surface.runaway_down_upper_limit, fdi, surface, 9),
-    ) == (
-        LOW,
-        HIGH,
-    )
+        assert on(held_surface.runaway_distance, fdi, surface, frame) == pytest.approx(way)
+        assert on(held_surface.runaway_interval, fdi, surface, frame, 1)[0] == pytest.approx(0.1 + way)
+        assert on(held_surface.runaway_interval, fdi, surface, frame, -1)[1] == pytest.approx(0.2 - way)
+    assert on(held_surface.runaway_interval, fdi, surface, 99, 1) == (HIGH, HIGH)
+    assert on(held_surface.runaway_interval, fdi, surface, 99, -1) == (LOW, LOW)
+    surface["evidence"]["k_first"] = -1
+    assert on(held_surface.runaway_interval, fdi, surface, 9, 1) == (LOW, HIGH)
 
 
 @pytest.mark.parametrize(
@@ -471,106 +451,102 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
         fdi, surface = new_surface(
             low=low,
             high=high,
-            first_anomalous_frame=3,
-            first_anomalous_position_low=0.1,
-            first_anomalous_position_high=0.2,
+            k_first=3,
+            first_lo=0.1,
+            first_hi=0.2,
         )
-        surface["actuator"]["min_runaway_rate"] = 1.0
-        surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
+        surface["actuator"]["runaway"] = 1.0
+        surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.05, 0.3
         judged(TYPES[kind].consistent_interval, fdi, surface, kind, 5)
-        assert surface["feasible_sets"]["excluded"][kind] == excluded
+        assert surface["sets"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate_parameter(fdi, 0, kind) == pytest.approx(0.175)
 
 
 @pytest.mark.parametrize(
-    ("whole", "stop_can_hide_deflection", "excluded"),
+    ("whole", "hides", "excluded"),
     [(1, (0, 0), 1), (0, (0, 0), 1), (1, (0, 1), 1), (0, (0, 1), 0), (0, (1, 0), 1)],
 )
-def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_can_hide_deflection, excluded):
+def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
     (
-        fdi["types"]["config"]["frame_shows_single_instant"],
-        surface["judged_observation"]["stop_can_hide_deflection"],
+        fdi["types"]["config"]["single_instant"],
+        surface["judged"]["hides"],
     ) = (
         whole,
-        stop_can_hide_deflection,
+        hides,
     )
     for frame in range(30):
         judged(
-            commanded_surface.update_oscillation_returning_consistent_interval,
+            commanded_surface.update_swing,
             fdi,
             surface,
             OSCILLATORY,
             frame,
         )
-    assert surface["feasible_sets"]["excluded"][OSCILLATORY] == excluded
+    assert surface["sets"]["excluded"][OSCILLATORY] == excluded
 
 
-@pytest.mark.parametrize(("least", "greatest", "stop_can_hide_deflection"), [
+@pytest.mark.parametrize(("least", "greatest", "hides"), [
     (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
 ])  # fmt: skip
-def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
-    least, greatest, stop_can_hide_deflection
-):
+def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
     _, surface = new_surface()
-    surface["commands"]["min_healthy_position"][0], surface["commands"]["max_healthy_position"][0] = (
+    surface["commands"]["u_min"][0], surface["commands"]["u_max"][0] = (
         least,
         greatest,
     )
-    types.mark_stops_that_can_hide_deflection(surface, 0.0999)
-    assert surface["last_observation"]["stop_can_hide_deflection"].tolist() == stop_can_hide_deflection
+    types.mark_stops(surface, 0.0999)
+    assert surface["last"]["hides"].tolist() == hides
 
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    judged(held_surface.update_stuck_returning_consistent_interval, fdi, surface, STUCK, 5)
-    assert on(held_surface.stuck_deflection_range, fdi, surface, STUCK) == (0.1, 0.2)
+    judged(held_surface.update_stuck, fdi, surface, STUCK, 5)
+    assert on(held_surface.stuck_range, fdi, surface, STUCK) == (0.1, 0.2)
     assert types.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
 
 def test_where_types_have_a_surface():
     fdi, surface = new_surface(
-        first_anomalous_frame=3,
-        first_anomalous_position_low=0.1,
-        first_anomalous_position_high=0.2,
-        min_runaway_rate=1.0,
+        k_first=3,
+        first_lo=0.1,
+        first_hi=0.2,
+        runaway=1.0,
         command=0.2,
     )
-    surface["last_observation"]["healthy_position"], surface["feasible_sets"]["low"][CONSTANT_LOSS] = (
+    surface["last"]["u"], surface["sets"]["low"][CONSTANT_LOSS] = (
         -0.2,
         0.25,
     )
     fdi["types"]["frame_index"] = 5
-    assert on(commanded_surface.loss_deflection_range, fdi, surface, CONSTANT_LOSS) == pytest.approx(
-        (-0.2, -0.05)
-    )
-    assert on(held_surface.float_deflection_range, fdi, surface, FLOAT) == (0.0, 0.0)
-    surface["actuator"]["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
-    assert on(held_surface.float_deflection_range, fdi, surface, FLOAT) == (0.1, 0.1)
-    assert held_surface.neutral_deflection_rad(fdi, 0, FLOAT) == 0.1
-    surface["actuator"]["travel_low"] = LOW
-    assert on(held_surface.hardover_up_deflection_range, fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert on(held_surface.hardover_down_deflection_range, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert on(commanded_surface.loss_range, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
+    assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.0, 0.0)
+    surface["actuator"]["stop_lo"] = 0.1  # the lower stop is as near to neutral as it comes
+    assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.1, 0.1)
+    assert held_surface.float_deflection(fdi, 0, FLOAT) == 0.1
+    surface["actuator"]["stop_lo"] = LOW
+    assert on(held_surface.range_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert on(held_surface.range_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [TYPES[kind].estimate_parameter(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,
         LOW,
     ]
-    assert commanded_surface.effectiveness_minus_one_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
+    assert commanded_surface.theta_of_set(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
 
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["types"]["config"]["released_surface_returns_via_actuator"], fdi["types"]["config"]["n_substeps"] = (
+    fdi["types"]["config"]["returns_lagged"], fdi["types"]["config"]["n_substeps"] = (
         1,
         instants,
     )
-    surface["commands"]["command_history"][1] = order
-    for which in (held_surface.EARLIER_RELEASES_SLOT, held_surface.LATER_RELEASES_SLOT):
+    surface["commands"]["history"][1] = order
+    for which in (held_surface.EARLIER_SLOT, held_surface.LATER_SLOT):
         held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["return_position_low"][held_surface.LATER_RELEASES_SLOT, STUCK] = low
-    surface["release"]["return_position_high"][held_surface.LATER_RELEASES_SLOT, STUCK] = high
+    surface["release"]["back_lo"][held_surface.LATER_SLOT, STUCK] = low
+    surface["release"]["back_hi"][held_surface.LATER_SLOT, STUCK] = high
     return fdi, surface
 
 
@@ -582,9 +558,7 @@ def test_a_return_goes_by_the_actuator(instants):
     for _ in range(instants):
         path.append(place)
         place -= min(0.5 * place, 0.1)
-    assert on(held_surface.simulate_return_in_frame, fdi, surface, 0.3) == pytest.approx(
-        (np.mean(path), place, 0.0)
-    )
+    assert on(held_surface.simulate_return, fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
@@ -596,37 +570,33 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["judged_observation"]["weighted_mean_error_per_position_range"] = (
-        0.25 * (G.max() - G.min()) / G.mean()
-    )
-    mean, _, room = on(held_surface.simulate_return_in_frame, fdi, surface, held)
+    surface["judged"]["kappa"] = 0.25 * (G.max() - G.min()) / G.mean()
+    mean, _, room = on(held_surface.simulate_return, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     (
-        surface["judged_observation"]["healthy_position"],
-        surface["judged_observation"]["position_low"],
-        surface["judged_observation"]["position_high"],
+        surface["judged"]["u"],
+        surface["judged"]["lo"],
+        surface["judged"]["hi"],
     ) = (
         9.0,
         shown - 1e-12,
         shown + 1e-12,
     )
-    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
+    assert on(held_surface.keep_returns, fdi, surface, STUCK)
 
 
 def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
-    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
+    assert on(held_surface.keep_returns, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
-        (0.22, 0.28)
-    )
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((0.22, 0.28))
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
-        assert not on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
-        assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
+        assert not on(held_surface.keep_returns, fdi, surface, STUCK)
+        assert not held_surface.may_return(surface, held_surface.LATER_SLOT, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
-        held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK
+        held_surface.keep_returns, fdi, surface, STUCK
     )  # it is back: no release explains that anything is wrong
 
 
@@ -638,15 +608,15 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
         (
             fdi["types"]["config"]["frames_per_block"],
-            surface["actuator"]["approach_share_per_substep"],
-            surface["actuator"]["max_motion_per_substep"],
+            surface["actuator"]["approach_share"],
+            surface["actuator"]["step"],
         ) = (
             length,
             1.0,
             0.05,
         )
-        surface["judged_observation"]["weighted_mean_error_per_position_range"] = 0.2
-        assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK) == there
+        surface["judged"]["kappa"] = 0.2
+        assert on(held_surface.keep_returns, fdi, surface, STUCK) == there
 
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
@@ -655,48 +625,42 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     held_surface.add_release(surface, STUCK, 0.1, 0.15)
     held_surface.add_release(surface, STUCK, 0.5, 0.4)  # nowhere
     held = surface["release"]
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.1, 0.3)
-    held["has_released"][STUCK] = 1
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == (0.1, 0.3)
+    held["released"][STUCK] = 1
     held_surface.add_release(surface, STUCK, -0.4, 0.5)
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.1, 0.3)
-    surface["judged_observation"]["is_anomalous"] = 1
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == (0.1, 0.3)
+    surface["judged"]["anomalous"] = 1
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
-        (0.05, 0.2)
-    )
-    assert held["has_released"][STUCK] == 1
-    surface["judged_observation"]["is_anomalous"] = 0
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((0.05, 0.2))
+    assert held["released"][STUCK] == 1
+    surface["judged"]["anomalous"] = 0
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert held["has_released"][STUCK] == 0
+    assert held["released"][STUCK] == 0
 
 
-@pytest.mark.parametrize("released_surface_returns_via_actuator", [0, 1])
+@pytest.mark.parametrize("returns_lagged", [0, 1])
 def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
-    released_surface_returns_via_actuator,
+    returns_lagged,
 ):
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["released_surface_returns_via_actuator"] = released_surface_returns_via_actuator
-    elsewhere = (
-        held_surface.STATUS_RETURNING
-        if released_surface_returns_via_actuator
-        else held_surface.STATUS_REFUTED
-    )
-    judged(held_surface.update_releases_returning_consistent_interval, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["feasible_sets"]["excluded"][STUCK] == (not released_surface_returns_via_actuator)
-    assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
+    fdi["types"]["config"]["returns_lagged"] = returns_lagged
+    elsewhere = held_surface.IS_RETURNING if returns_lagged else held_surface.IS_REFUTED
+    judged(held_surface.held_interval, fdi, surface, STUCK, -0.1, 0.1)
+    assert surface["sets"]["excluded"][STUCK] == (not returns_lagged)
+    assert surface["release"]["released"][STUCK] == returns_lagged
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["released_surface_returns_via_actuator"] = released_surface_returns_via_actuator
-    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.STATUS_HELD
-    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.STATUS_HELD
-    surface["release"]["has_released"][STUCK] = 1
-    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
+    fdi["types"]["config"]["returns_lagged"] = returns_lagged
+    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.3, 0.4) == held_surface.IS_HELD
+    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.1, 0.2) == held_surface.IS_HELD
+    surface["release"]["released"][STUCK] = 1
+    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
-    assert on(held_surface.position_interval_at_frame_start_and_its_frame, fdi, surface) == (0.1, 0.2, 9)
-    fdi["types"]["config"]["frame_shows_single_instant"] = 0
-    assert on(held_surface.position_interval_at_frame_start_and_its_frame, fdi, surface) == (0.3, 0.4, 8)
+    assert on(held_surface.frame_start, fdi, surface) == (0.1, 0.2, 9)
+    fdi["types"]["config"]["single_instant"] = 0
+    assert on(held_surface.frame_start, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
@@ -705,84 +669,51 @@ def test_from_where_each_type_lets_go(kind):
         low=np.inf,
         high=-np.inf,
         judged=(-0.1, 0.2),
-        first_anomalous_frame=7,
-        first_anomalous_position_low=0.0,
+        k_first=7,
+        first_lo=0.0,
     )
-    surface["actuator"]["min_runaway_rate"], surface["evidence"]["first_anomalous_position_high"] = 1.0, 0.1
-    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
+    surface["actuator"]["runaway"], surface["evidence"]["first_hi"] = 1.0, 0.1
+    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.05, 0.3
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["return_position_low"][held_surface.EARLIER_RELEASES_SLOT, STUCK],
-            surface["release"]["return_position_high"][held_surface.EARLIER_RELEASES_SLOT, STUCK],
+            surface["release"]["back_lo"][held_surface.EARLIER_SLOT, STUCK],
+            surface["release"]["back_hi"][held_surface.EARLIER_SLOT, STUCK],
         ) = 0.0, 0.1
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
-    assert (held["return_position_low"][1, kind], held["return_position_high"][1, kind]) == pytest.approx(
-        expected
-    )
+    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
 def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(kind, expected):
     fdi, surface = released(
-        first_anomalous_frame=7,
-        first_anomalous_position_low=0.0,
-        first_anomalous_position_high=0.1,
-        min_runaway_rate=1.0,
+        k_first=7,
+        first_lo=0.0,
+        first_hi=0.1,
+        runaway=1.0,
     )
     (
-        surface["earlier_observation"]["position_low"],
-        surface["earlier_observation"]["position_high"],
-        fdi["types"]["config"]["frame_shows_single_instant"],
+        surface["earlier"]["lo"],
+        surface["earlier"]["hi"],
+        fdi["types"]["config"]["single_instant"],
     ) = -0.1, 0.2, 0
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
-    assert (held["return_position_low"][1, kind], held["return_position_high"][1, kind]) == pytest.approx(
-        expected
-    )
-
-
-def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
-    surface["stuck"]["feasible_low_before_release"], surface["stuck"]["feasible_high_before_release"] = (
-        (0.0, 0.1),
-        (0.2, 0.4),
-    )
-    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
-    restore_sets(surface)
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.replace_impossible_release_and_store_set(
-        surface, STUCK
-    )  # no earlier release: the later are the earlier ones now
-    held = surface["release"]
-    assert (held["return_position_low"][0, STUCK], held["return_position_high"][0, STUCK]) == (0.2, 0.3)
-    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
-    assert (
-        surface["stuck"]["feasible_low_before_release"].tolist(),
-        surface["stuck"]["feasible_high_before_release"].tolist(),
-    ) == (
-        [0.1, 0.1],
-        [0.4, 0.4],
-    )
-    restore_sets(surface)
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
-    surface["judged_observation"]["is_anomalous"], surface["feasible_sets"]["low"][STUCK] = 1, 0.3
-    restore_sets(surface)
-    assert surface["feasible_sets"]["low"][STUCK] == 0.3
+    assert (held["back_lo"][1, kind], held["back_hi"][1, kind]) == pytest.approx(expected)
 
 
 def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     """A block of frames in which the surface may be let go at any instant."""
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, is_anomalous_then=1)
+    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, anomalous_then=1)
     fdi["types"]["config"]["frames_per_block"] = len(commands)
-    surface["commands"]["command_history"][1, : len(commands)] = commands
-    surface["release"]["held_position_min"][STUCK], surface["release"]["held_position_max"][STUCK] = held
-    surface["judged_observation"]["weighted_mean_error_per_position_range"] = UNEVEN
+    surface["commands"]["history"][1, : len(commands)] = commands
+    surface["release"]["held_lo"][STUCK], surface["release"]["held_hi"][STUCK] = held
+    surface["judged"]["kappa"] = UNEVEN
     return fdi, surface
 
 
@@ -806,7 +737,7 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
             path.append(place)
             place = extreme(way(place, [order])[1], start)
         room = UNEVEN * np.ptp(path)
-        assert on(held_surface.simulate_return_in_frame, fdi, surface, start, side) == pytest.approx(
+        assert on(held_surface.simulate_return, fdi, surface, start, side) == pytest.approx(
             (np.mean(path), place, room)
         )
         for wait in range(len(ORDERS)):  # held so long, then let go
@@ -819,24 +750,22 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
 def test_a_release_within_the_block_explains_what_lies_between_with_some_room(end, inside):
     fdi, surface = within_block(ORDERS)
     start, side = (0.2, -1) if end == "low" else (0.3, 1)
-    mean, _, room = on(held_surface.simulate_return_in_frame, fdi, surface, start, side)
+    mean, _, room = on(held_surface.simulate_return, fdi, surface, start, side)
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
-    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
-        (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    )
-    assert on(held_surface.release_within_block_explains_block, fdi, surface, STUCK) == inside
-    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK) == inside
-    held = surface["release"]["held_position_min"][STUCK] <= surface["release"]["held_position_max"][STUCK]
+    surface["judged"]["lo"], surface["judged"]["hi"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
+    assert on(held_surface.release_explains, fdi, surface, STUCK) == inside
+    assert on(held_surface.keep_returns, fdi, surface, STUCK) == inside
+    held = surface["release"]["held_lo"][STUCK] <= surface["release"]["held_hi"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["frames_per_block"] = 1
-    assert not on(held_surface.release_within_block_explains_block, fdi, surface, STUCK)
+    assert not on(held_surface.release_explains, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not on(held_surface.release_within_block_explains_block, fdi, surface, STUCK)
+    assert not on(held_surface.release_explains, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -844,19 +773,15 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     fdi, surface = within_block(ORDERS)
     held = surface["release"]
     if joined:
-        held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK] = 0.25, 0.251
+        held["back_lo"][1, STUCK], held["back_hi"][1, STUCK] = 0.25, 0.251
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    low, high = (
-        on(held_surface.simulate_return_in_frame, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1))
-    )
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
-        (low, high)
-    )
-    assert not held_surface.is_release_possible(surface, held_surface.EARLIER_RELEASES_SLOT, STUCK)
-    fdi["types"]["config"]["frames_per_block"], before = 1, held["return_position_high"][1, STUCK].copy()
-    held_surface.clear_releases(surface, held_surface.LATER_RELEASES_SLOT, STUCK)
+    low, high = (on(held_surface.simulate_return, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == pytest.approx((low, high))
+    assert not held_surface.may_return(surface, held_surface.EARLIER_SLOT, STUCK)
+    fdi["types"]["config"]["frames_per_block"], before = 1, held["back_hi"][1, STUCK].copy()
+    held_surface.clear_releases(surface, held_surface.LATER_SLOT, STUCK)
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASES_SLOT, STUCK), (
+    assert not held_surface.may_return(surface, held_surface.LATER_SLOT, STUCK), (
         "in one frame nothing is let go within"
     )
     assert before == pytest.approx(high)
@@ -866,76 +791,72 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
 @pytest.mark.parametrize("inside", [True, False])
 def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room(side, inside):
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
-    fdi["types"]["config"]["frames_per_block"], surface["commands"]["command_history"][1, :4] = 4, ORDERS
+    fdi["types"]["config"]["frames_per_block"], surface["commands"]["history"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
-    surface["judged_observation"]["weighted_mean_error_per_position_range"], path = UNEVEN, way(start, ORDERS)
+    surface["judged"]["kappa"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
-    assert on(held_surface.simulate_return_in_frame, fdi, surface, start) == pytest.approx(
+    assert on(held_surface.simulate_return, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
     )
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
-    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
-        (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    )
+    surface["judged"]["lo"], surface["judged"]["hi"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
     assert (
         on(
-            held_surface.narrow_and_test_return_interval,
+            held_surface.narrow_return,
             fdi,
             surface,
-            held_surface.LATER_RELEASES_SLOT,
+            held_surface.LATER_SLOT,
             STUCK,
         )
         == inside
     )
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
-        assert held["return_position_low"][1, STUCK] <= held["return_position_high"][1, STUCK]
-        kept = held["return_position_low" if side == "low" else "return_position_high"][1, STUCK]
+        assert held["back_lo"][1, STUCK] <= held["back_hi"][1, STUCK]
+        kept = held["back_lo" if side == "low" else "back_hi"][1, STUCK]
         assert kept == pytest.approx(start)
 
 
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
-    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.15, 0.22
+    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.15, 0.22
     on(held_surface.add_stuck_release, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["return_position_low"][0, STUCK], held["return_position_high"][0, STUCK]) == (0.1, 0.3)
-    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.15, 0.22)
-    assert (held["held_position_min"][STUCK], held["held_position_max"][STUCK]) == (0.15, 0.22)
+    assert (held["back_lo"][0, STUCK], held["back_hi"][0, STUCK]) == (0.1, 0.3)
+    assert (held["back_lo"][1, STUCK], held["back_hi"][1, STUCK]) == (0.15, 0.22)
+    assert (held["held_lo"][STUCK], held["held_hi"][STUCK]) == (0.15, 0.22)
 
 
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
-    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
-    surface["stuck"]["feasible_low_before_release"], surface["stuck"]["feasible_high_before_release"] = (
+    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
+    surface["stuck"]["lo_before"], surface["stuck"]["hi_before"] = (
         (0.0, 0.1),
         (0.2, 0.4),
     )
-    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
+    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.25, 0.26
     restore_sets(surface)
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
+    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.1, 0.4)
     (
-        surface["release"]["return_position_low"][0, STUCK],
-        surface["release"]["return_position_high"][0, STUCK],
+        surface["release"]["back_lo"][0, STUCK],
+        surface["release"]["back_hi"][0, STUCK],
     ) = 0.1, 0.2
     restore_sets(surface)
-    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
+    assert (surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK]) == (0.0, 0.2)
 
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    judged(commanded_surface.update_oscillation_returning_consistent_interval, fdi, surface, OSCILLATORY, 10)
+    judged(commanded_surface.update_swing, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
-    assert (swing["error_sign"], swing["n_half_cycles"], swing["sign_since_frame"]) == (0, 0, 11)
+    assert (swing["sign"], swing["n_half"], swing["since"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
-        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        surface["judged"]["lo"], surface["judged"]["hi"] = (
             low,
             high,
         )
-        judged(
-            commanded_surface.update_oscillation_returning_consistent_interval, fdi, surface, OSCILLATORY, 10
-        )
-        assert swing["error_sign"] == 0, "on its command it is on no side of it"
+        judged(commanded_surface.update_swing, fdi, surface, OSCILLATORY, 10)
+        assert swing["sign"] == 0, "on its command it is on no side of it"
 
 
 NOISY, SLOWEST_RAD_S = {"bounds": {"sensors": {"q": {"noise_std_deg_s": 0.1}}}}, 1.7
@@ -960,35 +881,33 @@ def test_all_that_types_are_set_up_with_by_scenario_surface_and_actuator(keys, f
     }  # fmt: skip
     types = np.zeros(1, registry.fault_types_dtype(4))[0]
     layout, prediction = np.zeros(1, layout_dtype(4))[0], np.zeros(1, prediction_dtype(4))[0]
-    layout["group"] = LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP, LATERAL_SURFACE_GROUP, PITCH_SURFACE_GROUP
+    layout["group"] = LATERAL_GROUP, PITCH_GROUP, LATERAL_GROUP, PITCH_GROUP
     actuators = prediction["actuators"]
     actuators["real"], actuators["approach"] = 1, (0.2, 0.3, 0.4, 0.5)
     actuators["step"] = np.inf, np.radians(90.0) * instant_s, np.radians(2.5) * instant_s, np.inf
     travel = np.array([[0.05, -0.4, -0.3, -0.2], [0.5, 0.45, 0.35, -0.02]])
-    registry.configure_fault_types(
-        types, layout, actuators, Declared.of(Scenario.model_validate(given)), travel
-    )
+    registry.configure_types(types, layout, actuators, Declared.of(Scenario.model_validate(given)), travel)
     config, pairs = types["config"], fdi.get("pairs", False)
     found = {name: config[name].item() for name in config.dtype.names if np.any(config[name])}
     expected = {
         "frames_per_block": frames, "block_duration_s": frames * dt, "dt": dt,
-        "slowest_half_cycle_frames": int(np.ceil(np.pi / SLOWEST_RAD_S / (frames * dt))),
-        "n_substeps": keys.get("substeps", 1), "released_surface_returns_via_actuator": 1,
+        "half_frames": int(np.ceil(np.pi / SLOWEST_RAD_S / (frames * dt))),
+        "n_substeps": keys.get("substeps", 1), "returns_lagged": 1,
     }  # fmt: skip
-    expected |= {"frame_shows_single_instant": 1} if pairs else {}
+    expected |= {"single_instant": 1} if pairs else {}
     expected |= {"abrupt": 1} if fdi.get("fault_profile") else {}
     assert found == pytest.approx(expected)
-    assert (types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"]) == (-1, pairs)
+    assert (types["pair"]["first_pitch"], types["pair"]["enabled"]) == (-1, pairs)
     surfaces = types["surface"]
     expected = {
-        "travel_low": travel[0], "travel_high": travel[1], "reachable_low": [0.0, -0.4, -0.3, -0.2],
-        "reachable_high": [0.5, 0.45, 0.35, 0.0], "approach_share_per_substep": actuators["approach"],
-        "max_motion_per_substep": actuators["step"],
-        "min_runaway_rate": [np.pi / 6.0, np.pi / 4.0, np.radians(1.25), np.pi / 6.0],
-        "min_rate_limited_motion_per_substep": np.radians([3.0, 3.0, 2.5, 3.0]) * instant_s,
+        "stop_lo": travel[0], "stop_hi": travel[1], "reach_lo": [0.0, -0.4, -0.3, -0.2],
+        "reach_hi": [0.5, 0.45, 0.35, 0.0], "approach_share": actuators["approach"],
+        "step": actuators["step"],
+        "runaway": [np.pi / 6.0, np.pi / 4.0, np.radians(1.25), np.pi / 6.0],
+        "slow_step": np.radians([3.0, 3.0, 2.5, 3.0]) * instant_s,
     }  # fmt: skip
     assert set(surfaces["actuator"].dtype.names) == set(expected)
     for name, values in expected.items():
         assert surfaces["actuator"][name] == pytest.approx(np.array(values)), name
-    assert surfaces["status"]["may_be_sole_fault"].tolist() == ([0, 1, 0, 1] if pairs else [1] * 4)
+    assert surfaces["status"]["may_be_sole"].tolist() == ([0, 1, 0, 1] if pairs else [1] * 4)
     assert surfaces["accommodation"]["mode"].tolist() == surfaces["status"]["fault_type"].tolist() == [-1] * 4

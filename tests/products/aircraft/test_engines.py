@@ -207,13 +207,13 @@ def judged(jet, missing_n, levers=(0.0, 0.0)):
     """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
     place in JSBSim's own file."""
     aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINE_MONITOR_RECORD)[0]
-    monitors.configure_engine_monitor(of_it["config"], aircraft)
+    monitors.configure_balance(of_it["config"], aircraft)
     names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
     y = np.zeros(4 + len(names))
     y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
     y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
     of_it, before = of_it.view(np.recarray), of_it["config"].copy()
-    monitors.disable_if_differential_thrust(of_it, np.array(levers))
+    monitors.disable_if_apart(of_it, np.array(levers))
     alarmed = monitors.detect_engine_failure(of_it, 1e-6, y)
     assert of_it["config"] == before
     assert of_it["output"]["engine_failed"] == alarmed
@@ -226,7 +226,7 @@ def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
     aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
     of_it = {
         "thrust": thrust,
-        "engines_n": monitors.healthy_yawing_moment_per_thrust(aircraft) * thrust + [0.0, off, 0.5 * off],
+        "engines_n": monitors.yaw_per_thrust(aircraft) * thrust + [0.0, off, 0.5 * off],
     }
     set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
     assert [("engines_apart" in box) for box in boxes] == [known, known]

@@ -317,16 +317,16 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     bound, design, means = (
         frame["fdi"]["bound"],
         frame["prediction"]["design"],
-        frame["prediction"]["frame_means"],
+        frame["prediction"]["means"],
     )
-    bound["declared_errors"]["has_declared_errors"], frame["fdi"]["types"]["config"]["frames_per_block"] = (
+    bound["declared_errors"]["given"], frame["fdi"]["types"]["config"]["frames_per_block"] = (
         1,
         1,
     )
     x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["prediction"]["actuators"]
     apart(
         eta_bar=bound["eta_bar"],
-        noise=bound["changing_gyro_error_bound"],
+        noise=bound["n_gyro"],
         inertia=bound["inertia_coupling_error_share"],
         G=means["G"],
         x=x,
@@ -334,9 +334,7 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     at = situation_of(SimpleNamespace(last=FrameReadout(frame)), ambiguous(substeps=2), 0.3)
     coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
     turning = bound["inertia_coupling_error_share"] * coupling * 0.3**2
-    assert at.bound == pytest.approx(
-        1.1 * (bound["eta_bar"] + turning + 2.0 * bound["changing_gyro_error_bound"] * 100.0)
-    )
+    assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["n_gyro"] * 100.0))
     for found, expected in (
         (at.G, means["G"]), (at.u, frame["prediction"]["u"]), (at.x, x), (at.alpha, y[0]),
         (at.stops, [actuators["low"], actuators["high"]]), (at.step, actuators["step"]),

@@ -95,7 +95,7 @@ def test_the_phases_are_what_they_are_called(published):
             assert loop.loop.frames["fdi"]["verdict"]["detected"][0] == alarm
             loop.fly(measure.FRAMES)
             assert loop.loop.frames["fdi"]["verdict"]["detected"][0] == alarm
-    assert np.abs(after.loop.frames["fdi"]["fdae"]["network"]["memory"]["basis_values"]).max() > 0
+    assert np.abs(after.loop.frames["fdi"]["fdae"]["network"]["memory"]["Phi"]).max() > 0
 
 
 def test_every_round_flies_what_the_flight_itself_flew():

@@ -53,7 +53,7 @@ def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():
     assert now["k"][0] == before["k"][0] + 20
     for untouched in ("fdi", "control", "accounts"):
         assert bits(now[untouched]) == bits(before[untouched])
-    for untouched in ("f", "G", "sums", "frame_means"):
+    for untouched in ("f", "G", "sums", "means"):
         assert bits(now["prediction"][untouched]) == bits(before["prediction"][untouched])
     assert np.isnan(loop.log).all()
     assert loop.plant.read("fcs/elevator-cmd-rad") == 0.01 != commands[1]

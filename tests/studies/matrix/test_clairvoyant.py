@@ -9,7 +9,7 @@ import pytest
 from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
-from beaver_ftc.diagnosis.informed_test import healthy_surface_positions, unit_term_acceleration
+from beaver_ftc.diagnosis.informed_test import healthy_positions, term_acceleration
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.results.log import Columns
@@ -50,14 +50,14 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
     x = np.column_stack([kept[f"{axis}_rad_s"] for axis in "pqr"])
     y = np.column_stack([kept[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")])
     found = sum(
-        t.value * unit_term_acceleration(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface
+        t.value * term_acceleration(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface
     )
     turning = inertial(inertia_coefficients(AIRCRAFT.mass), x)
     expected = [model.f(*each) for each in zip(x, y, strict=True)]
     assert found + turning == pytest.approx(np.array(expected), rel=1e-9)
     for s, surface in enumerate(AIRCRAFT.surfaces):
         of_it = [term for term in AIRCRAFT.moments if term.surface == surface]
-        found = sum(term.value * unit_term_acceleration(AIRCRAFT, term, kept, deflection) for term in of_it)
+        found = sum(term.value * term_acceleration(AIRCRAFT, term, kept, deflection) for term in of_it)
         expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
         assert found == pytest.approx(np.array(expected), rel=1e-9)
 
@@ -74,7 +74,7 @@ def test_a_healthy_surface_is_where_the_truth_has_it(lost):
         before = kept["t_s"] < until_s
         true = kept[f"{surface}_effective_rad"]
         step = context.declared.rate_limit_rad_s[0] * context.dt_s
-        assert np.abs(healthy_surface_positions(context, kept, surface) - true)[before].max() <= step
+        assert np.abs(healthy_positions(context, kept, surface) - true)[before].max() <= step
 
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
@@ -93,9 +93,7 @@ def test_the_time_since_the_fault_and_the_air_as_the_vanes_show_it(lost, monkeyp
     told = seen_when_told(scenario, kept, "elevator")
     rate = scenario.fdi.statistical.false_alarms_per_h
     assert seen == [(told["told_deflection"], scenario.duration_s - AT_S, rate)]
-    monkeypatch.setattr(
-        clairvoyant, "context_with_measured_gust", lambda context, std: seen.append(std) or context
-    )
+    monkeypatch.setattr(clairvoyant, "with_measured_gust", lambda context, std: seen.append(std) or context)
     clairvoyant._declared(rough)
     frames = Loop(rough).frames
     variance = FrameReadout(frames[0]).diagnosis.acceleration_variance_from_input_noise
@@ -139,7 +137,7 @@ def test_an_aircraft_with_signals_of_its_own_keeps_those():
     assert "dpt" not in kept
     for term in scenario.airframe.moments:
         moved = kept.get(f"{term.surface}_cmd_rad")
-        assert np.isfinite(unit_term_acceleration(scenario.airframe, term, kept, moved)).all()
+        assert np.isfinite(term_acceleration(scenario.airframe, term, kept, moved)).all()
 
 
 @pytest.mark.parametrize(
@@ -158,4 +156,4 @@ def test_a_healthy_surface_follows_the_command_within_its_travel_lag_and_rate(ba
         declared=SimpleNamespace(bandwidth_rad_s=[5.0, bandwidth], rate_limit_rad_s=[0.4, rate]),
     )  # fmt: skip
     log = {"tab_cmd_rad": np.array([0.5, 0.25, -1.0, -0.1]), "tab_effective_rad": np.zeros(4)}
-    assert healthy_surface_positions(context, log, "tab") == pytest.approx(expected, abs=1e-12)
+    assert healthy_positions(context, log, "tab") == pytest.approx(expected, abs=1e-12)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.informed_test import (
-    UNEXPLAINED_ACCELERATION_CORRELATION_S,
+    UNEXPLAINED_MEMORY_S,
     WhiteningFilter,
-    context_with_measured_gust,
     detection_probability,
+    with_measured_gust,
 )
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.loop.loop import Loop
@@ -39,9 +39,7 @@ def covariance(context, n):
         gust = process(declared.gust_rad_s[j], declared.gust_time_s[j])
         effect = declared.gust_effect[:, j]
         accelerations += np.einsum("a,b,kl->akbl", effect, effect, gust)
-        unexplained = process(
-            context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_ACCELERATION_CORRELATION_S
-        )
+        unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_MEMORY_S)
         accelerations[j, :, j] += unexplained + declared.model_rad_s2[j] ** 2 * np.eye(n)
     summed = DT * np.tril(np.ones((n, n)), -1)
     rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed, optimize=True)
@@ -59,9 +57,7 @@ def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
     mean[:, before:] = DT * np.cumsum(phi, axis=0).T
     C = covariance(context, before + after)
     expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
-    assert WhiteningFilter(context).deflection_coefficient_by_frame(phi)[-1] == pytest.approx(
-        expected, rel=0.01
-    )
+    assert WhiteningFilter(context).deflection_by_frame(phi)[-1] == pytest.approx(expected, rel=0.01)
 
 
 def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
@@ -84,18 +80,18 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     C, R = C.reshape(3 * (before + n), -1), R.reshape(-1, 2)
     expected = np.sqrt(late.ravel() @ np.linalg.solve(C + R @ R.T, late.ravel()))
     whitening = WhiteningFilter(context)
-    found = whitening.deflection_coefficient_with_unknowns(phi, regressors, sigma)
+    found = whitening.deflection_with_unknowns(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)
-    assert found < 0.98 * whitening.deflection_coefficient_by_frame(phi)[-1]
-    nothing = whitening.deflection_coefficient_with_unknowns(phi, regressors[..., :0], sigma[:0])
-    assert nothing == pytest.approx(whitening.deflection_coefficient_by_frame(phi)[-1])
+    assert found < 0.98 * whitening.deflection_by_frame(phi)[-1]
+    nothing = whitening.deflection_with_unknowns(phi, regressors[..., :0], sigma[:0])
+    assert nothing == pytest.approx(whitening.deflection_by_frame(phi)[-1])
 
 
 def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):
     phi = np.random.default_rng(0).normal(size=(50, 3))
     whitening = WhiteningFilter(context)
-    d = whitening.deflection_coefficient_by_frame(phi)
-    assert whitening.deflection_coefficient_by_frame(2.0 * phi) == pytest.approx(2.0 * d)
+    d = whitening.deflection_by_frame(phi)
+    assert whitening.deflection_by_frame(2.0 * phi) == pytest.approx(2.0 * d)
     assert (np.diff(d) >= 0.0).all()
 
 
@@ -103,7 +99,7 @@ def test_rougher_air_hides_more(context):
     phi = np.full((100, 3), 0.1)
     rough = replace(context, declared=replace(context.declared, gust_rad_s=3.0 * context.declared.gust_rad_s))
     still = replace(context, declared=replace(context.declared, gust_rad_s=np.zeros(3)))
-    found = [WhiteningFilter(one).deflection_coefficient_by_frame(phi)[-1] for one in (rough, context, still)]
+    found = [WhiteningFilter(one).deflection_by_frame(phi)[-1] for one in (rough, context, still)]
     assert found[0] < 0.6 * found[1] < 0.6 * found[2]
 
 
@@ -115,7 +111,7 @@ def test_of_a_flight_it_takes_what_the_surface_gave(context):
     frames = round(at_s * 100)
     effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])
     shown = VaneGust(recording.context).context  # a test that knows the gusts that the vanes show
-    d = WhiteningFilter(shown).deflection_coefficient_by_frame(effect)
+    d = WhiteningFilter(shown).deflection_by_frame(effect)
     assert deflections(recording, "elevator", 0.7, (0.5, 1.0)) == pytest.approx([d[49], d[-1]])
     assert not effect[:, [0, 2]].any()
 
@@ -137,7 +133,7 @@ def test_chance_is_what_throwing_the_noise_counts():
 def test_a_test_that_is_shown_the_vanes_knows_all_of_a_gust_but_what_they_leave(context):
     """Of roll all is left, of pitch and yaw shares of the intensity; what vanes add is noise of the model."""
     noise = np.array([0.03, 0.05, 0.02])
-    found = context_with_measured_gust(context, noise)
+    found = with_measured_gust(context, noise)
     declared = context.declared
     assert found.declared.gust_rad_s == pytest.approx(declared.gust_rad_s * np.sqrt([1.0, 0.003, 0.03]))
     assert found.declared.model_rad_s2 == pytest.approx(np.hypot(declared.model_rad_s2, noise))
@@ -145,4 +141,4 @@ def test_a_test_that_is_shown_the_vanes_knows_all_of_a_gust_but_what_they_leave(
     assert replace(found.declared, **of_before) == declared
     assert replace(found, declared=declared) == context
     still = replace(context, declared=replace(declared, gust_rad_s=np.zeros(3)))
-    assert context_with_measured_gust(still, noise) is still
+    assert with_measured_gust(still, noise) is still

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.diagnosis.schemes.published import N_CENTRES_PER_INPUT
+from beaver_ftc.diagnosis.schemes.published import N_CENTRES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce import beside, truth_and_design, words
 
@@ -188,6 +188,6 @@ def test_what_is_not_borne_out_is_red_and_where_it_stands_is_there():
 def test_the_listed_deviations_have_the_numbers_of_the_code():
     """The sizes of the networks are no options, so that the list alone says them."""
     listed = " ".join(words._SAYS["deviations from the paper"])
-    assert f"{N_CENTRES_PER_INPUT[0]} x {N_CENTRES_PER_INPUT[1]} x {N_CENTRES_PER_INPUT[2]} centres" in listed
+    assert f"{N_CENTRES[0]} x {N_CENTRES[1]} x {N_CENTRES[2]} centres" in listed
     assert f"{Scenario(name='x').control.least_effectiveness} by default" in listed
     assert all(word in listed for word in ("spread", "Earth's rotation", "rounding"))

@@ -80,9 +80,7 @@ def increment(law, reference, main, prediction, x):
         if memory.begun:
             change = (x[i] - memory.x_before[i]) / reference.config.dt
             xdot0 = smooth(memory.rate_filter, i, change, config.keep)
-            given = smooth(
-                memory.surface_filter, i, given_by(prediction.frame_means.Gu, main, i), config.keep
-            )
+            given = smooth(memory.surface_filter, i, given_by(prediction.means.Gu, main, i), config.keep)
         nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
         demand[i] = nu - xdot0 + given
     solve(prediction.G, main, demand, law.output.command)

@@ -465,9 +465,9 @@ def accommodate(control, assessment, faults, prediction, measured):
     for s in range(surfaces.output.target.size):
         target = reported(surfaces.output, assessment, faults, s, 0.0, False)
         start = start_of(surfaces.output, assessment, s, False)
-        if assessment.no_surface_to_accommodate and memory.estimator.active:
+        if assessment.no_target and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
-        elif assessment.accommodation_mode[s] != GIVE_UP and not assessment.is_held:
+        elif assessment.accommodation_mode[s] != GIVE_UP and not assessment.held:
             target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
         named = assessment.detected and s == assessment.isolated_surface
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)
@@ -657,9 +657,9 @@ def demand(law, reference, surfaces, main, transfer_share, prediction, measured)
     observer = law.observer
     memory = law.memory
     output = law.output
-    means = prediction.frame_means
+    means = prediction.means
     schedule(config, memory, measured.y[QDYN], transfer_share)
-    observe(law, surfaces, main, measured.x, means.predicted_acceleration, means.Gu, means.G)
+    observe(law, surfaces, main, measured.x, means.F, means.Gu, means.G)
     if memory.estimator.active:
         estimate(
             memory.estimator, memory.innovation, memory.L_rate, memory.L_disturbance, config.dt, measured.x,

@@ -23,8 +23,8 @@ from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.diagnosis.schemes.published import (
     STATE_NETWORK_RECORD,
-    configure_state_network,
-    fill_state_network_basis_and_output,
+    configure_network,
+    evaluate_state_network,
     train_state_network,
 )
 from beaver_ftc.plugins import LAWS, settings
@@ -56,7 +56,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
     layout = control["layout"]
     travel = np.array([layout["low"], layout["high"]])[:, layout["main"]]
-    configure_state_network(law["network"], option["network_gain"], limit, travel)
+    configure_network(law["network"], option["network_gain"], limit, travel)
     config["least"], config["most"] = -np.inf, np.inf
     if option["projection"]:
         config["least"], config["most"] = settled.least_effectiveness, 1.0
@@ -71,7 +71,7 @@ def accommodate(control, assessment, faults, prediction, measured):
         saturated, reference = control.allocation.output.saturated, control.reference
         error = reference.output.governed_rate - x
         adapt(law, surfaces, main, saturated, error, prediction.G, prediction.u, reference.config.dt)
-    fill_state_network_basis_and_output(law.network, main, x, measured.y, prediction.u)
+    evaluate_state_network(law.network, main, x, measured.y, prediction.u)
 
 
 @kernel

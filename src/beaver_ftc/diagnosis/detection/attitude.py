@@ -1,4 +1,4 @@
-"""Whether the attitude shows the turn that the rates show: then no gyro is broken.
+"""Whether the attitude shows the turn that the rates show: if so no gyro is broken, if not one is.
 
 About each body axis let xi, rad/s, be the true rate less that of the gyro, and psi, rad, its integral:
 
@@ -23,23 +23,34 @@ surface
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
 
 are at most standard normal. If one exceeds the margin of isolation, no gyro is the cause.
+
+A gyro is broken if the rates raise an alarm and the attitude shows no turn for it: if
+
+    T <- a T + dA      E <- a E + dt e_T      (|T| - E) / std(T)
+
+exceeds the same margin about one axis, and no sum above does. e_T, rad/s, bounds what the constant errors of
+gyros and attitude turn.
 """
 
 from math import sqrt
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.detection.likelihood import (
+    DRIFT_PRIOR_RAD_S2,
     LATERAL_BLOCK,
     PITCH_BLOCK,
-    PRIOR_DRIFT_STD_RAD_S2,
     BlockCapacity,
 )
 from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.scenario.declared import SensorErrors
 
 LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
-MEMORIES_OF_LOSS_S = (2.0, 10.0)
+LOSS_MEMORIES_S = (2.0, 10.0)
+COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
 
@@ -48,27 +59,37 @@ N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and t
 def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     """The comparison of attitude and rates, for the capacity of a block of the rates."""
     n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
-    n_b = len(MEMORIES_OF_LOSS_S)
+    n_b = len(LOSS_MEMORIES_S)
     return record(
         enabled=int, level=float,  # level of both sums, standard deviations
         D=(3, 3), R=float, a=n_a, b=n_b,  # 1/s; variance of v, rad2; leaks per frame
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
-        r=n, g_j=n, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
+        r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
         R_j=(3, n_h, n, n_b),
         score=float,  # the larger sum of the frame, over its level
+        e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
+        T=(3, n_a), E=(3, n_a), T_std=n_a,
+        turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
+        turn_max=float,  # of |T| with sound gyros, rad
     )  # fmt: skip
 
 
-def configure_attitude(
-    att: np.void, D: np.ndarray, attitude_std_rad: float, gyro_std_rad_s: float, margin: float, dt_s: float
-) -> None:
+def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin: float, dt_s: float) -> None:
     """Fill the comparison; D (3, 3) 1/s. margin: difference of log-likelihood ratios that names a surface."""
-    att["enabled"], att["level"] = 1, sqrt(2.0 * margin)
-    att["D"], att["R"] = D, attitude_std_rad**2
-    att["a"], att["b"] = np.exp(-dt_s / np.array(LEAK_TIMES_S)), np.exp(-dt_s / np.array(MEMORIES_OF_LOSS_S))
-    att["P_start"] = attitude_std_rad**2, gyro_std_rad_s**2, PRIOR_DRIFT_STD_RAD_S2**2
+    angles, gyros = [errors[name] for name in ("phi", "theta", "psi")], [errors[name] for name in AXES]
+    v, w = max(each.random for each in angles), max(each.random for each in gyros)
+    a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
+    att["enabled"], att["level"], att["gyro"] = 1, sqrt(2.0 * margin), -1
+    att["D"], att["R"] = D, v**2
+    att["a"], att["b"] = a, np.exp(-dt_s / np.array(LOSS_MEMORIES_S))
+    att["P_start"] = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
+    att["T_std"] = np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2))
+    drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ("phi", "theta", "psi"))
+    att["e_0"] = [each.steady + drift for each in gyros]
+    att["e_slope"] = [each.slope for each in gyros]
+    att["tilt"] = angles[0].steady + angles[1].steady
     for i in range(3):
         np.fill_diagonal(att["P"][i], att["P_start"])
 
@@ -79,39 +100,78 @@ def restart(att):
     att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
     att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
     att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    att.T[:], att.E[:] = 0.0, 0.0
     for i in range(3):
         for k in range(3):
             att.P[i, k, k] = att.P_start[k]
 
 
 @kernel
-def compare_attitude(att, blocks, eta, uses_regressors, dt):
-    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score`.
+def add_turn(att, i, turn):
+    """Add what the attitude has turned about axis i beyond the gyro in a sample, rad."""
+    att.turn[i] += turn
 
-    eta (3,) rad/s2: bound of the uncertainty.
+
+@kernel
+def compare_attitude(att, blocks, eta, with_Z, x, dt):
+    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score` and `gyro`.
+
+    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates.
     """
+    sum_turns(att, x, dt)
+    att.xi[:] = att.s[:, 1]
     for i in range(3):
-        block = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
-        advance_axis(att, i, block, i // 2, eta[i], uses_regressors, dt)
+        b = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
+        advance_axis(att, i, b, i // 2, eta[i], with_Z, dt)
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
     for i in range(3):
         att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
+    find_gyro(att)
 
 
 @kernel
-def advance_axis(att, i, block, row, eta, uses_regressors, dt):
+def sum_turns(att, x, dt):
+    """Advance T and E by a frame of dt s, and fill `turn_score`; x (3,) rad/s: measured rates."""
+    w = abs(x[0]) + abs(x[1]) + abs(x[2])
+    att.turn_max = 0.0
+    for i in range(3):
+        leak(att.T[i], att.a, att.turn[i])
+        leak(att.E[i], att.a, dt * (att.e_0[i] + att.e_slope[i] * abs(x[i]) + att.tilt * w))
+        att.turn_score[i] = 0.0
+        for m in range(att.a.size):
+            excess = (abs(att.T[i, m]) - att.E[i, m]) / (att.T_std[m] * att.level)
+            att.turn_max = max(att.turn_max, att.E[i, m] + att.T_std[m] * att.level)
+            att.turn_score[i] = max(att.turn_score[i], excess)
+
+
+@kernel
+def find_gyro(att):
+    """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1."""
+    att.gyro, worst = -1, 0
+    for i in range(3):
+        if att.turn_score[i] > att.turn_score[worst]:
+            worst = i
+    if att.turn_score[worst] > 1.0 >= att.score:
+        att.gyro = worst
+        for i in range(3):
+            if i != worst and att.turn_score[i] > max(1.0, COUPLED_SHARE * att.turn_score[worst]):
+                att.gyro = -1
+
+
+@kernel
+def advance_axis(att, i, b, row, eta, with_Z, dt):
     """Advance filter, responses and sums of axis i, in this row of its block."""
-    K0, K1, K2, S = advance_covariance(att, i, block, row, dt)
-    D, a, n = att.D[i, i], block.drift_decay_factor, block.n_regressors
+    K0, K1, K2, S = advance_P(att, i, b, row, dt)
+    D, a, n = att.D[i, i], b.a, b.n_Z
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
     for j in range(n):
-        att.r[j] = block.regressor[j, row] if uses_regressors else 0.0
+        att.r[j] = b.regressor[j, row] if with_Z else 0.0
     att.r[n] = eta
-    u = -block.frame_innovation[row]
+    u = -b.nu[row]
     for j in range(3):
-        att.r[n + 1 + j] = att.D[i, j] * att.s[j, 1]
+        att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
         if j != i:
             u -= att.r[n + 1 + j]
     std = np.sqrt(S)
@@ -120,7 +180,7 @@ def advance_axis(att, i, block, row, eta, uses_regressors, dt):
     for j in range(n + N_FURTHER):
         att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K0, K1, K2, dt) / std
         leak(att.z_j[i, j], att.a, att.g_j[j])
-    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
+    for h, hypothesis in enumerate(b.hypothesis[: b.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
             leak(att.N[i, h], att.b, g_s * g)
@@ -130,31 +190,31 @@ def advance_axis(att, i, block, row, eta, uses_regressors, dt):
 
 
 @kernel
-def tolerance(block, j):
+def tol(b, j):
     """tol_j of a constant: of a coefficient, of the bounded uncertainty, or of the damping."""
-    if j < block.n_regressors:
-        return block.regressor_tolerance[j]
-    return 1.0 if j == block.n_regressors else DAMPING_TOLERANCE
+    if j < b.n_Z:
+        return b.tol[j]
+    return 1.0 if j == b.n_Z else DAMPING_TOLERANCE
 
 
 @kernel
-def largest_sum(att, block, i):
+def largest_sum(att, b, i):
     """The largest leaky sum of axis i that no constant explains, over the level."""
     largest = 0.0
     for m, a in enumerate(att.a):
         excess = abs(att.z[i, m])
-        for j in range(block.n_regressors + N_FURTHER):
-            excess -= tolerance(block, j) * abs(att.z_j[i, j, m])
+        for j in range(b.n_Z + N_FURTHER):
+            excess -= tol(b, j) * abs(att.z_j[i, j, m])
         largest = max(largest, excess * np.sqrt(1.0 - a * a))
     return largest / att.level
 
 
 @kernel
-def largest_correlation(att, block, first, step):
-    """The largest correlation with a loss, over the axes of a block, every step-th from the first on, that no
+def largest_correlation(att, b, first, step):
+    """The largest correlation with a loss, over the axes of a b, every step-th from the first on, that no
     constant explains, over the level."""
     largest = 0.0
-    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
+    for h, hypothesis in enumerate(b.hypothesis[: b.n_h]):
         if hypothesis.kind != LOSS:
             continue
         for m in range(att.b.size):
@@ -162,11 +222,11 @@ def largest_correlation(att, block, first, step):
             for i in range(first, 3, step):
                 N += att.N[i, h, m]
                 M += att.M[i, h, m]
-            for j in range(block.n_regressors + N_FURTHER):
+            for j in range(b.n_Z + N_FURTHER):
                 R = 0.0
                 for i in range(first, 3, step):
                     R += att.R_j[i, h, j, m]
-                excess -= tolerance(block, j) * abs(R)
+                excess -= tol(b, j) * abs(R)
             excess += abs(N)
             if M > 0.0:
                 largest = max(largest, excess / np.sqrt(M))
@@ -184,16 +244,9 @@ def respond(s, A, u, D, a, K0, K1, K2, dt):
 
 
 @kernel
-def leak(z, a, v):
-    """z <- a z + v: filters of leaks a (m,) on a number v."""
-    for m in range(a.size):
-        z[m] = a[m] * z[m] + v
-
-
-@kernel
-def advance_covariance(att, i, block, row, dt):
+def advance_P(att, i, b, row, dt):
     """Gains K of the frame for axis i, and S, rad2: P <- F P F' + Q, then P <- P - K P[0]."""
-    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], block.drift_decay_factor
+    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], b.a
     for c in range(3):
         F_P[0, c] = P[0, c] + dt * P[1, c]
         F_P[1, c] = (1.0 - dt * D) * P[1, c] + dt * P[2, c]
@@ -202,8 +255,8 @@ def advance_covariance(att, i, block, row, dt):
         P[c, 0] = F_P[c, 0] + dt * F_P[c, 1]
         P[c, 1] = (1.0 - dt * D) * F_P[c, 1] + dt * F_P[c, 2]
         P[c, 2] = a * F_P[c, 2]
-    P[1, 1] += dt * dt * block.model_noise_variance[row]
-    P[2, 2] += dt * block.drift_intensity[row, row]
+    P[1, 1] += dt * dt * b.Q_x[row]
+    P[2, 2] += dt * b.Q_d[row, row]
     S = P[0, 0] + att.R
     K0, K1, K2 = P[0, 0] / S, P[1, 0] / S, P[2, 0] / S
     for c in range(3):

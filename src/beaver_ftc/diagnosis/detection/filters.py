@@ -1,7 +1,7 @@
 """The worst-case detector: a bank of filters of the innovation with adaptive thresholds, and the FDAE.
 
     nu[k] = (x[k+1] - x[k]) / dt - F[k] = eta[k] + phi[k]
-    E_m[k+1] = a_m E_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
+    eps_m[k+1] = a_m eps_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
 
 All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): a residual obeys eps[k+1] = a
 eps[k] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. The guarantees of the theory
@@ -15,7 +15,7 @@ The reach of a fault is its possible effect on the filters since the start of th
 
 The fault detection and approximation estimator (FDAE) is always on:
 
-    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > ebar_i, some i
+    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > mu_i, some i
 
 [Zhang2005, sec. IV]. Until the alarm eps0 is filter 0 of the bank, which raises it. In discrete time
 xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
@@ -28,323 +28,248 @@ weights:
 [Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning at any
 state. D is a continuous dead zone at the detection threshold: the network cannot learn what the declared
 uncertainty explains.
+
+Symbols of the kernels:
+
+    nu (3,) rad/s2            innovation of the elapsed frame
+    F (3,) rad/s2             f + G u of the healthy aircraft, mean over the frame
+    x, x_old (3,) rad/s       measured now and a frame ago
+    eps, mu rad/s             residual of a filter and its threshold
+    n rad/s                   nbar of bounds.py: bound on the changing part of a gyro's error
+    a, m, i                   decay per frame, filter, axis
+    fie, lo, hi, base, Z, e   isolation estimator; its set of theta; its fault base + theta Z +- e, rad/s2
+    bank, bound, net          records: BANK_RECORD, `bound_dtype`, FDAE_NETWORK_RECORD
 """
 
 from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bounds import detection_poles_for_delays
+from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.diagnosis.bounds import poles_for_delays
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 
 @kernel
-def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
-    """Advance ebar' = -lam ebar + eta_bar by one frame [Zhang2005, sec. IV].
-
-    Units: bound rad/s, eta_bar rad/s2, decay = exp(-lam dt), dt s.
-    """
-    return decay_factor * residual_bound + dt * eta_bar
+def leak(x, a, v):
+    """x <- a x + v: filters of poles a (m,); x (m,)."""
+    for m in range(a.size):
+        x[m] = a[m] * x[m] + v
 
 
 @kernel
-def advance_gyro_error_bound(filtered_gyro_error_bound, changing_gyro_error_bound, decay_factor):
-    """Advance the filtered bound on a gyro's changing error, rad/s, by one frame.
+def advance_bound(e, eta, a, dt, n=0.0):
+    """a e + dt eta + (1 - a) n: bound on a residual, rad/s, a frame later [Zhang2005, sec. IV].
 
-    changing_gyro_error_bound: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds
-    at most the filtered bound plus the present nbar to a residual.
+    eta rad/s2: bound on the uncertainty; n rad/s: on the changing part of the gyro's error when the frame
+    began.
     """
-    return decay_factor * filtered_gyro_error_bound + (1.0 - decay_factor) * changing_gyro_error_bound
+    return a * e + dt * eta + (1.0 - a) * n
 
 
 @kernel
-def residual_interval(
-    theta_min,
-    theta_max,
-    filtered_positive_Z,
-    filtered_negative_Z,
-    filtered_Z,
-    theta_estimate,
-    uncertainty_bound,
-):
-    """The signed interval (low, high), rad/s, that holds the residual of the true estimator.
+def advance_gyro(m, n, a):
+    """m <- a m + (1 - a) n: the filtered bound on a gyro's changing error, rad/s; n at the start of the
+    frame.
 
-    The parameter may move anywhere within [theta_min, theta_max] at every instant, so an incipient or
-    intermittent fault is covered. With Z+ and Z- the filtered positive and negative part of Z, the filtered
-    Z theta lies between theta_min Z+ + theta_max Z- and theta_max Z+ + theta_min Z-. The residual is this
-    effect minus Omega thetahat, plus or minus the bound on the uncertainty.
+    An error of the gyro adds at most the filtered bound plus the present n to a residual.
     """
-    residual_low = (
-        theta_min * filtered_positive_Z
-        + theta_max * filtered_negative_Z
-        - filtered_Z * theta_estimate
-        - uncertainty_bound
-    )
-    residual_high = (
-        theta_max * filtered_positive_Z
-        + theta_min * filtered_negative_Z
-        - filtered_Z * theta_estimate
-        + uncertainty_bound
-    )
-    return residual_low, residual_high
+    return a * m + (1.0 - a) * n
 
 
 @kernel
-def published_threshold_interval(theta_min, theta_max, filtered_Z, theta_estimate, uncertainty_bound):
-    """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
+def residual_interval(lo, hi, Zp, Zm, Z, th, e):
+    """The interval (low, high), rad/s, that holds the residual of the true estimator.
+
+        lo Zp + hi Zm - Z th - e  <=  eps  <=  hi Zp + lo Zm - Z th + e
+
+    The parameter may move anywhere within [lo, hi] at every instant, so an incipient or intermittent fault is
+    covered. Zp, Zm, Z rad/s: filtered positive part, negative part and whole of the regressor; th: estimate;
+    e rad/s: bound on the filtered uncertainty.
+    """
+    eps_lo = lo * Zp + hi * Zm - Z * th - e
+    eps_hi = hi * Zp + lo * Zm - Z * th + e
+    return eps_lo, eps_hi
+
+
+@kernel
+def published_interval(lo, hi, Z, th, e):
+    """(-mu, mu), mu = k |Z| + e rad/s, k = max(th - lo, hi - th) bounds |theta - th| [Zhang2005, via
     Zhang2002].
     """
-    published_threshold = (
-        max(theta_estimate - theta_min, theta_max - theta_estimate) * abs(filtered_Z) + uncertainty_bound
-    )
-    return -published_threshold, published_threshold
+    mu = max(th - lo, hi - th) * abs(Z) + e
+    return -mu, mu
 
 
-# The bank of detection filters; filter 0 is the published one. decay_factor: a_m; residual, threshold and its
-# parts rad/s; innovation rad/s2; max_residual_over_threshold_so_far: of residual over threshold, in healthy
-# flight.
-BANK_CONFIG_RECORD = record(n_filters=int, decay_factor=MAX_POLES)
-BANK_MEMORY_RECORD = record(
-    threshold_uncertainty_part=(MAX_POLES, 3), threshold_gyro_error_part=(MAX_POLES, 3)
-)
-BANK_OUTPUT_RECORD = record(
-    innovation=3,
-    residual=(MAX_POLES, 3),
-    threshold=(MAX_POLES, 3),
-    max_residual_over_threshold_so_far=MAX_POLES,
-)
+# The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu rad/s, e its
+# part with a memory; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
+BANK_CONFIG_RECORD = record(n_filters=int, a=MAX_POLES)
+BANK_MEMORY_RECORD = record(e=(MAX_POLES, 3))
+BANK_OUTPUT_RECORD = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES)
 BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
 
 
-def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
+def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
     """The filters' poles, 1/s, the published one first."""
-    poles_for_noise_per_s = detection_poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
-    poles_after_published_per_s = (
-        (*config.pole_bank_per_s, *poles_for_noise_per_s) if config.sharpen.pole_bank else ()
-    )
-    return (config.detection_pole_per_s, *poles_after_published_per_s)[:MAX_POLES]
+    for_noise = poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
+    others = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
+    return (config.detection_pole_per_s, *others)[:MAX_POLES]
 
 
-def fill_bank_decay_factors(filter_bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
+def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
-    poles_per_s = filter_poles_per_s(config, declared)
-    filter_bank["config"]["n_filters"] = len(poles_per_s)
-    filter_bank["config"]["decay_factor"][: len(poles_per_s)] = [
-        exp(-pole_per_s * dt) for pole_per_s in poles_per_s
-    ]
+    poles = filter_poles(config, declared)
+    bank["config"]["n_filters"] = len(poles)
+    bank["config"]["a"][: len(poles)] = [exp(-lam * dt) for lam in poles]
 
 
 @kernel
-def start_bank_gyro_error_bounds(filter_bank, changing_gyro_error_bound):
-    """Start with the full bound on the changing part of the gyros' errors, changing_gyro_error_bound (3,)
-    rad/s."""
-    filter_bank.memory.threshold_gyro_error_part[: filter_bank.config.n_filters] = changing_gyro_error_bound
+def set_directions(isolation, G):
+    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which each fault has least effect.
 
-
-@kernel
-def set_constant_published_filter_threshold(filter_bank, threshold):
-    """Replace the threshold of the published filter by a constant, rad/s."""
-    filter_bank.output.threshold[0] = threshold
-
-
-@kernel
-def set_estimator_parity_directions(isolation, G):
-    """Fix, once, the direction along which each fault has least effect; G (3, n) at the start of the flight.
-
-    Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
-    The bound is exact for any fixed direction; this one has power while G keeps its direction, which
-    depends on alpha alone, and weakly.
+    G (3, n) rad/s2 per rad: at the start of the flight. m has unit length, in the roll-yaw plane, whose two
+    axes are the only ones that one surface moves together. The bound is exact for any fixed direction; this
+    one has power while G keeps its direction, which depends on alpha alone, and weakly.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        roll_acceleration_per_rad, yaw_acceleration_per_rad = G[0, fie.surface], G[2, fie.surface]
-        roll_yaw_column_norm = np.hypot(roll_acceleration_per_rad, yaw_acceleration_per_rad)
-        if roll_yaw_column_norm > 0.0:
-            fie.parity_direction[0] = yaw_acceleration_per_rad / roll_yaw_column_norm
-            fie.parity_direction[2] = -roll_acceleration_per_rad / roll_yaw_column_norm
+        Gp, Gr = G[0, fie.surface], G[2, fie.surface]
+        norm = np.hypot(Gp, Gr)
+        if norm > 0.0:
+            fie.parity_direction[0] = Gr / norm
+            fie.parity_direction[2] = -Gp / norm
 
 
 @kernel
-def update_innovation_and_filter_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
+def update_bank(bank, bound, x, x_old, F, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
-    x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the
-    healthy aircraft, mean over the frame. bound_record: of `bound_dtype`; dt s.
+    nu = (x - x_old) / dt - F     nu_max = eta_bar + (n + n_old) / dt
+    eps <- a eps + dt nu          e <- a e + dt eta_bar + (1 - a) n_old      mu = e + n
     """
+    nu, eps, mu, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
     for i in range(3):
-        filter_bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
-        bound_record.frame_innovation_bound[i] = (
-            bound_record.eta_bar[i]
-            + (bound_record.changing_gyro_error_bound[i] + bound_record.changing_gyro_error_bound_before[i])
-            / dt
-        )
-        for m, decay_factor in enumerate(filter_bank.config.decay_factor[: filter_bank.config.n_filters]):
-            filter_bank.output.residual[m, i] = (
-                decay_factor * filter_bank.output.residual[m, i] + dt * filter_bank.output.innovation[i]
-            )
-            filter_bank.memory.threshold_uncertainty_part[m, i] = advance_residual_bound(
-                filter_bank.memory.threshold_uncertainty_part[m, i], bound_record.eta_bar[i], decay_factor, dt
-            )
-            filter_bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
-                filter_bank.memory.threshold_gyro_error_part[m, i],
-                bound_record.changing_gyro_error_bound_before[i],
-                decay_factor,
-            )
-            filter_bank.output.threshold[m, i] = (
-                filter_bank.memory.threshold_uncertainty_part[m, i]
-                + filter_bank.memory.threshold_gyro_error_part[m, i]
-                + bound_record.changing_gyro_error_bound[i]
-            )
+        nu[i] = (x[i] - x_old[i]) / dt - F[i]
+        bound.nu_max[i] = bound.eta_bar[i] + (bound.n_gyro[i] + bound.n_old[i]) / dt
+        for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
+            eps[m, i] = a * eps[m, i] + dt * nu[i]
+            e[m, i] = advance_bound(e[m, i], bound.eta_bar[i], a, dt, bound.n_old[i])
+            mu[m, i] = e[m, i] + bound.n_gyro[i]
 
 
 @kernel
-def bank_alarm_axis(filter_bank):
+def bank_axis(bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(filter_bank.config.n_filters):
-            if abs(filter_bank.output.residual[m, i]) > filter_bank.output.threshold[m, i]:
+        for m in range(bank.config.n_filters):
+            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 return i
     return -1
 
 
 @kernel
-def residual_threshold_ratio(filter_bank, m, i):
-    """The share of its bound that filter m reaches on axis i."""
-    threshold = filter_bank.output.threshold[m, i]
-    return abs(filter_bank.output.residual[m, i]) / threshold if threshold > 0.0 else 0.0
+def filter_share(bank, m, i):
+    """|eps| / mu of filter m on axis i."""
+    mu = bank.output.threshold[m, i]
+    return abs(bank.output.residual[m, i]) / mu if mu > 0.0 else 0.0
 
 
 @kernel
-def filter_nearest_to_alarm(filter_bank, i):
+def nearest_filter(bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
-    nearest_filter_index, max_ratio = 0, 0.0
-    for m in range(filter_bank.config.n_filters):
-        ratio = residual_threshold_ratio(filter_bank, m, i)
-        if ratio > max_ratio:
-            nearest_filter_index, max_ratio = m, ratio
-    return nearest_filter_index
+    nearest, best = 0, 0.0
+    for m in range(bank.config.n_filters):
+        share = filter_share(bank, m, i)
+        if share > best:
+            nearest, best = m, share
+    return nearest
 
 
 @kernel
-def max_residual_threshold_ratio(filter_bank):
-    """The largest share of its bound that a filter of the bank reaches."""
-    max_ratio = 0.0
-    for m in range(filter_bank.config.n_filters):
+def bank_share(bank):
+    """The largest |eps| / mu in the bank."""
+    best = 0.0
+    for m in range(bank.config.n_filters):
         for i in range(3):
-            max_ratio = max(max_ratio, residual_threshold_ratio(filter_bank, m, i))
-    return max_ratio
+            best = max(best, filter_share(bank, m, i))
+    return best
 
 
 @kernel
-def update_max_residual_ratio_by_filter(filter_bank):
-    """Keep the largest share of its bound that each filter has reached."""
-    for m in range(filter_bank.config.n_filters):
+def keep_bank_peak(bank):
+    """Keep the largest |eps| / mu that each filter has reached."""
+    for m in range(bank.config.n_filters):
         for i in range(3):
-            filter_bank.output.max_residual_over_threshold_so_far[m] = max(
-                filter_bank.output.max_residual_over_threshold_so_far[m],
-                residual_threshold_ratio(filter_bank, m, i),
-            )
+            bank.output.peak[m] = max(bank.output.peak[m], filter_share(bank, m, i))
 
 
 @kernel
-def fault_acceleration_range(fie, i):
-    """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
-    acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
-    acceleration_per_theta = fie.frame_mean_effect.regressor[i]
-    error_bound = fie.frame_mean_effect.error_bound[i]
-    acceleration_at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
-    acceleration_at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
-    acceleration_low = min(0.0, acceleration_at_theta_min, acceleration_at_theta_max) - error_bound
-    acceleration_high = max(0.0, acceleration_at_theta_min, acceleration_at_theta_max) + error_bound
-    return acceleration_low, acceleration_high
+def along(v, m, i, size):
+    """v_i of a vector v (3,), or, if i = 3, m' v along a direction m (3,); |m|' v if v is a `size`."""
+    if i < 3:
+        return v[i]
+    total = 0.0
+    for j in range(3):
+        total += (abs(m[j]) if size else m[j]) * v[j]
+    return total
 
 
 @kernel
-def fault_acceleration_range_along_parity(fie):
-    """Least and greatest acceleration, rad/s2, along `fie.parity_direction` (3,); else as
-    `fault_acceleration_range`."""
-    frame_mean_effect_record = fie.frame_mean_effect
-    acceleration_at_zero_theta = 0.0
-    acceleration_per_theta = 0.0
-    error_bound = 0.0
-    for i in range(3):
-        error_bound += abs(fie.parity_direction[i]) * frame_mean_effect_record.error_bound[i]
-        acceleration_at_zero_theta += (
-            fie.parity_direction[i] * frame_mean_effect_record.acceleration_at_zero_theta[i]
-        )
-        acceleration_per_theta += fie.parity_direction[i] * frame_mean_effect_record.regressor[i]
-    acceleration_at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
-    acceleration_at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
-    acceleration_low = min(0.0, acceleration_at_theta_min, acceleration_at_theta_max) - error_bound
-    acceleration_high = max(0.0, acceleration_at_theta_min, acceleration_at_theta_max) + error_bound
-    return acceleration_low, acceleration_high
+def fault_range(fie, i):
+    """Least and greatest acceleration on axis i, or along m if i = 3, rad/s2:
 
-
-@kernel
-def advance_reachable_residuals(filter_bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; index 3: `parity_direction`."""
-    for axis_or_parity in range(4):
-        acceleration_low, acceleration_high = (
-            fault_acceleration_range(fie, axis_or_parity)
-            if axis_or_parity < 3
-            else fault_acceleration_range_along_parity(fie)
-        )
-        for m, decay_factor in enumerate(filter_bank.config.decay_factor[: filter_bank.config.n_filters]):
-            fie.reachable_bank_residual_low[m, axis_or_parity] = (
-                decay_factor * fie.reachable_bank_residual_low[m, axis_or_parity] + dt * acceleration_low
-            )
-            fie.reachable_bank_residual_high[m, axis_or_parity] = (
-                decay_factor * fie.reachable_bank_residual_high[m, axis_or_parity] + dt * acceleration_high
-            )
-
-
-@kernel
-def are_residuals_reachable(filter_bank, fie, axes_share_theta):
-    """True if the residuals are within the reach of the fault, for any course of it since the flight began.
-
-    axes_share_theta: the axes share one parameter; the residual along `parity_direction` is then tested as
-    well.
+    base + theta Z +- e,  theta in its set, or no fault at all
     """
-    for m in range(filter_bank.config.n_filters):
-        parity_residual, parity_threshold = 0.0, 0.0
-        for i in range(3):
-            residual, threshold = filter_bank.output.residual[m, i], filter_bank.output.threshold[m, i]
-            if (
-                not fie.reachable_bank_residual_low[m, i] - threshold
-                <= residual
-                <= fie.reachable_bank_residual_high[m, i] + threshold
-                and not fie.ignored_axes[i]
-            ):
+    phi, m = fie.effect, fie.parity_direction
+    base, Z = along(phi.base, m, i, False), along(phi.regressor, m, i, False)
+    e = along(phi.e, m, i, True)
+    at_lo, at_hi = base + fie.theta_min * Z, base + fie.theta_max * Z
+    return min(0.0, at_lo, at_hi) - e, max(0.0, at_lo, at_hi) + e
+
+
+@kernel
+def advance_reach(bank, fie, dt):
+    """Advance the reach of the fault in each filter since the flight began; index 3: along m.
+
+    reach_lo <- a reach_lo + dt lo      reach_hi <- a reach_hi + dt hi
+    """
+    for i in range(4):
+        lo, hi = fault_range(fie, i)
+        for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
+            fie.reach_lo[m, i] = a * fie.reach_lo[m, i] + dt * lo
+            fie.reach_hi[m, i] = a * fie.reach_hi[m, i] + dt * hi
+
+
+@kernel
+def is_reachable(bank, fie, shared):
+    """True if reach_lo - mu <= eps <= reach_hi + mu for each filter and axis that is not skipped.
+
+    shared: the axes share one parameter; the residual along m is then tested as well.
+    """
+    for m in range(bank.config.n_filters):
+        for i in range(4):
+            eps = along(row_of(bank.output.residual, m), fie.parity_direction, i, False)
+            mu = along(row_of(bank.output.threshold, m), fie.parity_direction, i, True)
+            counts = not fie.skip[i] if i < 3 else shared
+            if counts and not fie.reach_lo[m, i] - mu <= eps <= fie.reach_hi[m, i] + mu:
                 return False
-            parity_residual += fie.parity_direction[i] * residual
-            parity_threshold += abs(fie.parity_direction[i]) * threshold
-        if (
-            axes_share_theta
-            and not fie.reachable_bank_residual_low[m, 3] - parity_threshold
-            <= parity_residual
-            <= fie.reachable_bank_residual_high[m, 3] + parity_threshold
-        ):
-            return False
     return True
 
 
-# Centres of the network's basis functions, rad; and its record. learning_gain 1/s2, weight_limit rad/s2;
-# output: fhat, rad/s2.
+# Centres of the network's basis functions, rad; and its record. gain 1/s2, w_max rad/s2; output fhat, rad/s2.
 ALPHA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES_RAD = np.linspace(-0.3, 0.3, 5)
-N_ALPHA_PLUS_BETA_CENTRES = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
+N_BASIS = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
 FDAE_NETWORK_RECORD = record(
-    config=record(learning_gain=float, leak_per_s=float, weight_limit=float),
-    memory=record(weights=(3, N_ALPHA_PLUS_BETA_CENTRES), basis_values=N_ALPHA_PLUS_BETA_CENTRES),
+    config=record(gain=float, leak=float, w_max=float),
+    memory=record(weights=(3, N_BASIS), Phi=N_BASIS),
     output=3,
 )
 
-# decay_factor: a. xhat: the estimate of the rates, rad/s; threshold_uncertainty_part,
-# threshold_gyro_error_part rad/s: parts of the threshold. residual, threshold rad/s.
-FDAE_CONFIG_RECORD = record(pole_per_s=3, decay_factor=3)
-FDAE_MEMORY_RECORD = record(xhat=3, threshold_uncertainty_part=3, threshold_gyro_error_part=3)
+# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; e, m: see `advance_fdae`.
+FDAE_CONFIG_RECORD = record(pole_per_s=3, a=3)
+FDAE_MEMORY_RECORD = record(xhat=3, e=3, m=3)
 FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
 FDAE_RECORD = record(
     config=FDAE_CONFIG_RECORD,
@@ -353,194 +278,154 @@ FDAE_RECORD = record(
     network=FDAE_NETWORK_RECORD,
 )
 
-_RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS = np.exp(-1.0)
-_N_ALPHA_CENTRES, _N_BETA_CENTRES = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
-_FIRST_ALPHA_CENTRE_RAD = ALPHA_CENTRES_RAD[0]
-_ALPHA_CENTRE_SPACING_RAD = ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
-_FIRST_BETA_CENTRE_RAD = BETA_CENTRES_RAD[0]
-_BETA_CENTRE_SPACING_RAD = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
+_GAUSS_RATIO = np.exp(-1.0)
+_N_ALPHA, _N_BETA = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
+_ALPHA_0 = ALPHA_CENTRES_RAD[0]
+_ALPHA_STEP = ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
+_BETA_0 = BETA_CENTRES_RAD[0]
+_BETA_STEP = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 
 def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control_config, network = declared.control, fdae["network"]
-    fdae["config"]["pole_per_s"] = declared.fdi.detection_pole_per_s
-    fdae["config"]["decay_factor"] = exp(-declared.fdi.detection_pole_per_s * (1.0 / declared.rate_hz))
-    network["config"]["learning_gain"] = control_config.network_gain_per_s2
-    network["config"]["leak_per_s"] = control_config.network_leak_per_s
-    network["config"]["weight_limit"] = control_config.network_weight_limit_rad_s2
+    control, cfg, net = declared.control, fdae["config"], fdae["network"]["config"]
+    lam = declared.fdi.detection_pole_per_s
+    cfg["pole_per_s"], cfg["a"] = lam, exp(-lam * (1.0 / declared.rate_hz))
+    net["gain"] = control.network_gain_per_s2
+    net["leak"] = control.network_leak_per_s
+    net["w_max"] = control.network_weight_limit_rad_s2
 
 
 @kernel
-def fill_gaussians_and_sum_squares(axis_position, n_gaussians, first_index, out):
-    """Fill out from first_index on with exp(-(axis_position - j)^2 / 2), j = 0, 1, ...; return the sum of
-    their squares.
+def start(bank, fdae, x, n):
+    """Begin all filters at the first measurement x (3,) rad/s; n (3,) rad/s: errors of the gyros to come."""
+    fdae.memory.xhat[:], fdae.memory.e[:], fdae.memory.m[:] = x, n, n
+    bank.memory.e[: bank.config.n_filters] = n
 
-    The ratio of a value and the one before is exp(axis_position - j - 1/2). The ratio of two successive
-    ratios is 1 / e. So two exponentials are enough for all values.
+
+@kernel
+def fill_gaussians(v, c0, dc, n, first, out):
+    """Fill out from `first` on with exp(-(z - j)^2 / 2), j < n; return the sum of their squares.
+
+    z = (v - c0) / dc: place of v among n centres from c0 on, dc apart; outside them the nearest edge answers.
+    The ratio of a value and the one before is exp(z - j - 1/2). The ratio of two successive ratios is 1 / e.
+    So two exponentials are enough for all values.
     """
-    gaussian = np.exp(-0.5 * axis_position * axis_position)
-    next_gaussian_ratio = np.exp(axis_position - 0.5)
-    sum_of_squares = 0.0
-    for j in range(n_gaussians):
-        out[first_index + j] = gaussian
-        sum_of_squares += gaussian * gaussian
-        gaussian *= next_gaussian_ratio
-        next_gaussian_ratio *= _RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS
-    return sum_of_squares
+    z = min(max((v - c0) / dc, 0.0), n - 1.0)
+    g = np.exp(-0.5 * z * z)
+    ratio = np.exp(z - 0.5)
+    total = 0.0
+    for j in range(n):
+        out[first + j] = g
+        total += g * g
+        g *= ratio
+        ratio *= _GAUSS_RATIO
+    return total
 
 
 @kernel
-def fill_normalised_gaussians(alpha, beta, out):
-    """Fill out (N_ALPHA_PLUS_BETA_CENTRES,) with the normalised radial basis functions at (alpha, beta), rad.
+def fill_basis(alpha, beta, out):
+    """Fill out (N_BASIS,) with Phi, the normalised radial basis functions at (alpha, beta), rad.
 
-    Each width equals the spacing of its centres; outside the grid the nearest edge answers.
+    Each width equals the spacing of its centres.
     """
-    alpha_grid_position = min(
-        max((alpha - _FIRST_ALPHA_CENTRE_RAD) / _ALPHA_CENTRE_SPACING_RAD, 0.0), _N_ALPHA_CENTRES - 1.0
+    norm = np.sqrt(
+        fill_gaussians(alpha, _ALPHA_0, _ALPHA_STEP, _N_ALPHA, 0, out)
+        + fill_gaussians(beta, _BETA_0, _BETA_STEP, _N_BETA, _N_ALPHA, out)
     )
-    beta_grid_position = min(
-        max((beta - _FIRST_BETA_CENTRE_RAD) / _BETA_CENTRE_SPACING_RAD, 0.0), _N_BETA_CENTRES - 1.0
-    )
-    concatenated_gaussian_norm = np.sqrt(
-        fill_gaussians_and_sum_squares(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
-        + fill_gaussians_and_sum_squares(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
-    )
-    for j in range(N_ALPHA_PLUS_BETA_CENTRES):
-        out[j] /= concatenated_gaussian_norm
+    for j in range(N_BASIS):
+        out[j] /= norm
 
 
 @kernel
-def signed_excess_over_threshold(residual, threshold):
-    """D[eps]: zero inside the threshold, the excess over it outside."""
-    if residual > threshold:
-        return residual - threshold
-    if residual < -threshold:
-        return residual + threshold
+def beyond_bound(eps, mu):
+    """D[eps]: zero within the threshold mu, the excess over it outside."""
+    if eps > mu:
+        return eps - mu
+    if eps < -mu:
+        return eps + mu
     return 0.0
 
 
 @kernel
-def evaluate_network(network, alpha, beta):
-    """Fill network.output (3,) rad/s2 for the present alpha and beta."""
-    fill_normalised_gaussians(alpha, beta, network.memory.basis_values)
+def evaluate_network(net, alpha, beta):
+    """fhat = W^T Phi, rad/s2, at the present alpha and beta."""
+    fill_basis(alpha, beta, net.memory.Phi)
     for i in range(3):
-        fhat_i = 0.0
-        for j in range(N_ALPHA_PLUS_BETA_CENTRES):
-            fhat_i += network.memory.weights[i, j] * network.memory.basis_values[j]
-        network.output[i] = fhat_i
+        fhat = 0.0
+        for j in range(N_BASIS):
+            fhat += net.memory.weights[i, j] * net.memory.Phi[j]
+        net.output[i] = fhat
 
 
 @kernel
-def train_network(network, residual, threshold, do_weights_leak, dt):
-    """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
+def train(W, Phi, a, step, W_max):
+    """W <- clip(a W + step Phi, W_max): a row of weights, and of the basis."""
+    for j in range(Phi.size):
+        W[j] = min(max(a * W[j] + step * Phi[j], -W_max), W_max)
 
-    do_weights_leak: the weights decay, because another estimate explains the fault.
+
+@kernel
+def train_network(net, eps, mu, leaks, dt):
+    """W <- clip(exp(-leak dt) W + dt gain D[eps] Phi, w_max): the weights after a frame.
+
+    leaks: the weights decay, because another estimate explains the fault.
     """
-    leak_factor = np.exp(-network.config.leak_per_s * dt) if do_weights_leak else 1.0
-    weight_limit = network.config.weight_limit
+    a = np.exp(-net.config.leak * dt) if leaks else 1.0
     for i in range(3):
-        learning_step_beyond_threshold = (
-            dt * network.config.learning_gain * signed_excess_over_threshold(residual[i], threshold[i])
-        )
-        for j in range(N_ALPHA_PLUS_BETA_CENTRES):
-            weight = (
-                leak_factor * network.memory.weights[i, j]
-                + learning_step_beyond_threshold * network.memory.basis_values[j]
-            )
-            network.memory.weights[i, j] = min(max(weight, -weight_limit), weight_limit)
+        step = dt * net.config.gain * beyond_bound(eps[i], mu[i])
+        train(row_of(net.memory.weights, i), net.memory.Phi, a, step, net.config.w_max)
 
 
 @kernel
-def start_fdae_rates_and_gyro_bounds(fdae, changing_gyro_error_bound, x):
-    """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
-
-    changing_gyro_error_bound (3,) rad/s: on the changing part of the gyros' errors.
-    """
-    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, changing_gyro_error_bound
-
-
-@kernel
-def set_constant_fdae_threshold(fdae, threshold):
-    """Replace the threshold by a constant, rad/s."""
-    fdae.output.threshold[:] = threshold
-
-
-@kernel
-def replace_network_output(network, fhat):
-    """Replace the output of the network by that of another, fhat (3,) rad/s2."""
-    network.output[:] = fhat
-
-
-@kernel
-def reset_network(network):
+def reset_network(net):
     """Set the weights and the output of the network to zero."""
-    network.memory.weights[:], network.output[:] = 0.0, 0.0
+    net.memory.weights[:], net.output[:] = 0.0, 0.0
 
 
 @kernel
-def form_fdae_residual(fdae, x):
-    """Fill the residual for the measured x (3,) rad/s."""
+def fdae_residual(fdae, x):
+    """eps0 = x - xhat0."""
     for i in range(3):
         fdae.output.residual[i] = x[i] - fdae.memory.xhat[i]
 
 
 @kernel
-def alarm_axis(filter_bank, alarm_authority_code, statistical_alarm_record):
-    """The axis on which a detector in authority raises the alarm, or -1.
-
-    statistical_alarm_record: `ALARM` of the statistical detector.
-    """
-    axis = bank_alarm_axis(filter_bank) if alarm_authority_code != STATISTICAL_DETECTOR else -1
-    if (
-        axis < 0
-        and alarm_authority_code != WORST_CASE_DETECTOR
-        and statistical_alarm_record.score_over_alarm_level > 1.0
-    ):
-        axis = statistical_alarm_record.axis
+def alarm_axis(bank, authority, alarm):
+    """The axis on which a detector in authority raises the alarm, or -1; alarm: ALARM_RECORD."""
+    axis = bank_axis(bank) if authority != STATISTICAL_DETECTOR else -1
+    if axis < 0 and authority != WORST_CASE_DETECTOR and alarm.ratio > 1.0:
+        axis = alarm.axis
     return axis
 
 
 @kernel
-def advance_fdae(fdae, bound_record, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
-    """Advance the FDAE and its threshold by one frame; once `is_fault_detected`, the network learns what
-    exceeds the threshold.
+def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
+    """Advance the FDAE and its threshold by a frame; after detection, the network learns what exceeds mu.
 
-    x (3,) rad/s; predicted_acceleration (3,) rad/s2 is f + G u, with the isolated fault once there is one.
+        xhat <- x + dt (F + fhat) + a (xhat - x)      mu as in `update_bank`      m <- a m + (1 - a) n_old
+
+    F (3,) rad/s2: with the isolated fault once there is one. m: the part of e by the gyros' errors.
     """
-    if is_fault_detected:
-        train_network(fdae.network, fdae.output.residual, fdae.output.threshold, do_weights_leak, dt)
+    M, mu = fdae.memory, fdae.output.threshold
+    if detected:
+        train_network(fdae.network, fdae.output.residual, mu, leaks, dt)
     for i in range(3):
-        acceleration_with_network_output = predicted_acceleration[i] + fdae.network.output[i]
-        decay_factor = fdae.config.decay_factor[i]
-        fdae.memory.xhat[i] = (
-            x[i] + dt * acceleration_with_network_output + decay_factor * (fdae.memory.xhat[i] - x[i])
-        )
-        fdae.memory.threshold_uncertainty_part[i] = advance_residual_bound(
-            fdae.memory.threshold_uncertainty_part[i], bound_record.eta_bar[i], decay_factor, dt
-        )
-        fdae.memory.threshold_gyro_error_part[i] = advance_gyro_error_bound(
-            fdae.memory.threshold_gyro_error_part[i],
-            bound_record.changing_gyro_error_bound_before[i],
-            decay_factor,
-        )
-        fdae.output.threshold[i] = (
-            fdae.memory.threshold_uncertainty_part[i]
-            + fdae.memory.threshold_gyro_error_part[i]
-            + bound_record.changing_gyro_error_bound[i]
-        )
+        a = fdae.config.a[i]
+        M.xhat[i] = x[i] + dt * (F[i] + fdae.network.output[i]) + a * (M.xhat[i] - x[i])
+        M.e[i] = advance_bound(M.e[i], bound.eta_bar[i], a, dt, bound.n_old[i])
+        M.m[i] = advance_gyro(M.m[i], bound.n_old[i], a)
+        mu[i] = M.e[i] + bound.n_gyro[i]
 
 
 @kernel
-def fill_fdae_unmodelled_acceleration_estimate(fdae, changing_gyro_error_bound, out):
-    """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
+def fdae_unmodelled(fdae, n, out):
+    """out = fhat + Lambda0 D[eps0], (3,) rad/s2: estimated acceleration in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's changing_gyro_error_bound (3,) rad/s alone
-    explains stays out of it, and off the surfaces.
+    weights, at the bandwidth of the estimator. The dead zone m + n is what the gyro's error alone explains:
+    it stays out of the estimate, and off the surfaces.
     """
     for i in range(3):
-        gyro_caused_residual_bound = fdae.memory.threshold_gyro_error_part[i] + changing_gyro_error_bound[i]
-        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * signed_excess_over_threshold(
-            fdae.output.residual[i], gyro_caused_residual_bound
-        )
+        eps = beyond_bound(fdae.output.residual[i], fdae.memory.m[i] + n[i])
+        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * eps

@@ -13,6 +13,16 @@ mass. Noise of the accelerometers is model noise; their declared bias and slope 
 
 The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
 rate of the run before.
+
+Letters of the kernels. i is the force, f its record, k a term or an axis, s a surface; a force over m c,
+like e, is in rad/s2.
+
+    e, f_hat       innovation; force of the model
+    per_C          qdyn S / m c: e of a coefficient of one
+    Z, tol         regressor of a term; tolerance of its coefficient
+    G, Gu, e_G     e per rad of a surface; e at its command; bound on the error of G
+    L              e per rad/s of rotation of the air, 1/s
+    angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
 """
 
 import numpy as np
@@ -22,491 +32,314 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
-from beaver_ftc.diagnosis.gusts import stop_gust_estimate, stop_using_accelerometers
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
+from beaver_ftc.diagnosis.gusts import drop_accelerometers
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
-SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES = range(2)  # across the body, and normal to it
-FORCE_COEFFICIENT_NAMES = ("CY", "CZ")
-SIDE_FORCE_INDEX_IN_TABLE = FORCES.index("CY")
-TYPICAL_BODY_RATE_RAD_S, TYPICAL_PATH_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
-MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
+SIDE_INDEX, NORMAL_INDEX = range(2)  # across the body, and normal to it
+FORCE_NAMES = ("CY", "CZ")
+VANES = BETA, ALPHA  # of each force, in y
+SIDE_ROW = FORCES.index("CY")
+TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
+MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
-MAX_LAG_BETWEEN_FORCE_AND_FLOW_S = 0.002
-FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
-SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES = {
-    False: 0.05,
-    True: 0.2,
-}  # of the term in the rate of sideslip: gusts have a part in it
+MAX_FORCE_LAG_S = 0.002
+DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
+# Tolerance of the term in the rate of sideslip, by whether the air moves: gusts have a part in it.
+SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
-RatesReadingsDeflections = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
 FORCE_RECORD = record(
-    innovation=float,  # e at the start of the elapsed frame, rad/s2
-    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
-    # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
-    innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
-    innovation_per_flow_angle_drift=float, inertial_innovation_drift_intensity=float,
+    innovation=float,  # e at the start of the elapsed frame
+    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; e per rad/s of
+    # drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
+    e_inertial=float, angle=float, drift=float, e_drift=float, Q_e=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    specific_force_over_chord_per_surface_rad=MAX_SURFACES,
-    previous_specific_force_over_chord_per_surface_rad=MAX_SURFACES,
-    specific_force_over_chord_of_surface_at_command=MAX_SURFACES,
-    specific_force_over_chord_per_surface_rad_error_bound=MAX_SURFACES,
+    G=MAX_SURFACES, G_prev=MAX_SURFACES, Gu=MAX_SURFACES, e_G=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
-    axis_and_force_innovation_per_vane_error=2, roll_innovation_per_vane_error=float,
-    # variance of e in trim and now: with the vane, without it; (rad/s2)2
-    trim_noise_variance_with_without_vane=2, noise_variance_with_without_vane=2,
-    # e per rad/s of rotation of the air; bound on e by errors of deflections
-    innovation_per_air_rotation=3, deflection_error_effect_bound=float,
-    predicted_specific_force_over_chord=float,  # e of the model, rad/s2
-    force_flow_lag_error_bound=float,  # bound on its error by a time lag, rad/s2
-    # variance of e by noise of the accelerometer; independent of the pressure
-    accelerometer_innovation_variance=float,
-    n_regressors=int, regressor_tolerance=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
+    vane=2, vane_roll=float,
+    var_trim=2, var=2,  # variance of e in trim and now, with the vane and without it, (rad/s2)2
+    L=3, eta_u=float, f_hat=float, e_lag=float,  # bounds on e by errors of deflections and by a time lag
+    var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
+    n_Z=int, tol=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
 )  # fmt: skip
-MEASURED_FORCES_RECORD = record(
-    in_use=int, inverse_chord_per_m=float,  # whether forces are used
-    gravity=float, wing_span=float,  # m/s2; m
-    trim_dynamic_pressure=float, dynamic_pressure_noise_std=float,  # Pa
-    dynamic_pressure_over_trim=float,  # forces scale with it
+FORCES_RECORD = record(
+    in_use=int, c_inv=float, gravity=float, span=float,  # whether forces are used; 1/m; m/s2; m
+    q_trim=float, q_noise=float, q_ratio=float,  # dynamic pressure: in trim, noise, Pa; over that in trim
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
-    sideslip_rate_coefficient=float, flow_angle_rate=2,
-    n_updates_capped_at_minimum=int,  # updates so far, up to MIN_FORCE_UPDATES
-    angular_acceleration_by_gust_noise_std=3,  # noise of the gust estimate from forces, rad/s2
-    y_without_vanes=N_Y, component=(FORCE_RECORD, 2),
+    CY_bdot=float, angle_rate=2,
+    n_seen=int,  # updates so far, up to MIN_UPDATES
+    gust_noise=3,  # noise of the gust estimate from forces, rad/s2
+    y_free=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
 
 
 @kernel
-def update_all_force_innovations(forces, gust, measured_signals, u, dt):
+def update_both_forces(forces, gust, meas, u, dt):
     """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
-    if forces.n_updates_capped_at_minimum == 0:
-        fill_flow_angle_rates(forces, measured_signals)
-    evaluate(gust.memory.force_table, measured_signals.x, measured_signals.y)
-    forces.dynamic_pressure_over_trim = measured_signals.y[QDYN] / forces.trim_dynamic_pressure
-    for force_index in range(2):
-        previous_predicted_specific_force_over_chord = forces.component[
-            force_index
-        ].predicted_specific_force_over_chord
-        update_force_innovation_and_regressors(forces, gust, force_index, measured_signals, u)
-        fill_force_flow_lag_error_bound(
-            forces.component[force_index],
-            previous_predicted_specific_force_over_chord,
-            forces.n_updates_capped_at_minimum,
-            dt,
-        )
-        update_inertial_flow_angle_and_force_innovation(
-            forces, forces.component[force_index], force_index, measured_signals.y, dt
-        )
-    fill_flow_angle_rates(forces, measured_signals)
-    forces.n_updates_capped_at_minimum = min(forces.n_updates_capped_at_minimum + 1, MIN_FORCE_UPDATES)
+    if forces.n_seen == 0:
+        fill_angle_rates(forces, meas)
+    evaluate(gust.memory.table, meas.x, meas.y)
+    forces.q_ratio = meas.y[QDYN] / forces.q_trim
+    for i in range(2):
+        f_prev = forces.component[i].f_hat
+        update_force(forces, gust, i, meas, u)
+        f = forces.component[i]
+        f.e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
+        update_inertial(forces, f, i, meas.y, dt)
+    fill_angle_rates(forces, meas)
+    forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
 
 
 @kernel
-def fill_force_flow_lag_error_bound(
-    force_record, previous_predicted_specific_force_over_chord, has_earlier_update, dt
-):
-    """Fill `force_flow_lag_error_bound` from the change of the model's e since
-    `previous_predicted_specific_force_over_chord`: force and flow differ in time."""
-    force_record.force_flow_lag_error_bound = (
-        MAX_LAG_BETWEEN_FORCE_AND_FLOW_S
-        * abs(force_record.predicted_specific_force_over_chord - previous_predicted_specific_force_over_chord)
-        / dt
-        if has_earlier_update
-        else 0.0
-    )
+def fill_vaneless_y(forces, w, y):
+    """Fill `y_free` with the readings y, but alpha and beta worked out from the forces.
 
+        y_free = y - (e / q_ratio + L' w) / vane[1]
 
-@kernel
-def fill_y_without_vanes(forces, air_rotation, y):
-    """Fill `y` with the readings y, but alpha and beta worked out from the forces.
-
-    air_rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
+    w (3,) rad/s: rotation of the air in body axes; it damps like the aircraft's own rotation.
     """
-    forces.y_without_vanes[:] = y
-    for force_index in range(2):
-        force_record = forces.component[force_index]
-        vane_index_in_y = BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA
-        air_rotation_part_of_innovation = 0.0
+    forces.y_free[:] = y
+    for i in range(2):
+        f = forces.component[i]
+        e_w = 0.0
         for k in range(3):
-            air_rotation_part_of_innovation += force_record.innovation_per_air_rotation[k] * air_rotation[k]
-        forces.y_without_vanes[vane_index_in_y] -= (
-            force_record.innovation / forces.dynamic_pressure_over_trim + air_rotation_part_of_innovation
-        ) / force_record.axis_and_force_innovation_per_vane_error[1]
+            e_w += f.L[k] * w[k]
+        forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[1]
 
 
 @kernel
-def stop_using_forces_and_accelerometers(forces, gust, inertial_gust):
+def drop_forces(forces, gust, inertial):
     """Stop using forces, and estimate the gust without accelerometers."""
-    stop_using_accelerometers(gust)
-    stop_gust_estimate(inertial_gust)
+    drop_accelerometers(gust)
+    inertial.output.gusty = 0
     forces.in_use = 0
 
 
 @kernel
-def update_inertial_flow_angle_and_force_innovation(forces, force_record, force_index, y, dt):
-    """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    vane_angle = y[BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA]
-    innovation_per_vane_rad = (
-        force_record.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
-    )
-    force_record.inertial_flow_angle = (
-        force_record.inertial_flow_angle + dt * forces.flow_angle_rate[force_index]
-        if forces.n_updates_capped_at_minimum
-        else vane_angle
-    )
-    force_record.innovation_per_flow_angle_drift += dt * innovation_per_vane_rad
-    force_record.innovation_at_inertial_flow_angle = force_record.innovation - innovation_per_vane_rad * (
-        vane_angle - force_record.inertial_flow_angle
-    )
+def update_inertial(forces, f, i, y, dt):
+    """Integrate the flow angle of a vane from inertial motion, and fill the innovation of force i at it.
 
-
-@kernel
-def update_force_innovation_and_regressors(forces, gust, force_index, measured_signals, u):
-    """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
-    all_forces_term_table, force_record = gust.memory.force_table, forces.component[force_index]
-    first_term_index = all_forces_term_table.free_from[SIDE_FORCE_INDEX_IN_TABLE + force_index]
-    end_term_index = all_forces_term_table.surface_to[SIDE_FORCE_INDEX_IN_TABLE + force_index]
-    specific_force_over_chord_per_coefficient = (
-        measured_signals.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
-    )
-    predicted_specific_force_over_chord = 0.0
-    force_record.previous_specific_force_over_chord_per_surface_rad[:] = (
-        force_record.specific_force_over_chord_per_surface_rad
-    )
-    force_record.specific_force_over_chord_per_surface_rad[:] = 0.0
-    force_record.specific_force_over_chord_per_surface_rad_error_bound[:] = 0.0
-    for k in range(first_term_index, end_term_index):
-        s = all_forces_term_table.surface[k]
-        term_regressor_per_unit_coefficient = (
-            specific_force_over_chord_per_coefficient
-            * all_forces_term_table.power[all_forces_term_table.monomial[k]]
-        )
-        if s >= 0:
-            force_record.specific_force_over_chord_per_surface_rad[s] += (
-                all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
-            )
-            force_record.specific_force_over_chord_per_surface_rad_error_bound[s] += (
-                force_record.regressor_tolerance[k - first_term_index]
-                * abs(term_regressor_per_unit_coefficient)
-            )
-            term_regressor_per_unit_coefficient *= u[s]
-        force_record.regressor[k - first_term_index] = term_regressor_per_unit_coefficient
-        predicted_specific_force_over_chord += (
-            all_forces_term_table.value[k] * term_regressor_per_unit_coefficient
-        )
-    if force_index == SIDE_INDEX_AMONG_FORCES:
-        side_force_over_chord_due_to_sideslip_rate = (
-            specific_force_over_chord_per_coefficient
-            * forces.sideslip_rate_coefficient
-            * forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES]
-            * forces.wing_span
-            / (2.0 * measured_signals.y[AIRSPEED])
-        )
-        force_record.regressor[end_term_index - first_term_index] = side_force_over_chord_due_to_sideslip_rate
-        predicted_specific_force_over_chord += side_force_over_chord_due_to_sideslip_rate
-    force_record.regressor[force_record.n_regressors - 1] = predicted_specific_force_over_chord
-    force_record.predicted_specific_force_over_chord = predicted_specific_force_over_chord
-    if forces.n_updates_capped_at_minimum == 0:
-        force_record.previous_specific_force_over_chord_per_surface_rad[:] = (
-            force_record.specific_force_over_chord_per_surface_rad
-        )
-    for s in range(u.size):
-        force_record.specific_force_over_chord_of_surface_at_command[s] = (
-            force_record.previous_specific_force_over_chord_per_surface_rad[s] * u[s]
-        )
-    force_record.innovation = (
-        measured_signals.force[1 + force_index] * forces.inverse_chord_per_m
-        - predicted_specific_force_over_chord
-    )
-    pressure_noise_innovation_std = (
-        predicted_specific_force_over_chord * forces.dynamic_pressure_noise_std / measured_signals.y[QDYN]
-    )
-    for k in range(2):
-        force_record.noise_variance_with_without_vane[k] = (
-            force_record.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
-            + pressure_noise_innovation_std * pressure_noise_innovation_std
-            + force_record.accelerometer_innovation_variance
-        )
-
-
-@kernel
-def fill_flow_angle_rates(forces, measured_signals):
-    """Fill `flow_angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
-
-    They follow from accelerometers, rates, attitude and flow.
+    angle <- angle + dt angle_rate      e_inertial = e - slope (y - angle)      e_drift = sum dt slope
     """
-    gravity, x, specific_force = forces.gravity, measured_signals.x, measured_signals.force
-    phi, theta = measured_signals.attitude[0], measured_signals.attitude[1]
-    alpha, beta, V = measured_signals.y[ALPHA], measured_signals.y[BETA], measured_signals.y[AIRSPEED]
-    unit_velocity_forward, unit_velocity_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
-    unit_velocity_down = np.sin(alpha) * np.cos(beta)
-    forward_acceleration = specific_force[0] - gravity * np.sin(theta)
-    right_acceleration = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
-    down_acceleration = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
-    airspeed_rate = (
-        unit_velocity_forward * forward_acceleration
-        + unit_velocity_right * right_acceleration
-        + unit_velocity_down * down_acceleration
-    )
-    right_velocity_rate = right_acceleration + V * (x[0] * unit_velocity_down - x[2] * unit_velocity_forward)
-    forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES] = (
-        right_velocity_rate - airspeed_rate * unit_velocity_right
-    ) / (V * np.cos(beta))
-    forward_velocity_rate = forward_acceleration + V * (
-        x[2] * unit_velocity_right - x[1] * unit_velocity_down
-    )
-    down_velocity_rate = down_acceleration + V * (x[1] * unit_velocity_forward - x[0] * unit_velocity_right)
-    forces.flow_angle_rate[NORMAL_INDEX_AMONG_FORCES] = (
-        down_velocity_rate * np.cos(alpha) - forward_velocity_rate * np.sin(alpha)
-    ) / (V * np.cos(beta))
+    angle = y[VANES[i]]
+    slope = f.vane[1] * forces.q_ratio
+    f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
+    f.e_drift += dt * slope
+    f.e_inertial = f.innovation - slope * (angle - f.angle)
 
 
-def terms_of_one_force(aircraft: Aircraft, force_index: int) -> list[Term]:
-    """The terms of one direction, as `update_force_innovation_and_regressors` goes through them."""
-    return [
-        term
-        for term in aircraft.measurable_forces
-        if term.coefficient == FORCE_COEFFICIENT_NAMES[force_index]
-    ]
+@kernel
+def update_force(forces, gust, i, meas, u):
+    """Update force i: its innovation e, the effects of surfaces, and the regressors of its errors.
+
+        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c      e = a_i / c - f_hat
+
+    The last regressors are the term in the rate of sideslip, f_bdot, and f_hat itself.
+    """
+    table, f = gust.memory.table, forces.component[i]
+    first = table.free_from[SIDE_ROW + i]
+    end = table.surface_to[SIDE_ROW + i]
+    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
+    f_hat = 0.0
+    f.G_prev[:] = f.G
+    f.G[:] = 0.0
+    f.e_G[:] = 0.0
+    for k in range(first, end):
+        s = table.surface[k]
+        Z = per_C * table.power[table.monomial[k]]
+        if s >= 0:
+            f.G[s] += table.value[k] * Z
+            f.e_G[s] += f.tol[k - first] * abs(Z)
+            Z *= u[s]
+        f.regressor[k - first] = Z
+        f_hat += table.value[k] * Z
+    if i == SIDE_INDEX:
+        f_bdot = (
+            per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * forces.span / (2.0 * meas.y[AIRSPEED])
+        )
+        f.regressor[end - first] = f_bdot
+        f_hat += f_bdot
+    f.regressor[f.n_Z - 1] = f_hat
+    f.f_hat = f_hat
+    if forces.n_seen == 0:
+        f.G_prev[:] = f.G
+    for s in range(u.size):
+        f.Gu[s] = f.G_prev[s] * u[s]
+    f.innovation = meas.force[1 + i] * forces.c_inv - f_hat
+    std = f_hat * forces.q_noise / meas.y[QDYN]
+    for k in range(2):
+        f.var[k] = f.var_trim[k] * forces.q_ratio**2 + std * std + f.var_acc
+
+
+@kernel
+def fill_angle_rates(forces, meas):
+    """Fill `angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
+
+        a = f + gravity      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
+
+    f (3,) m/s2: accelerometers; x (3,) rad/s.
+    """
+    g, x, f = forces.gravity, meas.x, meas.force
+    phi, th = meas.attitude[0], meas.attitude[1]
+    alpha, beta, V = meas.y[ALPHA], meas.y[BETA], meas.y[AIRSPEED]
+    e_x, e_y = np.cos(alpha) * np.cos(beta), np.sin(beta)
+    e_z = np.sin(alpha) * np.cos(beta)
+    a_x = f[0] - g * np.sin(th)
+    a_y = f[1] + g * np.cos(th) * np.sin(phi)
+    a_z = f[2] + g * np.cos(th) * np.cos(phi)
+    V_dot = e_x * a_x + e_y * a_y + e_z * a_z
+    v_dot = a_y + V * (x[0] * e_z - x[2] * e_x)
+    forces.angle_rate[SIDE_INDEX] = (v_dot - V_dot * e_y) / (V * np.cos(beta))
+    u_dot = a_x + V * (x[2] * e_y - x[1] * e_z)
+    w_dot = a_z + V * (x[1] * e_x - x[0] * e_y)
+    forces.angle_rate[NORMAL_INDEX] = (w_dot * np.cos(alpha) - u_dot * np.sin(alpha)) / (V * np.cos(beta))
+
+
+def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
+    """The terms of force i, as `update_force` goes through them."""
+    return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]
 
 
 def configure_forces(
-    fdi: np.void,
-    declared: Declared,
-    trim: RatesReadingsDeflections,
-    acceleration_slopes_by_air_data: np.ndarray,
-    dt_s: float,
+    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, dt: float
 ) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
-    acceleration_slopes_by_air_data (3, y.size): the slopes of the angular accelerations with y. dt_s: of a
-    frame.
+    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
     """
     y = trim[1]
-    statistical_record = fdi["statistical"]
+    stat = fdi["statistical"]
     aircraft = declared.aircraft
-    sensor_errors = declared.sensors
-    forces, gust, geometry = statistical_record["forces"], statistical_record["gust"], aircraft.geometry
-    forces["inverse_chord_per_m"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
-    forces["trim_dynamic_pressure"] = y[QDYN]
-    forces["dynamic_pressure_noise_std"] = sensor_errors["qdyn"].random
-    side_force_sideslip_rate_coefficients = [
-        t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)
-    ]
-    forces["wing_span"] = geometry.span_m
-    forces["sideslip_rate_coefficient"] = sum(side_force_sideslip_rate_coefficients)
-    for force_index in range(2):
-        _configure_force(fdi, declared, trim, acceleration_slopes_by_air_data, force_index, dt_s)
+    errors = declared.sensors
+    forces, gust, geometry = stat["forces"], stat["gust"], aircraft.geometry
+    forces["c_inv"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
+    forces["q_trim"] = y[QDYN]
+    forces["q_noise"] = errors["qdyn"].random
+    CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
+    forces["span"] = geometry.span_m
+    forces["CY_bdot"] = sum(CY_bdot)
+    for i in range(2):
+        _configure_force(fdi, declared, trim, slopes, i, dt)
 
 
 def _configure_force(
-    fdi: np.void,
-    declared: Declared,
-    trim: RatesReadingsDeflections,
-    acceleration_slopes_by_air_data: np.ndarray,
-    force_index: int,
-    dt_s: float,
+    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
 ) -> None:
     """Fill the record of one force; the arguments are those of `configure_forces`."""
-    y, aircraft, sensor_errors = trim[1], declared.aircraft, declared.sensors
-    forces, gust_config = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
-    force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
-    vane_index_in_y, axis = ((BETA, 2), (ALPHA, 1))[force_index]
-    specific_force_over_chord_per_coefficient = (
-        y[QDYN] * gust_config["wing_area_per_mass"] * forces["inverse_chord_per_m"]
-    )
-    specific_force_over_chord_slopes_with_slipstream = (
-        specific_force_over_chord_per_coefficient
-        * _force_coefficient_slopes(aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim)
-    )
-    specific_force_over_chord_slopes = specific_force_over_chord_slopes_with_slipstream[:-1]
-    force_record["axis_and_force_innovation_per_vane_error"] = (
-        -acceleration_slopes_by_air_data[axis, vane_index_in_y],
-        -specific_force_over_chord_slopes[vane_index_in_y],
-    )
-    force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index_in_y]
-    force_record["innovation_per_air_rotation"] = specific_force_over_chord_slopes[3:]
-    force_record["trim_noise_variance_with_without_vane"] = _force_prediction_noise_variances(
-        fdi, sensor_errors, y, specific_force_over_chord_slopes_with_slipstream, vane_index_in_y
-    )
-    accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
-    force_record["accelerometer_innovation_variance"] = (
-        forces["inverse_chord_per_m"] * accelerometer_noise_std
-    ) ** 2
-    _configure_force_regressors_and_tolerances(
-        force_record,
-        declared,
-        terms,
-        y,
-        specific_force_over_chord_slopes[vane_index_in_y] / specific_force_over_chord_per_coefficient,
-        force_index,
-        forces["inverse_chord_per_m"],
-    )
-    max_specific_force_over_chord_per_deflection_rad = specific_force_over_chord_per_coefficient * sum(
-        abs(term.value) for term in terms if term.surface
-    )
-    force_record["deflection_error_effect_bound"] = (
-        max_specific_force_over_chord_per_deflection_rad * declared.deflection_rad
-    )
-    force_record["flow_angle_drift_bound"] = _flow_angle_drift_rate_bound(
-        sensor_errors, gust_config["gravity"], y[AIRSPEED], force_index
-    )
-    flow_angle_drift_intensity = (
-        FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
-    ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-    force_record["inertial_innovation_drift_intensity"] = specific_force_over_chord_slopes[
-        vane_index_in_y
-    ] ** 2 * (flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED]))
+    y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
+    forces, cfg = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
+    f, terms = forces["component"][i], terms_of_force(aircraft, i)
+    vane, axis = VANES[i], (2, 1)[i]
+    per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
+    f_all = per_C * _force_slopes(aircraft, FORCE_NAMES[i], trim)
+    f_y = f_all[:-1]
+    f["vane"] = (-slopes[axis, vane], -f_y[vane])
+    f["vane_roll"] = -slopes[0, vane]
+    f["L"] = f_y[3:]
+    f["var_trim"] = _force_variances(fdi, errors, y, f_all, vane)
+    std = errors[ACCELEROMETERS[1 + i]].random
+    f["var_acc"] = (forces["c_inv"] * std) ** 2
+    _configure_terms(f, declared, terms, y, f_y[vane] / per_C, i, forces["c_inv"])
+    f_u = per_C * sum(abs(term.value) for term in terms if term.surface)
+    f["eta_u"] = f_u * declared.deflection_rad
+    f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+    Q_angle = (DRIFT_CHANGE_PER_S * f["drift"]) ** 2 + dt * (std / y[AIRSPEED]) ** 2
+    f["Q_e"] = f_y[vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
 
 
-def _force_prediction_noise_variances(
-    fdi: np.void,
-    sensor_errors: SensorErrors,
-    y: np.ndarray,
-    specific_force_over_chord_slopes_with_slipstream: np.ndarray,
-    vane_index_in_y: int,
+def _force_variances(
+    fdi: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, and without that of its vane."""
-    specific_force_over_chord_slopes = specific_force_over_chord_slopes_with_slipstream[:-1].copy()
-    specific_force_over_chord_per_slipstream = specific_force_over_chord_slopes_with_slipstream[-1]
-    slipstream_slope_per_airspeed, slipstream_variance_from_other_readings = (
-        _slipstream_slope_and_noise_variance(y, fdi["bound"]["declared_errors"], sensor_errors)
-    )
-    specific_force_over_chord_slopes[AIRSPEED] += (
-        specific_force_over_chord_per_slipstream * slipstream_slope_per_airspeed
-    )
-    innovation_variance_by_reading = (
-        specific_force_over_chord_slopes * sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
-    ) ** 2
-    total_variance = (
-        innovation_variance_by_reading.sum()
-        + specific_force_over_chord_per_slipstream**2 * slipstream_variance_from_other_readings
-    )
-    return total_variance, total_variance - innovation_variance_by_reading[vane_index_in_y]
+    """Variance of a predicted force by the noise of all readings, and without that of its vane.
+
+    f_all (7,): slopes of the force as of `_force_slopes`.
+    """
+    f_y = f_all[:-1].copy()
+    f_dpt = f_all[-1]
+    dpt_V, var_dpt = _slipstream_noise(y, fdi["bound"]["declared_errors"], errors)
+    f_y[AIRSPEED] += f_dpt * dpt_V
+    parts = (f_y * errors.each("random", ("alpha", "beta", "V", *AXES))) ** 2
+    var = parts.sum() + f_dpt**2 * var_dpt
+    return var, var - parts[vane]
 
 
-def _slipstream_slope_and_noise_variance(
-    y: np.ndarray, declared_errors: np.void, sensor_errors: SensorErrors
-) -> tuple[float, float]:
+def _slipstream_noise(y: np.ndarray, declared_errors: np.void, errors: SensorErrors) -> tuple[float, float]:
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
-    if not declared_errors["has_engine_instrument_errors"]:
+    if not declared_errors["engine"]:
         return 0.0, 0.0
-    slipstream_slope_per_airspeed, slipstream_per_pressure, slipstream_slope_per_kw = slipstream_slopes(
-        y, declared_errors["power_error_kw_per_density_ratio"]
-    )
-    power_noise_kw = declared_errors["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
-    return slipstream_slope_per_airspeed, float(
-        (slipstream_per_pressure * sensor_errors["qdyn"].random) ** 2
-        + (slipstream_slope_per_kw * power_noise_kw) ** 2
-    )
+    dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, declared_errors["kw1"])
+    noise_kw = declared_errors["kw0"] / NOISE_LIMIT_SIGMA
+    return dpt_V, float((dpt_q * errors["qdyn"].random) ** 2 + (dpt_kw * noise_kw) ** 2)
 
 
-def _flow_angle_drift_rate_bound(
-    sensor_errors: SensorErrors, gravity: float, airspeed_mps: float, force_index: int
-) -> float:
+def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
     """Bound the drift of the flow angle from inertial motion, rad/s. Gravity acts along the path's slope only
     on the incidence, and in full on sideslip."""
-    attitude_error_bound = sensor_errors["phi"].steady + sensor_errors["theta"].steady
-    gyro_error_bound = sum(
-        sensor_errors[gyro_name].steady + TYPICAL_BODY_RATE_RAD_S * sensor_errors[gyro_name].slope
-        for gyro_name in AXES
-    )
+    attitude = errors["phi"].steady + errors["theta"].steady
+    gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
-    accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
-    accelerometer_error_bound = (
-        accelerometer_errors.steady
-        + TYPICAL_PATH_SLOPE_RAD * sensor_errors["ax"].steady
-        + gravity * (accelerometer_errors.slope if force_index == NORMAL_INDEX_AMONG_FORCES else 0.0)
+    acc = errors[ACCELEROMETERS[1 + i]]
+    a_acc = (
+        acc.steady
+        + TYPICAL_SLOPE_RAD * errors["ax"].steady
+        + gravity * (acc.slope if i == NORMAL_INDEX else 0.0)
     )
-    acceleration_error_bound = (
-        gravity
-        * attitude_error_bound
-        * (TYPICAL_PATH_SLOPE_RAD if force_index == NORMAL_INDEX_AMONG_FORCES else 1.0)
-        + EARTH_ACCELERATION_BOUND_M_S2
-        + accelerometer_error_bound
-    )
-    return float(EARTH_RATE_RAD_S + gyro_error_bound + acceleration_error_bound / airspeed_mps)
+    a_all = gravity * attitude * (TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else 1.0) + EARTH_M_S2 + a_acc
+    return float(EARTH_RATE_RAD_S + gyros + a_all / V)
 
 
-def _configure_force_regressors_and_tolerances(
-    force_record: np.void,
-    declared: Declared,
-    terms: list[Term],
-    y: np.ndarray,
-    coefficient_per_vane_rad: float,
-    force_index: int,
-    inverse_chord_per_m: float,
+def _configure_terms(
+    f: np.void, declared: Declared, terms: list[Term], y: np.ndarray, C_vane: float, i: int, c_inv: float
 ) -> None:
     """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
     pressure do; of the accelerometer's bias, m/s2; of the whole."""
-    relative_coefficient_tolerance, sensor_errors = declared.coefficients.largest, declared.sensors
-    declared_errors_of_vane = sensor_errors["alpha" if force_index == NORMAL_INDEX_AMONG_FORCES else "beta"]
-    accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
-    relative_pressure_error_bound = sensor_errors["qdyn"].steady / y[QDYN] + sensor_errors["qdyn"].slope
+    tol_C, errors = declared.coefficients.largest, declared.sensors
+    vane = errors["alpha" if i == NORMAL_INDEX else "beta"]
+    acc = errors[ACCELEROMETERS[1 + i]]
+    tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
-        force_record["regressor_tolerance"][k] = (
-            relative_coefficient_tolerance + relative_pressure_error_bound + declared_errors_of_vane.slope
-        ) * abs(term.value)
+        f["tol"][k] = (tol_C + tol_q + vane.slope) * abs(term.value)
         if term.is_constant:
-            force_record["regressor_tolerance"][k] += declared_errors_of_vane.steady * abs(
-                coefficient_per_vane_rad
-            )
-    n_regressors_so_far = len(terms)
-    if force_index == SIDE_INDEX_AMONG_FORCES:
-        force_record["regressor_tolerance"][n_regressors_so_far] = (
-            relative_coefficient_tolerance
-            + SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES[declared.air.moves]
-        )
-        n_regressors_so_far = n_regressors_so_far + 1
-    if accelerometer_errors.steady:
-        force_record["regressor_tolerance"][n_regressors_so_far] = accelerometer_errors.steady
-        force_record["regressor"][n_regressors_so_far] = inverse_chord_per_m
-        n_regressors_so_far = n_regressors_so_far + 1
-    force_record["regressor_tolerance"][n_regressors_so_far] = MASS_TOLERANCE + accelerometer_errors.slope
-    force_record["n_regressors"] = n_regressors_so_far + 1
+            f["tol"][k] += vane.steady * abs(C_vane)
+    n = len(terms)
+    if i == SIDE_INDEX:
+        f["tol"][n] = tol_C + SIDESLIP_RATE_TOLERANCES[declared.air.moves]
+        n = n + 1
+    if acc.steady:
+        f["tol"][n] = acc.steady
+        f["regressor"][n] = c_inv
+        n = n + 1
+    f["tol"][n] = MASS_TOLERANCE + acc.slope
+    f["n_Z"] = n + 1
 
 
-def _force_coefficient(
-    aircraft: Aircraft, coefficient_name: str, flight_state: RatesReadingsDeflections
-) -> float:
-    """A force coefficient at x (3,) rad/s, y, u rad."""
-    x, y, u = flight_state
+def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
+    """The force coefficient `name` at x (3,) rad/s, y, u rad."""
+    x, y, u = state
     geometry, V = aircraft.geometry, y[AIRSPEED]
-    normalised_rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
-    value_by_factor_name = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
-        zip(aircraft.signals, y[4:], strict=True)
+    rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
+    values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
+    values |= dict(
+        zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *rates, 0.0), strict=True)
     )
-    value_by_factor_name |= dict(
-        zip(
-            ("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE),
-            (y[0], y[1], *normalised_rates, 0.0),
-            strict=True,
-        )
-    )
-    return float(aircraft.coefficient(coefficient_name, value_by_factor_name))
+    return float(aircraft.coefficient(name, values))
 
 
-def _force_coefficient_slopes(
-    aircraft: Aircraft, coefficient_name: str, trim: RatesReadingsDeflections
-) -> np.ndarray:
+def _force_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
-    (x, y, u), difference_step = trim, 1e-5
-    changed_states = [(x, y + difference_step * e, u) for e in np.eye(3, y.size)]
-    changed_states += [(x + difference_step * e, y, u) for e in np.eye(3)]
-    changed_states += [(x, y + difference_step * (np.arange(y.size) == DPT), u)]
-    trim_coefficient = _force_coefficient(aircraft, coefficient_name, trim)
-    return np.array(
-        [
-            (_force_coefficient(aircraft, coefficient_name, state) - trim_coefficient) / difference_step
-            for state in changed_states
-        ]
-    )
+    (x, y, u), step = trim, 1e-5
+    states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
+    states += [(x + step * e, y, u) for e in np.eye(3)]
+    states += [(x, y + step * (np.arange(y.size) == DPT), u)]
+    C = _force_coefficient(aircraft, name, trim)
+    return np.array([(_force_coefficient(aircraft, name, state) - C) / step for state in states])

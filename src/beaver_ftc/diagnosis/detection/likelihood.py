@@ -51,6 +51,26 @@ and the evidence that it contributes is subtracted.
 
 Onsets: slot j restarts every 2^(j+1) frames, so that onsets of about every age exist at any time. After an
 alarm no slot restarts, and old evidence decays slowly.
+
+Letters of the kernels. A block b has n axes, 1 or 2; i is an axis, j a regressor, k an onset test; a digit
+at the end is an axis.
+
+    nu, v          innovation of the frame; input of a filter, rad/s2
+    x              state of a filter: e of two axes, rad/s, then d of two axes, rad/s2
+    g              whitened response, rad/s: to nu; g_Z to a regressor, g_c to a coarse gust, g_s to s
+    a              decay of the drift d in a frame
+    P, Q, R_y      covariance of e (xx) and d (dd); noise of e (Q_x), (rad/s2)2, of d (Q_d), (rad/s2)2/s,
+                   and of the readings, (rad/s)2
+    S_inv, K       S^-1, s2/rad2; gains of e (K_x) and of d (K_d), 1/s
+    s, w           signature since the onset, rad/s2; S^-1 g_s, s/rad
+    N, D           sums as above; N_p, N_c: shares of N by p = lambda (g - g_0) and by a coarse gust
+    Z, tol, R      regressor, rad/s2; its tolerance; R_j
+    e_R            sum tol |R|
+    eta, eta_0     eta_bar, rad/s2; eta_bar |g_0|, rad/s
+    eta_r          eta_bar RINGING / K_d, rad/s
+    eta_rate       omega dt
+    e_0, e_tv, e_w shares of |N| by eta_bar: sums of eta_0 |w|, eta_r TV(w), eta_r eta_rate |w|
+    th             theta
 """
 
 from collections.abc import Sequence
@@ -64,48 +84,35 @@ from beaver_ftc.diagnosis.state import LOSS
 
 # A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
 # filter is e, then d.
-PITCH_BLOCK, LATERAL_BLOCK, MEAN_REVERTING_LATERAL_BLOCK = (
-    0,
-    1,
-    2,
-)  # the last: roll and yaw again, with a drift that returns to zero
+# The last: roll and yaw again, with a drift that returns to zero.
+PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = 0, 1, 2
 N_FILTER_BLOCKS = 3
-N_ONSET_SLOTS = 10
+N_SLOTS = 10
 N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: statistical.py
-USUAL_MAX_HYPOTHESES_PER_BLOCK = (
-    8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
-)
-MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2 = (
-    1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
-)
+USUAL_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
+MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
-SUPPORTING_CORRELATION_SIGN_BY_KIND = {
-    LOSS: -1.0,
-    STEP_FAULT: 0.0,
-    ALPHA_CUBED_MOMENT: 0.0,
-    GROWING_LOSS: -1.0,
-    LOSS_END: 1.0,
-}
+SIGN_OF_KIND = {LOSS: -1.0, STEP_FAULT: 0.0, ALPHA_CUBED_MOMENT: 0.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}
 
-PRIOR_DRIFT_STD_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
-PRIOR_LOSS_INFORMATION = 12.0  # one over the variance of a loss that is uniform on [0, 1]
+DRIFT_PRIOR_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
+LOSS_PRIOR = 12.0  # one over the variance of a loss that is uniform on [0, 1]
 # The magnitudes of a second-order transient of damping 0.7 sum to 1.09 times its sum; on two axes to more.
-TRANSIENT_RINGING_SUM_FACTOR = 1.2
+RINGING_FACTOR = 1.2
 
 # Time constant, s, of the estimate of lambda: long compared with a filter's memory, short compared with
 # changes of the weather.
-CALM_AIR_SHARE_MEMORY_S = 2.0
-CALM_AIR_SHARE_PRIOR_INFORMATION = 4.0  # prior information for lambda = 1 (calm air), units of sum p' S^-1 p
-STDS_ADDED_TO_CALM_AIR_SHARE = 2.0  # standard deviations by which lambda is taken larger than estimated
+CALM_MEMORY_S = 2.0
+CALM_PRIOR = 4.0  # prior information for lambda = 1 (calm air), units of sum p' S^-1 p
+CALM_STDS = 2.0  # standard deviations by which lambda is taken larger than estimated
 
 HYPOTHESIS_RECORD = record(
-    kind=int, surface=int, axis=int, raises_alarm=int, score_column_index=int,
+    kind=int, surface=int, axis=int, alarms=int, column=int,
     signature=2,  # s of this frame, rad/s2 per unit of theta
-    remaining_growth_decay_factor=float,  # exp(-kappa dt) of a growing loss
+    decay=float,  # exp(-kappa dt) of a growing loss
     score=float,  # largest normalised evidence over the onsets, standard deviations
-    theta_estimate=float, theta_information=float,  # estimate at the likeliest onset; one over its variance
-    llr_lower_bound=float, llr_upper_bound=float,  # bounds on the log-likelihood ratio against no fault
+    th=float, D=float,  # estimate at the likeliest onset; one over its variance
+    llr_lo=float, llr_hi=float,  # bounds on the log-likelihood ratio against no fault
 )  # fmt: skip
 
 
@@ -117,552 +124,361 @@ class BlockCapacity(NamedTuple):
 
 
 # An onset test is one hypothesis with one onset. Those of a few hypotheses lie side by side for vector
-# instructions: test (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS + slot in group
-# h // HYPOTHESES_PER_TEST_GROUP. A group has the same size in every record, so compiled code knows that its
-# arrays do not overlap. Checking that in each frame took a tenth of the detector's time.
-HYPOTHESES_PER_TEST_GROUP = 4
-N_ONSET_TESTS_PER_GROUP = HYPOTHESES_PER_TEST_GROUP * N_ONSET_SLOTS
-ONSET_TESTS_RECORD = record(
-    supporting_correlation_sign=N_ONSET_TESTS_PER_GROUP,  # sign of N that supports the hypothesis, or 0
-    signature_for_onset=(2, N_ONSET_TESTS_PER_GROUP),  # s since the onset, rad/s2
-    signature_filter_state=(4, N_ONSET_TESTS_PER_GROUP),
-    correlation_weight=(2, N_ONSET_TESTS_PER_GROUP),  # w = S^-1 g_s of the frame
-    correlation=N_ONSET_TESTS_PER_GROUP, information=N_ONSET_TESTS_PER_GROUP,  # N; D
-    max_correlation_by_coefficient_errors=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
-    # exp(-kappa t) of a growing loss; 1 until a loss has ended
-    remaining_growth_share=N_ONSET_TESTS_PER_GROUP,
-    signature_at_loss_end=(2, N_ONSET_TESTS_PER_GROUP),  # rad/s2
-    # shares of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its rate of
-    # change
-    max_correlation_by_constant_uncertainty=N_ONSET_TESTS_PER_GROUP,
-    max_correlation_by_varying_uncertainty=N_ONSET_TESTS_PER_GROUP,
-    max_correlation_by_rate_limited_uncertainty=N_ONSET_TESTS_PER_GROUP,
-    # shares of N: of lambda p; of a roughly visible gust
-    correlation_by_calm_air=N_ONSET_TESTS_PER_GROUP, correlation_from_coarse_gust=N_ONSET_TESTS_PER_GROUP,
-    score=N_ONSET_TESTS_PER_GROUP,
-    llr_lower_bound=N_ONSET_TESTS_PER_GROUP, llr_upper_bound=N_ONSET_TESTS_PER_GROUP,
-    llr=N_ONSET_TESTS_PER_GROUP,  # log-likelihood ratio
+# instructions: test (h % GROUP_SIZE) * N_SLOTS + slot in group h // GROUP_SIZE. A group has the same size in
+# every record, so compiled code knows that its arrays do not overlap. Checking that in each frame took a
+# tenth of the detector's time.
+GROUP_SIZE = 4
+N_GROUP_TESTS = GROUP_SIZE * N_SLOTS
+TESTS_RECORD = record(
+    supporting_correlation_sign=N_GROUP_TESTS,  # sign of N that supports the hypothesis, or 0
+    # signature since the onset, rad/s2; state of its filter; g_s of the frame
+    s=(2, N_GROUP_TESTS), x_s=(4, N_GROUP_TESTS), g_s=(2, N_GROUP_TESTS),
+    w=(2, N_GROUP_TESTS), correlation=N_GROUP_TESTS, information=N_GROUP_TESTS,  # w; N; D
+    e_R=N_GROUP_TESTS,
+    left=N_GROUP_TESTS,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
+    e_0=N_GROUP_TESTS, e_tv=N_GROUP_TESTS, e_w=N_GROUP_TESTS,
+    N_p=N_GROUP_TESTS, correlation_from_coarse_gust=N_GROUP_TESTS,  # N_p; N_c
+    score=N_GROUP_TESTS, llr_lo=N_GROUP_TESTS, llr_hi=N_GROUP_TESTS,
+    llr=N_GROUP_TESTS,  # log-likelihood ratio
 )  # fmt: skip
 
 
-_FILTER_FIELD_TYPE_BY_NAME = {
-    "n_axes": int, "drift_decay_factor": float, "state": 4, "unscaled_white_innovation_rad_s": 2,
-    "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2,
-    "gyro_noise_variance": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
+_FILTER_FIELDS = {
+    "n": int, "a": float, "state": 4, "g": 2, "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "Q_d": (2, 2),
+    "Q_x": 2, "R_y": 2, "S_inv": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
-FILTER_RECORD = record(**_FILTER_FIELD_TYPE_BY_NAME)
+FILTER_RECORD = record(**_FILTER_FIELDS)
 
 
-def set_supporting_correlation_signs(block: np.void, hypothesis_kinds: Sequence[int]) -> None:
-    """Fill the sign of N that supports each hypothesis, in all of its onset tests."""
-    block["onset_tests"]["supporting_correlation_sign"] = 0.0
-    for h, kind in enumerate(hypothesis_kinds):
-        first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
-        block["onset_tests"]["supporting_correlation_sign"][
-            h // HYPOTHESES_PER_TEST_GROUP, first_test_index : first_test_index + N_ONSET_SLOTS
-        ] = SUPPORTING_CORRELATION_SIGN_BY_KIND[kind]
-
-
-def max_test_groups(capacity: BlockCapacity) -> int:
-    """The number of groups of onset tests that the hypotheses of a block need."""
-    return (capacity.max_hypotheses + HYPOTHESES_PER_TEST_GROUP - 1) // HYPOTHESES_PER_TEST_GROUP
+def set_signs(b: np.void, kinds: Sequence[int]) -> None:
+    """Fill the sign of N that supports each hypothesis of a block, in all of its onset tests."""
+    b["tests"]["supporting_correlation_sign"] = 0.0
+    for h, kind in enumerate(kinds):
+        k = (h % GROUP_SIZE) * N_SLOTS
+        b["tests"]["supporting_correlation_sign"][h // GROUP_SIZE, k : k + N_SLOTS] = SIGN_OF_KIND[kind]
 
 
 @sized
-def block_dtype(capacity: BlockCapacity) -> np.dtype:
+def block_dtype(size: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
+    n_groups = (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
-        **_FILTER_FIELD_TYPE_BY_NAME,
-        drift_correlation_length_m=float, gust_drift_intensity_factor=float,
-        filter_state_after_known_faults=4,
-        frame_innovation=2,  # rad/s2
-        # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
-        no_gust_filter=FILTER_RECORD, predictable_innovation_in_calm_air=2, calm_air_cross_correlation=float,
-        calm_air_information=float,
-        # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
-        has_coarse_gust_estimate=int, coarse_gust_response=2, coarse_gust_filter_state=4,
-        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty;
-        # omega dt of that uncertainty; its responses: see `fill_uncertainty_response_bounds`
-        alarm_level=float, noise_share_of_alarm_level=float, uncertainty_change_over_bound_per_frame=float,
-        settled_uncertainty_response_bound=2, transient_response_sum_bound=2,
-        n_regressors=int, regressor_tolerance=capacity.max_regressors, regressor=(capacity.max_regressors, 2),
-        regressor_filter_state=(capacity.max_regressors, 4), regressor_response=(capacity.max_regressors, 2),
-        n_hypotheses=int, hypothesis=(HYPOTHESIS_RECORD, capacity.max_hypotheses),
-        onset_tests=(ONSET_TESTS_RECORD, max_test_groups(capacity)),
-        # R_j of each onset test
-        regressor_correlation=(max_test_groups(capacity), capacity.max_regressors, N_ONSET_TESTS_PER_GROUP),
+        **_FILTER_FIELDS,
+        # length of the drift's memory, m, 0 for none; factor on the intensity of a gust
+        drift_correlation_length_m=float, Q_scale=float,
+        x_known=4, nu=2,  # state of the filter after known faults
+        calm=FILTER_RECORD, p=2, pg=float, pp=float,  # in turbulence: filter without gust; p; sums of lambda
+        has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust roughly; state of its filter
+        # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
+        alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
+        n_Z=int, tol=size.max_regressors, regressor=(size.max_regressors, 2),
+        x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
+        n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
+        tests=(TESTS_RECORD, n_groups),
+        R=(n_groups, size.max_regressors, N_GROUP_TESTS),
     )  # fmt: skip
 
 
 def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
-    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
-    array_of_one_block, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
-    block, rate_slice, drift_slice = array_of_one_block[0], slice(0, n), slice(n, 2 * n)
-    block["n_axes"], block["axes"], block["gyro_noise_variance"][:n] = n, (0, 1), R
-    for covariance_name, row_slice, column_slice in (
-        ("P_xx", rate_slice, rate_slice),
-        ("P_xd", rate_slice, drift_slice),
-        ("P_dd", drift_slice, drift_slice),
-    ):
-        block[covariance_name][:n, :n] = P[row_slice, column_slice]
-    return array_of_one_block
+    P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise.
+    """
+    blocks, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
+    b, x, d = blocks[0], slice(0, n), slice(n, 2 * n)
+    b["n"], b["axes"], b["R_y"][:n] = n, (0, 1), R
+    for name, i, j in (("P_xx", x, x), ("P_xd", x, d), ("P_dd", d, d)):
+        b[name][:n, :n] = P[i, j]
+    return blocks
 
 
 @kernel
-def invert_symmetric_in_place(n, S):
-    """Replace the leading n x n part of a symmetric S (2, 2), n at most 2, by its inverse."""
+def invert_symmetric(n, S):
+    """S <- S^-1, in place; S (n, n) symmetric, n at most 2."""
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
         return
-    off_diagonal = 0.5 * (S[0, 1] + S[1, 0])
-    determinant = S[0, 0] * S[1, 1] - off_diagonal * off_diagonal
-    S[0, 0], S[1, 1] = S[1, 1] / determinant, S[0, 0] / determinant
-    S[0, 1] = S[1, 0] = -off_diagonal / determinant
+    c = 0.5 * (S[0, 1] + S[1, 0])
+    det = S[0, 0] * S[1, 1] - c * c
+    S[0, 0], S[1, 1] = S[1, 1] / det, S[0, 0] / det
+    S[0, 1] = S[1, 0] = -c / det
 
 
 @kernel
-def predict_covariance(block, dt):
-    """Predict the covariances over a frame of dt s, and fill `S_inverse` with S, yet to be inverted."""
-    P_xx, P_xd, P_dd, S_before_inversion = block.P_xx, block.P_xd, block.P_dd, block.S_inverse
-    for i in range(block.n_axes):
-        for j in range(block.n_axes):
-            P_xx[i, j] += dt * (P_xd[i, j] + P_xd[j, i]) + dt * dt * P_dd[i, j]
-        P_xx[i, i] += dt * dt * block.model_noise_variance[i]
-    for i in range(block.n_axes):
-        for j in range(block.n_axes):
-            P_xd[i, j] = block.drift_decay_factor * (P_xd[i, j] + dt * P_dd[i, j])
-            P_dd[i, j] = (
-                block.drift_decay_factor * block.drift_decay_factor * P_dd[i, j]
-                + dt * block.drift_intensity[i, j]
-            )
-            S_before_inversion[i, j] = P_xx[i, j]
-        S_before_inversion[i, i] += block.gyro_noise_variance[i]
+def predict_covariance(b, dt):
+    """Predict the covariances over a frame of dt s:
 
+        P <- F P F' + Q,  F = [1 dt; 0 a],  Q = [dt^2 Q_x 0; 0 dt Q_d]        S = P_xx + R_y
 
-@kernel
-def fill_kalman_gains(block):
-    """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
-    for i in range(block.n_axes):
-        for j in range(block.n_axes):
-            rate_gain_entry, drift_gain_entry = 0.0, 0.0
-            for k in range(block.n_axes):
-                rate_gain_entry += block.P_xx[i, k] * block.S_inverse[k, j]
-                drift_gain_entry += block.P_xd[k, i] * block.S_inverse[k, j]
-            block.K_x[i, j], block.K_d[i, j] = rate_gain_entry, drift_gain_entry
-
-
-@kernel
-def update_covariance(block):
-    """Update the covariances for the measurement: P <- P - K S K'."""
-    rate_gain, drift_gain = block.K_x, block.K_d
-    for j in range(2):  # a column follows from itself alone
-        P_xx_0j, P_xx_1j = block.P_xx[0, j], block.P_xx[1, j]
-        P_xd_0j, P_xd_1j = block.P_xd[0, j], block.P_xd[1, j]
-        for i in range(block.n_axes):
-            block.P_dd[i, j] -= drift_gain[i, 0] * P_xd_0j + drift_gain[i, 1] * P_xd_1j
-            block.P_xx[i, j] -= rate_gain[i, 0] * P_xx_0j + rate_gain[i, 1] * P_xx_1j
-            block.P_xd[i, j] -= rate_gain[i, 0] * P_xd_0j + rate_gain[i, 1] * P_xd_1j
-
-
-@kernel
-def advance_covariance(block, dt):
-    """Predict the covariances, fill the gains, update the covariances for the frame just measured; dt s."""
-    predict_covariance(block, dt)
-    invert_symmetric_in_place(block.n_axes, block.S_inverse)
-    fill_kalman_gains(block)
-    update_covariance(block)
-
-
-@kernel
-def advance_whitening_filter(block, filter_state, input_acceleration, dt, out):
-    """Advance the filter by one frame of input_acceleration (2,) rad/s2; dt s.
-
-    filter_state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g;
-    that of the innovation has covariance S.
+    `S_inv` is filled with S, yet to be inverted.
     """
-    for i in range(block.n_axes):
-        out[i] = filter_state[i] + dt * (input_acceleration[i] - filter_state[2 + i])
-    for i in range(block.n_axes):
-        remaining_rate_error, drift_correction = out[i], 0.0
-        for j in range(block.n_axes):
-            remaining_rate_error -= block.K_x[i, j] * out[j]
-            drift_correction += block.K_d[i, j] * out[j]
-        filter_state[i] = remaining_rate_error
-        filter_state[2 + i] = block.drift_decay_factor * filter_state[2 + i] + drift_correction
+    P_xx, P_xd, P_dd, S = b.P_xx, b.P_xd, b.P_dd, b.S_inv
+    for i in range(b.n):
+        for j in range(b.n):
+            P_xx[i, j] += dt * (P_xd[i, j] + P_xd[j, i]) + dt * dt * P_dd[i, j]
+        P_xx[i, i] += dt * dt * b.Q_x[i]
+    for i in range(b.n):
+        for j in range(b.n):
+            P_xd[i, j] = b.a * (P_xd[i, j] + dt * P_dd[i, j])
+            P_dd[i, j] = b.a * b.a * P_dd[i, j] + dt * b.Q_d[i, j]
+            S[i, j] = P_xx[i, j]
+        S[i, i] += b.R_y[i]
 
 
 @kernel
-def whiten_regressors(block, dt):
-    """Whiten all regressors as `advance_whitening_filter` does.
+def fill_kalman_gains(b):
+    """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
+    for i in range(b.n):
+        for j in range(b.n):
+            K_x, K_d = 0.0, 0.0
+            for k in range(b.n):
+                K_x += b.P_xx[i, k] * b.S_inv[k, j]
+                K_d += b.P_xd[k, i] * b.S_inv[k, j]
+            b.K_x[i, j], b.K_d[i, j] = K_x, K_d
+
+
+@kernel
+def update_covariance(b):
+    """Update the covariances for the measurement: P <- P - K S K'."""
+    K_x, K_d = b.K_x, b.K_d
+    for j in range(2):  # a column follows from itself alone
+        xx_0, xx_1 = b.P_xx[0, j], b.P_xx[1, j]
+        xd_0, xd_1 = b.P_xd[0, j], b.P_xd[1, j]
+        for i in range(b.n):
+            b.P_dd[i, j] -= K_d[i, 0] * xd_0 + K_d[i, 1] * xd_1
+            b.P_xx[i, j] -= K_x[i, 0] * xx_0 + K_x[i, 1] * xx_1
+            b.P_xd[i, j] -= K_x[i, 0] * xd_0 + K_x[i, 1] * xd_1
+
+
+@kernel
+def advance_covariance(b, dt):
+    """Predict the covariances, fill the gains, update the covariances for the frame just measured; dt s."""
+    predict_covariance(b, dt)
+    invert_symmetric(b.n, b.S_inv)
+    fill_kalman_gains(b)
+    update_covariance(b)
+
+
+@kernel
+def whiten_step(b, x, v, dt, g):
+    """Advance the filter of a block by one frame of the input v (2,) rad/s2:
+
+        g = e + dt (v - d)      e <- g - K_x g      d <- a d + K_d g
+
+    x (4,): e, d; advanced in place. g (2,) rad/s, filled: of the innovation it has the covariance S.
+    """
+    for i in range(b.n):
+        g[i] = x[i] + dt * (v[i] - x[2 + i])
+    for i in range(b.n):
+        e, d = g[i], 0.0
+        for j in range(b.n):
+            e -= b.K_x[i, j] * g[j]
+            d += b.K_d[i, j] * g[j]
+        x[i] = e
+        x[2 + i] = b.a * x[2 + i] + d
+
+
+@kernel
+def whiten_regressors(b, dt):
+    """Advance the filter of each regressor Z as `whiten_step` does: x_Z, g_Z.
 
     In a block of one axis all values of a second axis are zero.
     """
-    rate_gain, drift_gain, drift_decay_factor = block.K_x, block.K_d, block.drift_decay_factor
-    rate_gain_00, rate_gain_01 = rate_gain[0, 0], rate_gain[0, 1]
-    rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
-    drift_gain_00, drift_gain_01 = drift_gain[0, 0], drift_gain[0, 1]
-    drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
-    regressors = block.regressor
-    filter_states = block.regressor_filter_state
-    responses = block.regressor_response
-    for j in range(block.n_regressors):
-        response_0 = filter_states[j, 0] + dt * (regressors[j, 0] - filter_states[j, 2])
-        response_1 = filter_states[j, 1] + dt * (regressors[j, 1] - filter_states[j, 3])
-        responses[j, 0], responses[j, 1] = response_0, response_1
-        filter_states[j, 0] = response_0 - rate_gain_00 * response_0 - rate_gain_01 * response_1
-        filter_states[j, 1] = response_1 - rate_gain_10 * response_0 - rate_gain_11 * response_1
-        filter_states[j, 2] = drift_decay_factor * filter_states[j, 2] + (
-            drift_gain_00 * response_0 + drift_gain_01 * response_1
-        )
-        filter_states[j, 3] = drift_decay_factor * filter_states[j, 3] + (
-            drift_gain_10 * response_0 + drift_gain_11 * response_1
-        )
+    for j in range(b.n_Z):
+        whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
 
 
 @kernel
-def whiten_by_no_gust_filter(block, dt):
-    """Whiten the frame, `frame_innovation`, rad/s2, by the filter without gust; dt s."""
-    advance_covariance(block.no_gust_filter, dt)
-    advance_whitening_filter(
-        block.no_gust_filter,
-        block.no_gust_filter.state,
-        block.frame_innovation,
-        dt,
-        block.no_gust_filter.unscaled_white_innovation_rad_s,
-    )
+def whiten_calm(b, dt):
+    """Whiten nu by the filter without gust; dt s."""
+    advance_covariance(b.calm, dt)
+    whiten_step(b.calm, b.calm.state, b.nu, dt, b.calm.g)
 
 
 @kernel
-def update_predictable_innovation(block, dt):
-    """Fill `predictable_innovation_in_calm_air` (2,) rad/s with lambda p, the part of g that calm air makes
-    predictable.
+def update_calm_part(b, dt):
+    """Fill `p` (2,) rad/s with lam p, the part of g that calm air makes predictable.
 
-    lambda is estimated over the last CALM_AIR_SHARE_MEMORY_S. `whiten_by_no_gust_filter` must have run for
-    this frame.
+        p = g - g_0      lam = sum p' S^-1 g / sum p' S^-1 p
+
+    The sums, pg and pp, are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before.
     """
-    no_gust_filter = block.no_gust_filter
-    predictable_innovation = block.predictable_innovation_in_calm_air
-    unscaled_white_innovation_rad_s = block.unscaled_white_innovation_rad_s
-    sum_decay_factor = np.exp(-dt / CALM_AIR_SHARE_MEMORY_S)
-    block.calm_air_cross_correlation *= sum_decay_factor
-    block.calm_air_information *= sum_decay_factor
-    for i in range(block.n_axes):
-        predictable_innovation[i] = (
-            unscaled_white_innovation_rad_s[i] - no_gust_filter.unscaled_white_innovation_rad_s[i]
-        )
-    for i in range(block.n_axes):
-        for j in range(block.n_axes):
-            block.calm_air_cross_correlation += (
-                predictable_innovation[i] * block.S_inverse[i, j] * unscaled_white_innovation_rad_s[j]
-            )
-            block.calm_air_information += (
-                predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
-            )
-    calm_air_share_denominator = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
-    upper_calm_air_share_numerator = (
-        block.calm_air_cross_correlation
-        + CALM_AIR_SHARE_PRIOR_INFORMATION
-        + STDS_ADDED_TO_CALM_AIR_SHARE * sqrt(calm_air_share_denominator)
-    )
-    upper_calm_air_share = min(max(upper_calm_air_share_numerator / calm_air_share_denominator, 0.0), 1.0)
-    for i in range(block.n_axes):
-        predictable_innovation[i] *= upper_calm_air_share
+    p, g, decay = b.p, b.g, np.exp(-dt / CALM_MEMORY_S)
+    b.pg *= decay
+    b.pp *= decay
+    for i in range(b.n):
+        p[i] = g[i] - b.calm.g[i]
+    for i in range(b.n):
+        for j in range(b.n):
+            b.pg += p[i] * b.S_inv[i, j] * g[j]
+            b.pp += p[i] * b.S_inv[i, j] * p[j]
+    D = b.pp + CALM_PRIOR
+    lam = min(max((b.pg + CALM_PRIOR + CALM_STDS * sqrt(D)) / D, 0.0), 1.0)
+    for i in range(b.n):
+        p[i] *= lam
 
 
 @kernel
-def onset_slot_restarting_at_frame(frame_index):
-    """The slot that restarts at a frame: slot j at odd multiples of 2^j, the last at all other frames."""
-    onset_slot = 0
-    while frame_index % 2 == 0 and onset_slot < N_ONSET_SLOTS - 1:
-        frame_index //= 2
-        onset_slot += 1
-    return onset_slot
+def restarting_slot(k):
+    """The slot that restarts at frame k: slot j at odd multiples of 2^j, the last at all other frames."""
+    j = 0
+    while k % 2 == 0 and j < N_SLOTS - 1:
+        k //= 2
+        j += 1
+    return j
 
 
 @kernel
-def n_onset_tests_in_group(block, group_index):
-    """The number of onset tests in use in group g: the first entries of each array."""
-    return (
-        min(block.n_hypotheses - group_index * HYPOTHESES_PER_TEST_GROUP, HYPOTHESES_PER_TEST_GROUP)
-        * N_ONSET_SLOTS
-    )
+def tests_in_group(b, i):
+    """The number of onset tests in use in group i: the first entries of each array."""
+    return min(b.n_h - i * GROUP_SIZE, GROUP_SIZE) * N_SLOTS
 
 
 @kernel
-def n_test_groups(block):
-    """The number of groups of onset tests in use."""
-    return (block.n_hypotheses + HYPOTHESES_PER_TEST_GROUP - 1) // HYPOTHESES_PER_TEST_GROUP
+def n_test_groups(n_h):
+    """The number of groups of onset tests that n_h hypotheses need."""
+    return (n_h + GROUP_SIZE - 1) // GROUP_SIZE
 
 
 @kernel
-def reset_onset_slot(block, onset_slot):
+def reset_slot(b, slot):
     """Restart a slot: its onset is the next frame, without evidence."""
-    for group_index in range(n_test_groups(block)):
-        onset_tests = block.onset_tests[group_index]
-        for k in range(onset_slot, n_onset_tests_in_group(block, group_index), N_ONSET_SLOTS):
-            onset_tests.correlation[k] = onset_tests.information[k] = 0.0
-            onset_tests.correlation_weight[0, k] = onset_tests.correlation_weight[1, k] = 0.0
-            onset_tests.max_correlation_by_constant_uncertainty[
-                k
-            ] = onset_tests.max_correlation_by_varying_uncertainty[k] = 0.0
-            onset_tests.max_correlation_by_rate_limited_uncertainty[k] = 0.0
-            onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_from_coarse_gust[k] = 0.0
-            onset_tests.remaining_growth_share[k] = 1.0
-            for i in range(4):
-                onset_tests.signature_filter_state[i, k] = 0.0
-            for j in range(block.n_regressors):
-                block.regressor_correlation[group_index, j, k] = 0.0
+    for group in range(n_test_groups(b.n_h)):
+        t = b.tests[group]
+        for k in range(slot, tests_in_group(b, group), N_SLOTS):
+            t.correlation[k] = t.information[k] = t.w[0, k] = t.w[1, k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
+            t.left[k] = 1.0
+            t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
-def fill_uncertainty_response_bounds(block, uncertainty_bound, dt):
-    """Fill `settled_uncertainty_response_bound` and `transient_response_sum_bound` (2,) with eta_bar |g_0|
-    and eta_bar RINGING / K_d.
+def bound_responses(b, eta, dt):
+    """Fill `eta_0` = eta_bar |g_0| and `eta_r` = eta_bar RINGING |K_d^-1|, (2,); eta (3,) rad/s2: eta_bar.
 
-    uncertainty_bound (3,) rad/s2: eta_bar.
+    g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      K_d^-1: cofactors c over det
     """
-    drift_gain, drift_share_lost_per_frame = block.K_d, 1.0 - block.drift_decay_factor
-    drift_gain_determinant = (
-        drift_gain[0, 0] * drift_gain[1, 1] - drift_gain[0, 1] * drift_gain[1, 0]
-        if block.n_axes > 1
-        else drift_gain[0, 0]
-    )
-    for i in range(block.n_axes):
-        block.settled_uncertainty_response_bound[i] = block.transient_response_sum_bound[i] = 0.0
-        for j in range(block.n_axes):
-            drift_gain_cofactor = (
-                1.0 if block.n_axes == 1 else (drift_gain[1 - i, 1 - i] if i == j else drift_gain[i, j])
-            )
-            block.transient_response_sum_bound[i] += (
-                TRANSIENT_RINGING_SUM_FACTOR
-                * abs(drift_gain_cofactor / drift_gain_determinant)
-                * uncertainty_bound[block.axes[j]]
-            )
-        if drift_share_lost_per_frame > 0.0:
-            axis_settled_response_per_constant_uncertainty = (
-                dt
-                * drift_share_lost_per_frame
-                / (block.K_x[i, i] * drift_share_lost_per_frame + dt * drift_gain[i, i])
-            )
-            block.settled_uncertainty_response_bound[i] = (
-                axis_settled_response_per_constant_uncertainty * uncertainty_bound[block.axes[i]]
-            )
+    K_d, lost = b.K_d, 1.0 - b.a
+    det = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if b.n > 1 else K_d[0, 0]
+    for i in range(b.n):
+        b.eta_0[i] = b.eta_r[i] = 0.0
+        for j in range(b.n):
+            c = 1.0 if b.n == 1 else (K_d[1 - i, 1 - i] if i == j else K_d[i, j])
+            b.eta_r[i] += RINGING_FACTOR * abs(c / det) * eta[b.axes[j]]
+        if lost > 0.0:
+            g_0 = dt * lost / (b.K_x[i, i] * lost + dt * K_d[i, i])
+            b.eta_0[i] = g_0 * eta[b.axes[i]]
 
 
 @kernel
-def update_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
-    """Fill `signature_for_onset`, rad/s2, of a hypothesis for each onset, from test `first_test_index` on.
+def update_signatures(h, t, first):
+    """Fill s (2,) rad/s2 of hypothesis h for each of its onsets, tests first, first + 1, ...
 
-    It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
-    of the onset.
+    It is the signature of the frame; for a growing loss times 1 - left, left = exp(-kappa t); for the end of
+    a loss that of the onset.
     """
-    frame_signature_0, frame_signature_1 = hypothesis.signature[0], hypothesis.signature[1]
-    for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
-        if hypothesis.kind == LOSS_END:
-            if onset_tests.remaining_growth_share[k] > 0.0:
-                onset_tests.remaining_growth_share[k] = 0.0
-                onset_tests.signature_at_loss_end[0, k] = frame_signature_0
-                onset_tests.signature_at_loss_end[1, k] = frame_signature_1
-            onset_tests.signature_for_onset[0, k] = onset_tests.signature_at_loss_end[0, k]
-            onset_tests.signature_for_onset[1, k] = onset_tests.signature_at_loss_end[1, k]
-        elif hypothesis.kind == GROWING_LOSS:
-            onset_tests.remaining_growth_share[k] *= hypothesis.remaining_growth_decay_factor
-            grown_share = 1.0 - onset_tests.remaining_growth_share[k]
-            onset_tests.signature_for_onset[0, k] = grown_share * frame_signature_0
-            onset_tests.signature_for_onset[1, k] = grown_share * frame_signature_1
-        else:
-            onset_tests.signature_for_onset[0, k] = frame_signature_0
-            onset_tests.signature_for_onset[1, k] = frame_signature_1
+    for k in range(first, first + N_SLOTS):
+        grown = 1.0
+        if h.kind == GROWING_LOSS:
+            t.left[k] *= h.decay
+            grown -= t.left[k]
+        elif h.kind == LOSS_END:
+            if t.left[k] == 0.0:
+                continue
+            t.left[k] = 0.0
+        for i in range(2):
+            t.s[i, k] = grown * h.signature[i]
 
 
 @kernel
-def whiten_signatures_and_accumulate_sums(block, onset_tests, n_tests, dt, evidence_decay_factor):
-    """Whiten `signature_for_onset` of the first n_tests tests, and add the frame to N, D and the bounds on N.
+def accumulate_tests(b, t, n, dt, decay):
+    """Whiten s of the first n tests of a group t, and add the frame to their sums, axis by axis:
 
-    evidence_decay_factor: factor by which earlier sums decay. In a block of one axis all values of a second
-    axis are zero.
+        w = S^-1 g_s      N <- decay N + w' g      D <- decay D + w' g_s
+        N_p <- decay N_p + w' p                    N_c <- decay N_c + w' g_c
+        e_0 <- decay e_0 + eta_0' |w|              e_tv <- decay e_tv + eta_r' |w - w_before|
+        e_w <- decay e_w + eta_rate eta_r' |w|
+
+    In a block of one axis all values of a second axis are zero.
     """
-    rate_gain, drift_gain, S_inverse = block.K_x, block.K_d, block.S_inverse
-    rate_gain_00, rate_gain_01 = rate_gain[0, 0], rate_gain[0, 1]
-    rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
-    drift_gain_00, drift_gain_01 = drift_gain[0, 0], drift_gain[0, 1]
-    drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
-    S_inv00, S_inv01, S_inv10, S_inv11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 0], S_inverse[1, 1]
-    drift_decay_factor = block.drift_decay_factor
-    unscaled_white_innovation_0 = block.unscaled_white_innovation_rad_s[0]
-    unscaled_white_innovation_1 = block.unscaled_white_innovation_rad_s[1]
-    predictable_innovation_0 = block.predictable_innovation_in_calm_air[0]
-    predictable_innovation_1 = block.predictable_innovation_in_calm_air[1]
-    transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
-    transient_response_sum_bound_1 = block.transient_response_sum_bound[1]
-    settled_response_bound_0 = block.settled_uncertainty_response_bound[0]
-    settled_response_bound_1 = block.settled_uncertainty_response_bound[1]
-    signature_filter_state = onset_tests.signature_filter_state
-    signature_for_onset = onset_tests.signature_for_onset
-    correlation_weight = onset_tests.correlation_weight
-    uncertainty_change_over_bound_per_frame = block.uncertainty_change_over_bound_per_frame
-    for k in range(n_tests):
-        signature_response_0 = signature_filter_state[0, k] + dt * (
-            signature_for_onset[0, k] - signature_filter_state[2, k]
-        )
-        signature_response_1 = signature_filter_state[1, k] + dt * (
-            signature_for_onset[1, k] - signature_filter_state[3, k]
-        )
-        signature_filter_state[0, k] = (
-            signature_response_0 - rate_gain_00 * signature_response_0 - rate_gain_01 * signature_response_1
-        )
-        signature_filter_state[1, k] = (
-            signature_response_1 - rate_gain_10 * signature_response_0 - rate_gain_11 * signature_response_1
-        )
-        signature_filter_state[2, k] = drift_decay_factor * signature_filter_state[2, k] + (
-            drift_gain_00 * signature_response_0 + drift_gain_01 * signature_response_1
-        )
-        signature_filter_state[3, k] = drift_decay_factor * signature_filter_state[3, k] + (
-            drift_gain_10 * signature_response_0 + drift_gain_11 * signature_response_1
-        )
-        weight_0 = S_inv00 * signature_response_0 + S_inv01 * signature_response_1
-        weight_1 = S_inv10 * signature_response_0 + S_inv11 * signature_response_1
-        onset_tests.correlation[k] = evidence_decay_factor * onset_tests.correlation[k] + (
-            weight_0 * unscaled_white_innovation_0 + weight_1 * unscaled_white_innovation_1
-        )
-        onset_tests.information[k] = (
-            evidence_decay_factor * onset_tests.information[k]
-            + weight_0 * signature_response_0
-            + weight_1 * signature_response_1
-        )
-        onset_tests.correlation_by_calm_air[k] = (
-            evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
-        ) + (weight_0 * predictable_innovation_0 + weight_1 * predictable_innovation_1)
-        varying_uncertainty_bound_increment = transient_response_sum_bound_0 * abs(
-            weight_0 - correlation_weight[0, k]
-        ) + transient_response_sum_bound_1 * abs(weight_1 - correlation_weight[1, k])
-        constant_uncertainty_bound_increment = settled_response_bound_0 * abs(
-            weight_0
-        ) + settled_response_bound_1 * abs(weight_1)
-        onset_tests.max_correlation_by_constant_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.max_correlation_by_constant_uncertainty[k]
-            + constant_uncertainty_bound_increment
-        )
-        onset_tests.max_correlation_by_varying_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.max_correlation_by_varying_uncertainty[k]
-            + varying_uncertainty_bound_increment
-        )
-        onset_tests.max_correlation_by_rate_limited_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.max_correlation_by_rate_limited_uncertainty[k]
-            + uncertainty_change_over_bound_per_frame
-            * (
-                transient_response_sum_bound_0 * abs(weight_0)
-                + transient_response_sum_bound_1 * abs(weight_1)
-            )
-        )
-        correlation_weight[0, k], correlation_weight[1, k] = weight_0, weight_1
+    x, g_s, w, a, N_c = t.x_s, t.g_s, t.w, b.a, t.correlation_from_coarse_gust
+    for i in range(b.n):
+        for k in range(n):
+            g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[2 + i, k])
+            x[i, k] = g_s[i, k]
+            x[2 + i, k] *= a
+    for i in range(b.n):
+        for j in range(b.n):
+            K_x, K_d = b.K_x[i, j], b.K_d[i, j]
+            for k in range(n):
+                x[i, k] -= K_x * g_s[j, k]
+                x[2 + i, k] += K_d * g_s[j, k]
+        S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
+        keep, c, r, r_w = 1.0 if i else decay, b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
+        for k in range(n):
+            w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
+            t.correlation[k] = keep * t.correlation[k] + w_i * g
+            t.information[k] = keep * t.information[k] + w_i * g_s[i, k]
+            t.N_p[k] = keep * t.N_p[k] + w_i * p
+            N_c[k] = keep * N_c[k] + w_i * g_c
+            t.e_0[k] = keep * t.e_0[k] + c * abs(w_i)
+            t.e_tv[k] = keep * t.e_tv[k] + r * abs(w_i - w[i, k])
+            t.e_w[k] = keep * t.e_w[k] + r_w * abs(w_i)
+            w[i, k] = w_i
 
 
 @kernel
-def accumulate_regressor_correlation(
-    block, onset_tests, regressor_correlation, n_tests, evidence_decay_factor
-):
-    """Add the frame to R_j of n onset tests, `regressor_correlation` (regressors, tests), and fill their
-    `max_correlation_by_coefficient_errors`.
+def accumulate_regressors(b, t, R, n, decay):
+    """Add the frame to R (regressors, tests) of the first n tests of a group t, and fill their e_R:
+
+        R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
 
     Regressors go in pairs: weight and bound then pass through memory half as often. LLVM makes vector
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
-    correlation_weight = onset_tests.correlation_weight
-    max_correlation_by_coefficient_errors = onset_tests.max_correlation_by_coefficient_errors
-    regressor_response, coefficient_error_bounds = block.regressor_response, block.regressor_tolerance
-    n_regressors = block.n_regressors
-    max_correlation_by_coefficient_errors[:n_tests] = 0.0
-    for j in range(0, n_regressors - 1, 2):
-        response_a0 = regressor_response[j, 0]
-        response_a1 = regressor_response[j, 1]
-        response_b0 = regressor_response[j + 1, 0]
-        response_b1 = regressor_response[j + 1, 1]
-        correlations_a, correlations_b = regressor_correlation[j], regressor_correlation[j + 1]
-        error_bound_a, error_bound_b = coefficient_error_bounds[j], coefficient_error_bounds[j + 1]
-        for k in range(n_tests):
-            weight_0, weight_1 = correlation_weight[0, k], correlation_weight[1, k]
-            R_a = evidence_decay_factor * correlations_a[k] + (
-                weight_0 * response_a0 + weight_1 * response_a1
-            )
-            R_b = evidence_decay_factor * correlations_b[k] + (
-                weight_0 * response_b0 + weight_1 * response_b1
-            )
-            correlations_a[k], correlations_b[k] = R_a, R_b
-            max_correlation_by_coefficient_errors[k] = (
-                max_correlation_by_coefficient_errors[k] + error_bound_a * abs(R_a) + error_bound_b * abs(R_b)
-            )
-    for j in range(n_regressors - n_regressors % 2, n_regressors):
-        response_0, response_1 = regressor_response[j, 0], regressor_response[j, 1]
-        for k in range(n_tests):
-            regressor_correlation[j, k] = evidence_decay_factor * regressor_correlation[j, k] + (
-                correlation_weight[0, k] * response_0 + correlation_weight[1, k] * response_1
-            )
-            max_correlation_by_coefficient_errors[k] += coefficient_error_bounds[j] * abs(
-                regressor_correlation[j, k]
-            )
+    w, e_R, g, tol, n_Z = t.w, t.e_R, b.g_Z, b.tol, b.n_Z
+    e_R[:n] = 0.0
+    for j in range(0, n_Z - 1, 2):
+        ga0, ga1, gb0, gb1 = g[j, 0], g[j, 1], g[j + 1, 0], g[j + 1, 1]
+        Ra, Rb, tol_a, tol_b = R[j], R[j + 1], tol[j], tol[j + 1]
+        for k in range(n):
+            w0, w1 = w[0, k], w[1, k]
+            R_a = decay * Ra[k] + (w0 * ga0 + w1 * ga1)
+            R_b = decay * Rb[k] + (w0 * gb0 + w1 * gb1)
+            Ra[k], Rb[k] = R_a, R_b
+            e_R[k] = e_R[k] + tol_a * abs(R_a) + tol_b * abs(R_b)
+    for j in range(n_Z - n_Z % 2, n_Z):
+        g0, g1 = g[j, 0], g[j, 1]
+        for k in range(n):
+            R[j, k] = decay * R[j, k] + (w[0, k] * g0 + w[1, k] * g1)
+            e_R[k] += tol[j] * abs(R[j, k])
 
 
 @kernel
-def accumulate_correlation_from_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
-    """Add the frame to the share of N that a roughly visible gust contributes.
+def accumulate_evidence(b, with_Z, dt, decay):
+    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `decay`.
 
-    `whiten_signatures_and_accumulate_sums` must have filled the weights of the frame.
+    with_Z: whether the regressors count; dt s.
     """
-    gust_acceleration_axis_0, gust_acceleration_axis_1 = (
-        block.coarse_gust_response[0],
-        block.coarse_gust_response[1],
-    )
-    for k in range(n_tests):
-        onset_tests.correlation_from_coarse_gust[k] = (
-            evidence_decay_factor * onset_tests.correlation_from_coarse_gust[k]
-            + (
-                onset_tests.correlation_weight[0, k] * gust_acceleration_axis_0
-                + onset_tests.correlation_weight[1, k] * gust_acceleration_axis_1
-            )
-        )
+    for h in range(b.n_h):
+        update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
+    for i in range(n_test_groups(b.n_h)):
+        t, n = b.tests[i], tests_in_group(b, i)
+        accumulate_tests(b, t, n, dt, decay)
+        if with_Z:
+            accumulate_regressors(b, t, b.R[i], n, decay)
 
 
 @kernel
-def accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor):
-    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by
-    `evidence_decay_factor`."""
-    for h in range(block.n_hypotheses):
-        update_signatures_for_onsets(
-            block.hypothesis[h],
-            block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP],
-            (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS,
-        )
-    for group_index in range(n_test_groups(block)):
-        onset_tests, n_tests = block.onset_tests[group_index], n_onset_tests_in_group(block, group_index)
-        whiten_signatures_and_accumulate_sums(block, onset_tests, n_tests, dt, evidence_decay_factor)
-        if block.has_coarse_gust_estimate:
-            accumulate_correlation_from_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
-        if uses_regressors:
-            accumulate_regressor_correlation(
-                block, onset_tests, block.regressor_correlation[group_index], n_tests, evidence_decay_factor
-            )
+def uncertain_share(t, k, r0, r1):
+    """The share of |N| in test k that a bounded uncertainty explains: e_0 + min(e_tv + eta_r' |w|, e_w).
 
-
-@kernel
-def max_correlation_by_uncertainty(
-    onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
-):
-    """The largest share of |N| in test k that a bounded uncertainty explains.
-
-    transient_response_sum_bound_0, _1: the two entries of the block's `transient_response_sum_bound`.
+    r0, r1: eta_r. eta_r' |w| is the variation when the weight drops to zero at the end.
     """
-    bound_from_final_drop_of_weight = transient_response_sum_bound_0 * abs(
-        onset_tests.correlation_weight[0, k]
-    ) + transient_response_sum_bound_1 * abs(onset_tests.correlation_weight[1, k])
-    return onset_tests.max_correlation_by_constant_uncertainty[k] + min(
-        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_from_final_drop_of_weight,
-        onset_tests.max_correlation_by_rate_limited_uncertainty[k],
-    )
+    drop = r0 * abs(t.w[0, k]) + r1 * abs(t.w[1, k])
+    return t.e_0[k] + min(t.e_tv[k] + drop, t.e_w[k])
 
 
 @kernel
@@ -672,185 +488,114 @@ def is_one_sided(kind):
 
 
 @kernel
-def max_log_likelihood_ratio(is_loss_or_its_end, supporting_evidence, information):
-    """Largest log-likelihood ratio of a fault against none, for supporting_evidence N and information D.
+def max_llr(signed, N, D):
+    """Largest log-likelihood ratio of a fault against none: N^2 / 2 D.
 
-    It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
+    If signed, |theta| is at most 1, as that of a loss: N - D / 2 where N > D.
     """
-    llr = 0.5 * supporting_evidence * supporting_evidence / information
-    if is_loss_or_its_end and supporting_evidence > information:
-        llr = supporting_evidence - 0.5 * information
+    llr = 0.5 * N * N / D
+    if signed and N > D:
+        llr = N - 0.5 * D
     # The zero is not returned earlier: each way out would be a division of its own.
-    return llr if supporting_evidence > 0.0 else 0.0
+    return llr if N > 0.0 else 0.0
 
 
 @kernel
-def evidence_over_noise_and_uncertainty(
-    alarm_level, noise_share_of_alarm_level, supporting_evidence, max_evidence_from_uncertainty, information
-):
-    """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
+def evidence_ratio(level, share, N, eta, D):
+    """Evidence over what noise, and uncertainty with noise, allow.
 
-    max_evidence_from_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
-    of the alarm; noise_share_of_alarm_level: share of the level that is reserved for noise in addition. The
-    result is compared with the level.
+        N / max(sqrt(D), eta / level + share sqrt(D))
+
+    eta: share of N that a bounded uncertainty explains. level: that of the alarm, with which the result is
+    compared; share: share of it that is reserved for noise in addition.
     """
-    evidence_std = sqrt(information)
-    return supporting_evidence / (
-        evidence_std
-        if max_evidence_from_uncertainty <= 0.0
-        else max(
-            evidence_std,
-            max_evidence_from_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
-        )
-    )
+    std = sqrt(D)
+    return N / (std if eta <= 0.0 else max(std, eta / level + share * std))
 
 
 @kernel
-def evaluate_onset_tests(
-    block, onset_tests, n_tests, llr_bounds_ignore_uncertainty, non_loss_llr_bounds_include_uncertainty
-):
-    """Fill the score and the log-likelihood ratios of n onset tests; those of a test without information are
-    0.
+def evaluate_tests(b, t, n, without_eta, mapped):
+    """Fill the score and the log-likelihood ratios of the first n tests of a group t; 0 without information.
 
-    llr_bounds_ignore_uncertainty: the bounds on the ratios leave out the bounded uncertainty.
-    non_loss_llr_bounds_include_uncertainty: the bounds on hypotheses other than a loss always include it,
-    because the model's error is mapped: it is then large and lasting.
+        score = (N_s - e) over noise and eta      llr(N_s)      llr_lo, llr_hi: llr(N_s -+ (e + eta))
+
+    N_s: sign N, or |N| without a sign; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); eta: `uncertain_share`.
+    without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
+    always include it, because the model's error is mapped: it is then large and lasting.
     """
-    supporting_correlation_sign = onset_tests.supporting_correlation_sign
-    transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
-    transient_response_sum_bound_1 = block.transient_response_sum_bound[1]
-    alarm_level = block.alarm_level
-    noise_share_of_alarm_level = block.noise_share_of_alarm_level
-    uncertainty_weight_in_llr_bounds = 0.0 if llr_bounds_ignore_uncertainty else 1.0
-    for k in range(n_tests):
-        N, D = onset_tests.correlation[k], onset_tests.information[k]
-        evidence_from_errors_and_air = onset_tests.max_correlation_by_coefficient_errors[k] + max(
-            supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
-        )
-        evidence_from_errors_and_air += max(
-            supporting_correlation_sign[k] * onset_tests.correlation_from_coarse_gust[k], 0.0
-        )
-        is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
-        supporting_evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
-        max_evidence_from_uncertainty = max_correlation_by_uncertainty(
-            onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
-        )
-        evidence_error_bound = evidence_from_errors_and_air + (
-            max_evidence_from_uncertainty
-            if non_loss_llr_bounds_include_uncertainty and not is_loss_or_its_end
-            else uncertainty_weight_in_llr_bounds * max_evidence_from_uncertainty
-        )
-        score_in_standard_deviations = evidence_over_noise_and_uncertainty(
-            alarm_level,
-            noise_share_of_alarm_level,
-            supporting_evidence - evidence_from_errors_and_air,
-            max_evidence_from_uncertainty,
-            D,
-        )
-        llr = max_log_likelihood_ratio(is_loss_or_its_end, supporting_evidence, D)
-        llr_lower_bound = max_log_likelihood_ratio(
-            is_loss_or_its_end, supporting_evidence - evidence_error_bound, D
-        )
-        llr_upper_bound = max_log_likelihood_ratio(
-            is_loss_or_its_end, supporting_evidence + evidence_error_bound, D
-        )
-        onset_tests.score[k] = score_in_standard_deviations if has_information else 0.0
-        onset_tests.llr_lower_bound[k] = llr_lower_bound if has_information else 0.0
-        onset_tests.llr_upper_bound[k] = llr_upper_bound if has_information else 0.0
-        onset_tests.llr[k] = llr if has_information else -1.0
+    sign, level, share = t.supporting_correlation_sign, b.alarm_level, b.noise_share
+    r0, r1 = b.eta_r[0], b.eta_r[1]
+    for k in range(n):
+        N, D = t.correlation[k], t.information[k]
+        signed, known = sign[k] != 0.0, D > 0.0
+        N_s = sign[k] * N if signed else abs(N)
+        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
+        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
+        eta = uncertain_share(t, k, r0, r1)
+        score = evidence_ratio(level, share, N_s - e, eta, D)
+        e += 0.0 if without_eta and (signed or not mapped) else eta
+        llr, lo, hi = max_llr(signed, N_s, D), max_llr(signed, N_s - e, D), max_llr(signed, N_s + e, D)
+        t.score[k] = score if known else 0.0
+        t.llr_lo[k] = lo if known else 0.0
+        t.llr_hi[k] = hi if known else 0.0
+        t.llr[k] = llr if known else -1.0
 
 
 @kernel
-def evaluate_hypotheses(
-    block, upper_bound_decay_factor_per_frame=0.0, non_loss_llr_bounds_include_uncertainty=False
-):
+def evaluate_hypotheses(b, decay=0.0, mapped=False):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
-    upper_bound_decay_factor_per_frame: if a loss may end, the factor by which earlier upper bounds decay;
-    else 0. non_loss_llr_bounds_include_uncertainty: see `evaluate_onset_tests`.
+    They are the largest over its onsets. decay: if a loss may end, the factor by which earlier upper bounds
+    decay; else 0. mapped: see `evaluate_tests`.
     """
-    for group_index in range(n_test_groups(block)):
-        evaluate_onset_tests(
-            block,
-            block.onset_tests[group_index],
-            n_onset_tests_in_group(block, group_index),
-            upper_bound_decay_factor_per_frame > 0.0,
-            non_loss_llr_bounds_include_uncertainty,
-        )
-    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
-        onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]
-        first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
-        max_score, best_llr, likeliest_test_index = 0.0, -1.0, -1
-        max_llr_lower_bound, max_llr_upper_bound = (
-            0.0,
-            upper_bound_decay_factor_per_frame * hypothesis.llr_upper_bound,
-        )
-        for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
-            max_score = max(max_score, onset_tests.score[k])
-            max_llr_lower_bound = max(max_llr_lower_bound, onset_tests.llr_lower_bound[k])
-            max_llr_upper_bound = max(max_llr_upper_bound, onset_tests.llr_upper_bound[k])
-            if onset_tests.llr[k] > best_llr:
-                best_llr, likeliest_test_index = onset_tests.llr[k], k
-        hypothesis.score = max_score
-        hypothesis.llr_lower_bound, hypothesis.llr_upper_bound = max_llr_lower_bound, max_llr_upper_bound
-        if likeliest_test_index >= 0:
-            N = onset_tests.correlation[likeliest_test_index]
-            D = onset_tests.information[likeliest_test_index]
-            hypothesis.theta_estimate, hypothesis.theta_information = (
-                estimate_theta_with_loss_prior(hypothesis.kind, N, D),
-                D,
-            )
+    for i in range(n_test_groups(b.n_h)):
+        evaluate_tests(b, b.tests[i], tests_in_group(b, i), decay > 0.0, mapped)
+    for h, hyp in enumerate(b.hypothesis[: b.n_h]):
+        t, first = b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS
+        k_best = first
+        hyp.score, hyp.llr_lo, hyp.llr_hi = 0.0, 0.0, decay * hyp.llr_hi
+        for k in range(first, first + N_SLOTS):
+            hyp.score = max(hyp.score, t.score[k])
+            hyp.llr_lo, hyp.llr_hi = max(hyp.llr_lo, t.llr_lo[k]), max(hyp.llr_hi, t.llr_hi[k])
+            if t.llr[k] > t.llr[k_best]:
+                k_best = k
+        if t.llr[k_best] > -1.0:
+            N, hyp.D = t.correlation[k_best], t.information[k_best]
+            hyp.th = estimate_theta(hyp.kind, N, hyp.D)
 
 
 @kernel
-def update_block(
-    block,
-    uncertainty_bound,
-    uses_regressors,
-    dt,
-    evidence_decay_factor,
-    upper_bound_decay_factor_per_frame=0.0,
-    non_loss_llr_bounds_include_uncertainty=False,
-):
-    """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
+def update_block(b, eta, with_Z, dt, decay, hi_decay=0.0, mapped=False):
+    """Update a block with one frame of the innovation nu: whiten it and test every hypothesis; dt s.
 
-    The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `uses_regressors`,
-    regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response_bounds`;
-    evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor_per_frame,
-    non_loss_llr_bounds_include_uncertainty: `evaluate_hypotheses`.
+    Noise, drift, signatures and, if with_Z, regressors are those of the frame. eta: see `bound_responses`;
+    decay: `accumulate_evidence`; hi_decay and mapped: `evaluate_hypotheses`.
     """
-    advance_covariance(block, dt)
-    if block.alarm_level > 0.0:
-        fill_uncertainty_response_bounds(block, uncertainty_bound, dt)
-    advance_whitening_filter(
-        block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
-    )
-    if block.no_gust_filter.n_axes > 0:
-        update_predictable_innovation(block, dt)
-    if block.has_coarse_gust_estimate:
-        advance_whitening_filter(
-            block, block.coarse_gust_filter_state, block.coarse_gust_response, dt, block.coarse_gust_response
-        )
-    if uses_regressors:
-        whiten_regressors(block, dt)
-    accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor)
-    evaluate_hypotheses(block, upper_bound_decay_factor_per_frame, non_loss_llr_bounds_include_uncertainty)
+    advance_covariance(b, dt)
+    if b.alarm_level > 0.0:
+        bound_responses(b, eta, dt)
+    whiten_step(b, b.state, b.nu, dt, b.g)
+    if b.calm.n > 0:
+        update_calm_part(b, dt)
+    if b.has_coarse:
+        whiten_step(b, b.x_c, b.g_c, dt, b.g_c)
+    if with_Z:
+        whiten_regressors(b, dt)
+    accumulate_evidence(b, with_Z, dt, decay)
+    evaluate_hypotheses(b, hi_decay, mapped)
 
 
 @kernel
-def estimate_theta_with_loss_prior(kind, N, D):
-    """The most likely theta; for a loss with a prior that is uniform on its set [-1, 0]."""
+def estimate_theta(kind, N, D):
+    """The most likely theta: N / D; for a loss with a prior that is uniform on its set [-1, 0]."""
     if not is_one_sided(kind):
         return N / D
-    theta = (N - 0.5 * PRIOR_LOSS_INFORMATION) / (D + PRIOR_LOSS_INFORMATION)
-    return min(max(theta, -1.0), 0.0)
+    th = (N - 0.5 * LOSS_PRIOR) / (D + LOSS_PRIOR)
+    return min(max(th, -1.0), 0.0)
 
 
 @kernel
-def set_coarse_gust_effect_of_block(block, gust_acceleration):
-    """Store gust_acceleration (3,) rad/s2, of the coarsely estimated gust, in `coarse_gust_response`.
-
-    `update_block` whitens it in place.
-    """
-    for i, axis in enumerate(block.axes[: block.n_axes]):
-        block.coarse_gust_response[i] = gust_acceleration[axis]
+def set_coarse_gust(b, acc):
+    """Store acc (3,) rad/s2, the effect of the coarse gust, in g_c, where `update_block` whitens it."""
+    for i, axis in enumerate(b.axes[: b.n]):
+        b.g_c[i] = acc[axis]

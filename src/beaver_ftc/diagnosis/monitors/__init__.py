@@ -4,7 +4,7 @@ The monitor of the engines is in this file. Engines under one lever that thrust 
 moments of engines that are effectors are signals, which the innovation does not contain. They are compared
 with the thrust. With all levers alike, a healthy aircraft has
 
-    |Cn - a CT| <= bound + MAX_CENTRE_OF_MASS_OFFSET_M / b |CT|,    a = -sum share right / b
+    |Cn - a CT| <= bound + MAX_OFFSET_M / b |CT|,    a = -sum share right / b
 
 CT, Cn: coefficients of thrust and of its yawing moment; b m: span; right m: place of an engine. bound:
 measured where the terms were derived, box by box of the map of the model's error (propellers yaw aslant); the
@@ -22,34 +22,24 @@ from beaver_ftc.design.model import DPT
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING, N_TESTS_WITH_EQUATION, RPM_TEST
+    from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING, N_EQUATIONS, RPM_TEST
 else:
     __getattr__, __dir__ = lazily(__name__)
 
 
-THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME = "thrust", "engines_n"  # signals: CT and Cn
-MAX_CENTRE_OF_MASS_OFFSET_M = 0.05
+THRUST_SIGNAL, YAW_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
+MAX_OFFSET_M = 0.05
 
-# n_engines: engines, 0 where they are not monitored. thrust_index, yawing_moment_index: places of the signals
-# in y. healthy_yawing_moment_per_thrust: a. yawing_moment_tolerance_per_thrust: of the bound, per CT.
-ENGINE_MONITOR_CONFIG_RECORD = record(
-    n_engines=int,
-    thrust_index=int,
-    yawing_moment_index=int,
-    healthy_yawing_moment_per_thrust=float,
-    yawing_moment_tolerance_per_thrust=float,
-)
+# n_engines: engines, 0 where they are not monitored. i_T, i_n: places of CT and Cn in y. yaw_per_thrust: a.
+# slack: MAX_OFFSET_M / b.
+BALANCE_CONFIG = record(n_engines=int, i_T=int, i_n=int, yaw_per_thrust=float, slack=float)
 # A law has moved an engine apart: the levers are no longer alike.
-ENGINE_MONITOR_MEMORY_RECORD = record(disabled_by_differential_thrust=int)
-ENGINE_MONITOR_OUTPUT_RECORD = record(engine_failed=int)  # an engine has failed
-ENGINE_MONITOR_RECORD = record(
-    config=ENGINE_MONITOR_CONFIG_RECORD,
-    memory=ENGINE_MONITOR_MEMORY_RECORD,
-    output=ENGINE_MONITOR_OUTPUT_RECORD,
-)
+BALANCE_MEMORY = record(levers_apart=int)
+BALANCE_OUTPUT = record(engine_failed=int)  # an engine has failed
+ENGINE_MONITOR_RECORD = record(config=BALANCE_CONFIG, memory=BALANCE_MEMORY, output=BALANCE_OUTPUT)
 
 
-def healthy_yawing_moment_per_thrust(aircraft: Aircraft) -> float:
+def yaw_per_thrust(aircraft: Aircraft) -> float:
     """a: the yawing moment of the thrust with all levers alike, per CT."""
     return (
         -sum(effector.share * effector.right_m for effector in aircraft.effectors.values())
@@ -57,43 +47,31 @@ def healthy_yawing_moment_per_thrust(aircraft: Aircraft) -> float:
     )
 
 
-def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
+def configure_balance(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
-    model_error_map, aircraft_signal_names = aircraft.file.model_error_map, list(aircraft.signals)
-    if (
-        model_error_map is None
-        or not model_error_map.knows_engines
-        or not {THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME} <= set(aircraft_signal_names)
-    ):
+    error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return
-    config["n_engines"], config["healthy_yawing_moment_per_thrust"] = (
-        len(aircraft.effectors),
-        healthy_yawing_moment_per_thrust(aircraft),
-    )
-    config["thrust_index"], config["yawing_moment_index"] = (
-        DPT + aircraft_signal_names.index(signal_name)
-        for signal_name in (THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME)
-    )
-    config["yawing_moment_tolerance_per_thrust"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
+    config["n_engines"], config["yaw_per_thrust"] = (len(aircraft.effectors), yaw_per_thrust(aircraft))
+    config["i_T"], config["i_n"] = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))
+    config["slack"] = MAX_OFFSET_M / aircraft.geometry.span_m
 
 
 @kernel
-def disable_if_differential_thrust(engine_monitor, lever_offsets):
-    """Disable the monitor once a law has moved an engine apart; lever_offsets (n and more,): of each, in
-    addition to the common one."""
-    for engine_index in range(engine_monitor.config.n_engines):
-        engine_monitor.memory.disabled_by_differential_thrust |= lever_offsets[engine_index] != 0.0
+def disable_if_apart(mon, levers):
+    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in addition to
+    the common one.
+    """
+    for i in range(mon.config.n_engines):
+        mon.memory.levers_apart |= levers[i] != 0.0
 
 
 @kernel
-def detect_engine_failure(engine_monitor, engine_asymmetry_bound, y):
-    """Whether an engine has failed, by these signals y or before; engine_asymmetry_bound: on |Cn - a CT|
-    here."""
-    config = engine_monitor.config
-    if config.n_engines > 0 and not engine_monitor.memory.disabled_by_differential_thrust:
-        thrust_coefficient = y[config.thrust_index]
-        if abs(
-            y[config.yawing_moment_index] - config.healthy_yawing_moment_per_thrust * thrust_coefficient
-        ) > engine_asymmetry_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust_coefficient):
-            engine_monitor.output.engine_failed = 1
-    return engine_monitor.output.engine_failed == 1
+def detect_engine_failure(mon, asymmetry, y):
+    """Whether an engine has failed, by these signals y or before; asymmetry: bound on |Cn - a CT| here."""
+    c = mon.config
+    if c.n_engines > 0 and not mon.memory.levers_apart:
+        CT = y[c.i_T]
+        if abs(y[c.i_n] - c.yaw_per_thrust * CT) > asymmetry + c.slack * abs(CT):
+            mon.output.engine_failed = 1
+    return mon.output.engine_failed == 1

@@ -8,32 +8,31 @@ The error x of the sensor is counted as
     alpha, beta, phi, theta    x = 2 sin((reading - truth) / 2): by so much the angle turns a unit vector
     airspeed                   x = reading / truth - 1
 
-The record of the hypotheses (INITIAL_ERRORS_RECORD) holds for each hypothesis, with h the time between two
-samples, s; test t; and filter pole m
+Of each hypothesis h the record holds, for test j and filter pole m,
 
-    max_effect_per_unit_error           W_t: bound on |effect on residual t in one sample| / |x|
-    filtered_max_effect_per_unit_error  W_tm: the same through the filter, W_tm <- decay_m W_tm + W_t
-    error_bound                     b: bound on |x|. At the first sample it is as large as an aircraft can fly
-                                    (error_bound_at_start). Then, at each sample,
-                                      b <- min(b + (1 - decay_slow) d, error_bound_at_start)
-                                    and for each test, or pair of tests, that couples with the error
-                                      b <- min(b, (r + B + 2 d W_tm)
-                                                  / (MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY C))
-    error_change_bound              d: bound on the change of x within the memory of the slowest filter,
-                                    d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
-                                    of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
+    H    bound on |effect on residual j in one sample| / |x|
+    H_m  the same through the filter, H_m <- a_m H_m + H
+    C    lower bound, with sign, on the effect of a unit of x in one sample; C_m the same through the filter
+    e    bound on |x|. At the first sample it is as large as an aircraft can fly (e_start). Then, at each
+         sample,
+             e <- min(e + (1 - a_slow) d, e_start)
+         and for each test, or pair of tests, that couples with the error
+             e <- min(e, (r + B + 2 d H_m) / (EFFECT_LEFT C_m))
+    d    bound on the change of x within the memory of the slowest filter,
+             d = min(r + B + e H_m, e_start)
+         of the test that a change of x moves at once; for the airspeed r + B + e H_m times (1 + e) / V
 
-r: |filtered residual|; B: bound on it for sound sensors; C: filtered signed effect, a lower bound on the
-effect of a unit of x. Of several tests r + B + 2 d W_tm is the root of the sum of squares. For the airspeed
-it counts 1 + b times in the tests of flow; in that of the density 2 (1 + b) / V times r + B of SPEED is added
-to it. A test refutes a hypothesis with
+r: |filtered residual|; B: bound on it for sound sensors; a_m: decay of the filter per sample; h also the time
+between two samples, s, in the formulas of the effects. Of several tests r + B + 2 d H_m is the root of the
+sum of squares. For the airspeed it counts 1 + e times in the tests of flow; in that of the density
+2 (1 + e) / V times r + B of SPEED is added to it. A test refutes a hypothesis with
 
-    r > B + (b + d) W_tm
-    r > (1 + b + d) B + (b + d) W_tm     for the airspeed, in SPEED and the tests after it
+    r > B + (e + d) H_m
+    r > (1 + e + d) B + (e + d) H_m     for the airspeed, in SPEED and the tests after it
 
 since a residual is the sum of the effect of sound sensors, at most B, and of the effect of the error. So an
 error from the start, of any size, never excludes the broken sensor. Where sensor_monitor.py excludes a sensor
-by the effect that its error would have from now on, the limit is B + b W_tm with b as of the alarm.
+by the effect that its error would have from now on, the limit is B + e_alarm H_m, e as of the alarm.
 
 What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
 in body axes; p, q, r rad/s):
@@ -54,646 +53,434 @@ in body axes; p, q, r rad/s):
 
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
+
+red: record of the tests (redundancy.py, which says y and y_past); ini: record of the hypotheses.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
-    AIRSPEED_DIVISOR_FLOOR_MPS,
-    AIRSPEED_HYPOTHESIS,
     ALPHA,
-    ALPHA_FLOW_TEST,
-    ALPHA_HYPOTHESIS,
+    ALPHA_TEST,
+    ANGLE_TEST,
     BETA,
-    BETA_FLOW_TEST,
-    BETA_HYPOTHESIS,
+    BETA_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
-    DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA,
-    FIRST_ANGLE_TEST,
-    FIRST_TURN_TEST,
-    MAX_PITCH_RAD,
-    N_INITIAL_ERROR_HYPOTHESES,
-    PHI_HYPOTHESIS,
+    H_AIRSPEED,
+    H_ALPHA,
+    H_BETA,
+    H_PHI,
+    H_THETA,
+    MIN_AIRSPEED_MPS,
+    MIN_QDYN_PA,
+    N_EFFECTS,
+    N_INITIAL,
     QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
-    THETA_HYPOTHESIS,
-    pitch_is_too_steep,
+    TURN_TEST,
+    down,
+    secant,
+    too_steep,
+    vector_length,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
 MAX_FLOW_ANGLE_RAD = 0.7  # an aircraft whose attitude and flow are tested flies at less, to either side
-MAX_AIRSPEED_READING_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
-MAX_CHORD_OF_ATTITUDE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
-MAX_DENSITY_DEVIATION_SHARE = (
-    0.25  # of the density from the standard atmosphere at a height, as a share of it
-)
-MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL = (
-    0.05  # temperature over that at sea level, below which none is extrapolated
-)
+MAX_SPEED_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
+MAX_CHORD = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
+DENSITY_SHARE = 0.25  # of the density from the standard atmosphere at a height, as a share of it
+MIN_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
-MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY = 0.8
-SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
+EFFECT_LEFT = 0.8
+SLOW_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
-# per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
+# Places in C. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
 # reading that is off comes first; VANE: of alpha and of beta.
 (
-    PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX,  # h q
-    PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX,  # h r
-    PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX,  # h g cos(theta) cos(phi)
-    PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX,  # h g cos(theta) sin(phi)
-    THETA_ERROR_EFFECT_BY_GRAVITY_INDEX,  # h g cos(largest mean of reading and truth)
+    PHI_Q,  # h q
+    PHI_R,  # h r
+    PHI_DOWN,  # h g cos(theta) cos(phi)
+    PHI_SIDE,  # h g cos(theta) sin(phi)
+    THETA_G,  # h g cos(largest mean of reading and truth)
     # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
-    ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX,
-    VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX,  # h (p cos(alpha) + r sin(alpha))
-    VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX,  # h (p sin(alpha) - r cos(alpha))
+    ALPHA_CLIMB,
+    VANE_ROLL,  # h (p cos(alpha) + r sin(alpha))
+    VANE_YAW,  # h (p sin(alpha) - r cos(alpha))
     # of the effect of alpha on BETA_FLOW, of beta on ALPHA_FLOW: bound on the part of the force
-    ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
-    BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
-    AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+    ALPHA_FORCE,
+    BETA_FORCE,
+    SPEED_ALPHA,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
     # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
-    AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX,
-    AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX,  # 2 (log V - log V before)
-    THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
+    SPEED_BETA,
+    SPEED_DENSITY,  # 2 (log V - log V before)
+    THETA_TURN,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
 ) = range(14)
 
 
 @kernel
-def angle_of_chord(chord):
-    """The angle, rad, whose 2 sin(angle / 2) is `chord`; half a turn for a longer one than 2."""
-    return 2.0 * np.arcsin(min(0.5 * chord, 1.0))
+def angle_of_chord(x):
+    """The angle, rad, with 2 sin(angle / 2) = x; half a turn for x > 2."""
+    return 2.0 * np.arcsin(min(0.5 * x, 1.0))
 
 
 @kernel
-def chord_of_angle(angle_rad):
+def chord_of_angle(angle):
     """2 sin(|angle| / 2) of an angle, rad; of more than half a turn as of half a turn."""
-    return 2.0 * np.sin(0.5 * min(abs(angle_rad), np.pi))
+    return 2.0 * np.sin(0.5 * min(abs(angle), np.pi))
 
 
 @kernel
-def standard_air_density(altitude_m):
-    """Return the density of the standard troposphere, kg/m3, at altitude_m."""
-    temperature_ratio = max(1.0 - 2.25577e-5 * altitude_m, MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL)
-    return 1.225 * temperature_ratio**4.2559
+def standard_density(h):
+    """Density of the standard troposphere, kg/m3, at the height h m."""
+    T = max(1.0 - 2.25577e-5 * h, MIN_TEMPERATURE_RATIO)
+    return 1.225 * T**4.2559
 
 
 @kernel
-def set_error_bounds_at_start(initial_errors, readings):
-    """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
-    error_bound_at_start = initial_errors.error_bound_at_start
-    error_bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
-    error_bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
-    V = max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
-    airspeed_in_standard_atmosphere = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
-        2.0
-        * max(readings[QDYN], DYNAMIC_PRESSURE_DIVISOR_FLOOR_PA)
-        / standard_air_density(readings[ALTITUDE])
-    )
-    (
-        max_reading_over_truth,
-        min_reading_over_truth,
-    ) = (  # of reading and truth, in the thickest and in the thinnest air
-        V / airspeed_in_standard_atmosphere * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
-        V / airspeed_in_standard_atmosphere * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
-    )
-    error_bound_at_start[AIRSPEED_HYPOTHESIS] = min(
-        max(max_reading_over_truth - 1.0, 1.0 - min_reading_over_truth), MAX_AIRSPEED_READING_RATIO - 1.0
-    )
-    error_bound_at_start[PHI_HYPOTHESIS] = error_bound_at_start[THETA_HYPOTHESIS] = (
-        MAX_CHORD_OF_ATTITUDE_ERROR
-    )
-    initial_errors.error_bound[:] = error_bound_at_start
+def start_bounds(ini, y):
+    """e_start: bound each error at the first sample: an aircraft can fly at the truth.
 
-
-@kernel
-def index_of_test_showing_error_change(hypothesis_index):
-    """The test whose residual is, at once, the change of the error of a hypothesis."""
-    return (ALPHA_FLOW_TEST, BETA_FLOW_TEST, SPEED_TEST, FIRST_ANGLE_TEST, FIRST_ANGLE_TEST + 1)[
-        hypothesis_index
-    ]
-
-
-@kernel
-def update_recent_change_and_widen_bounds(redundancy, initial_errors):
-    """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
-    part of it that this filter forgets in a sample."""
-    share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay_by_pole[SLOWEST_POLE_INDEX]
-    for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        test_index = index_of_test_showing_error_change(i)
-        error_bound_at_start = initial_errors.error_bound_at_start[i]
-        recent_change_bound = (
-            max_error_effect_allowed_by_residual(redundancy, test_index, SLOWEST_POLE_INDEX)
-            + initial_errors.error_bound[i]
-            * initial_errors.filtered_max_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
-        )
-        if i == AIRSPEED_HYPOTHESIS:  # from m/s to a share of the truth, which is at least V / (1 + b)
-            recent_change_bound *= (1.0 + initial_errors.error_bound[i]) / max(
-                redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS
-            )
-        initial_errors.error_change_bound[i] = min(recent_change_bound, error_bound_at_start)
-        widened_bound = (
-            initial_errors.error_bound[i] + share_forgotten_per_sample * initial_errors.error_change_bound[i]
-        )
-        initial_errors.error_bound[i] = min(widened_bound, error_bound_at_start)
-
-
-@kernel
-def fill_effects_per_unit_error(redundancy, initial_errors, readings):
-    """Fill `max_effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
-    `signed_effect_per_unit_error` (N_SIGNED_INITIAL_ERROR_EFFECTS,).
-
-    Both are taken at the sample before, from which this sample, readings (N_SENSORS,), is predicted.
+    V_air: airspeed by dynamic pressure and height in the standard atmosphere, m/s; most, least: reading over
+    truth in the thickest and in the thinnest air.
     """
-    previous_reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
-    p, q, r = previous_reading[0], previous_reading[1], previous_reading[2]
-    V = max(previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
-    previous_phi = previous_reading[PHI]
-    previous_theta = previous_reading[THETA]
-    max_effect_per_unit = initial_errors.max_effect_per_unit_error
-    signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
-    max_effect_per_unit[:] = 0.0
+    e = ini.e_start
+    e[H_ALPHA] = chord_of_angle(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD)
+    e[H_BETA] = chord_of_angle(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD)
+    V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / standard_density(y[ALTITUDE]))
+    ratio = max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V_air
+    most, least = ratio * np.sqrt(1.0 + DENSITY_SHARE), ratio * np.sqrt(1.0 - DENSITY_SHARE)
+    e[H_AIRSPEED] = min(max(most - 1.0, 1.0 - least), MAX_SPEED_RATIO - 1.0)
+    e[H_PHI] = e[H_THETA] = MAX_CHORD
+    ini.e[:] = e
+
+
+@kernel
+def change_test(h):
+    """The test whose residual is, at once, the change of the error of a hypothesis."""
+    return (ALPHA_TEST, BETA_TEST, SPEED_TEST, ANGLE_TEST, ANGLE_TEST + 1)[h]
+
+
+@kernel
+def widen_bounds(red, ini):
+    """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
+    lost = 1.0 - red.config.decay[SLOW_POLE]
+    for i in range(N_INITIAL):
+        j = change_test(i)
+        d = allowed_effect(red, j, SLOW_POLE) + ini.e[i] * ini.H_m[i, j, SLOW_POLE]
+        if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
+            d *= (1.0 + ini.e[i]) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+        ini.d[i] = min(d, ini.e_start[i])
+        ini.e[i] = min(ini.e[i] + lost * ini.d[i], ini.e_start[i])
+
+
+@kernel
+def fill_effects(red, ini, y):
+    """Fill H (N_INITIAL, RPM_TEST) and C (N_EFFECTS,), taken at the sample before, from which y is
+    predicted.
+    """
+    y_past, h, H, C = red.memory.y_past, red.config.sample_time_s, ini.H, ini.C
+    p, q, r = y_past[0], y_past[1], y_past[2]
+    V = max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    theta_secant = 1.0 / np.cos(min(abs(previous_theta), MAX_PITCH_RAD))
-    max_theta_secant = 1.0 / np.cos(
-        min(abs(previous_theta) + angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]), MAX_PITCH_RAD)
-    )
-    second_order_turn_rad2 = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
+    sec = secant(y_past[THETA])
+    sec_max = secant(abs(y_past[THETA]) + angle_of_chord(ini.e[H_THETA]))
+    second = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
-    pitch_yaw_turn = h * np.hypot(q, r)
-    max_heading_turn = h * abs(q * np.sin(previous_phi) + r * np.cos(previous_phi)) * max_theta_secant
+    C[PHI_Q] = h * q
+    C[PHI_R] = h * r
+    C[THETA_TURN] = h * (q * np.sin(y_past[PHI]) + r * np.cos(y_past[PHI]))
+    qr = h * np.hypot(q, r)
+    heading = abs(C[THETA_TURN]) * sec_max
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
-        max_effect_per_unit[PHI_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + (
-            pitch_yaw_turn if i > 0 else 0.0
-        )
-        max_effect_per_unit[THETA_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
+        H[H_PHI, TURN_TEST + i] = second + (qr if i > 0 else 0.0)
+        H[H_THETA, TURN_TEST + i] = second + heading
         # Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by e:
         # phi' = p + m tan(theta), psi' = m / cos(theta), with m = q sin(phi) + r cos(phi). The tangents, or
         # secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
         # theta' = q cos(phi) - r sin(phi) there is no theta.
-        max_effect_per_unit[PHI_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
-            pitch_yaw_turn + theta_secant * second_order_turn_rad2
-        )
-        max_effect_per_unit[THETA_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
-            (max_heading_turn if i != 1 else 0.0) + max_theta_secant * second_order_turn_rad2
-        )
-    (
-        signed_effect_per_unit[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
-        signed_effect_per_unit[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
-        signed_effect_per_unit[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX],
-    ) = (
-        h * q,
-        h * r,
-        h * (q * np.sin(previous_phi) + r * np.cos(previous_phi)),
-    )
-    fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r)
+        H[H_PHI, ANGLE_TEST + i] = sec * (qr + sec * second)
+        H[H_THETA, ANGLE_TEST + i] = sec * ((heading if i != 1 else 0.0) + sec_max * second)
+    fill_flow_effects(red, ini, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
-    log_airspeed_change = np.log(max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS) / V)
-    max_effect_per_unit[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
-    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX] = 2.0 * log_airspeed_change
+    C[SPEED_DENSITY] = 2.0 * np.log(max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    H[H_AIRSPEED, DENSITY_TEST] = abs(C[SPEED_DENSITY])
 
 
 @kernel
-def fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r):
-    """Fill `max_effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and
-    climb, and by gravity.
+def fill_flow_effects(red, ini, V, p, q, r):
+    """Fill H and C for the tests of speed, flow and climb, and by gravity.
 
-    V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
-    for the second order in h. x: the error of the row's hypothesis.
+    V m/s; p, q, r rad/s: of the sample before. h2: h times 1 + h (|a| / V + |p| + |q| + |r|), the second
+    order in h. sa, ca, sb, cb, ct: sines and cosines of alpha, beta, theta; d0, d1, d2: the vertical. x: the
+    error of the row's hypothesis.
     """
-    memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
-    previous_reading, a = memory.previous_reading, memory.body_acceleration
-    max_effect_per_unit = initial_errors.max_effect_per_unit_error
-    signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
-    sin_alpha, cos_alpha = np.sin(previous_reading[ALPHA]), np.cos(previous_reading[ALPHA])
-    sin_beta, cos_beta = np.sin(previous_reading[BETA]), np.cos(previous_reading[BETA])
-    sin_phi, cos_phi = np.sin(previous_reading[PHI]), np.cos(previous_reading[PHI])
-    sin_theta, cos_theta = np.sin(previous_reading[THETA]), np.cos(previous_reading[THETA])
-    # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    sideslip_magnitude = abs(previous_reading[BETA])
-    max_sideslip = abs(previous_reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
-    beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
-    max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    M, h, g, H, C = red.memory, red.config.sample_time_s, red.config.g, ini.H, ini.C
+    y, a = M.y_past, M.a
+    sa, ca = np.sin(y[ALPHA]), np.cos(y[ALPHA])
+    sb, cb = np.sin(y[BETA]), np.cos(y[BETA])
+    ct, (d0, d1, d2) = np.cos(y[THETA]), down(y)
+    # the largest |beta| if beta is off; 1 / cos of it by its reading, and the largest one
+    beta_max = abs(y[BETA]) + angle_of_chord(ini.e[H_BETA])
+    sec, sec_max = secant(y[BETA]), secant(beta_max)
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
-    a_normal = a[2] * cos_alpha - a[0] * sin_alpha
-    a_side = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
-    a_max = max(
-        memory.acceleration_magnitude,
-        np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2),
-    )
+    a_normal = a[2] * ca - a[0] * sa
+    a_side = a[1] * cb - (a[0] * ca + a[2] * sa) * sb
+    a_max = max(M.a_size[0], vector_length(a))
     # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
-    flow_roll_rate, negative_flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
-    widened_step_s = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
-    roll_yaw_rate = np.hypot(p, r)
-    predicted_climb_m = memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE]
-    # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    max_effect_per_unit[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect_per_unit[BETA_HYPOTHESIS, SPEED_TEST] = (
-        widened_step_s * a_max
+    roll, yaw = p * ca + r * sa, p * sa - r * ca
+    h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
+    pr, n = np.hypot(p, r), a_max / V  # rad/s
+    climb = M.predicted_reading[ALTITUDE] - y[ALTITUDE]
+    vert, across = np.hypot(d0, d2), np.hypot(sb, sa * cb)
+    # By row: SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB.
+    # alpha off: V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
+    # (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and sin(beta)
+    # (a_x, a_z) / V; in altitude' (cos(alpha), sin(alpha)), times V cos(beta), along (sin(theta), -cos(phi)
+    # cos(theta))
+    H[H_ALPHA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * (n + pr * abs(sb)),
+        h2 * (pr + n * abs(sb)),
+        0.0,
+        h * V * cb * vert,
     )
-    # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    max_effect_per_unit[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        widened_step_s * beta_secant * (a_max / V + roll_yaw_rate * abs(sin_beta))
+    # beta off: V' likewise; in alpha' tangents, and secants, of reading and truth differ by x over both
+    # cosines; in beta' a is turned by beta; in altitude' (cos(beta), -sin(beta)), times V
+    H[H_BETA, SPEED_TEST:] = (
+        h2 * a_max,
+        h2 * sec * sec_max * (abs(roll) + n),
+        h2 * n,
+        0.0,
+        h * V * np.hypot(ca * d0 + sa * d2, d1),
     )
-    # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    max_effect_per_unit[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
-        roll_yaw_rate + a_max * abs(sin_beta) / V
+    # V off: in alpha', beta' a / truth = (1 + x) a / reading; the true climb is the predicted one over 1 + x,
+    # which differ by x / (1 + x) of the latter
+    H[H_AIRSPEED, SPEED_TEST:] = (
+        0.0,
+        h2 * sec * n,
+        h2 * sec * n,
+        0.0,
+        abs(climb) / (1.0 - min(ini.e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)),
     )
-    # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    max_effect_per_unit[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + a_max / V)
-    )
-    # beta' with beta off: a turned by beta
-    max_effect_per_unit[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * a_max / V
-    # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    max_effect_per_unit[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
-        AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST
-    ] = widened_step_s * beta_secant * a_max / V
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
-    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    max_effect_per_unit[PHI_HYPOTHESIS, SPEED_TEST] = (
-        widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it. The
+    # vertical's part cos(theta) is turned, against the part of v across the first axis
+    H[H_PHI, SPEED_TEST:] = (
+        h2 * g * ct * across,
+        h2 * g * ct * sec / V,
+        h2 * g * ct * sec / V,
+        0.0,
+        h * V * ct * across,
     )
-    max_effect_per_unit[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
-        PHI_HYPOTHESIS, BETA_FLOW_TEST
-    ] = widened_step_s * g * cos_theta * beta_secant / V
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
-    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    max_effect_per_unit[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
-    max_effect_per_unit[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
-    max_effect_per_unit[THETA_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest. The
+    # vertical is turned, against v
+    H[H_THETA, SPEED_TEST:] = (
+        h2 * g,
+        h2 * sec * g / V,
+        h2 * g * (abs(np.sin(y[PHI])) + abs(sb)) / V,
+        0.0,
+        h * V,
     )
-    # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
-    # (sin(theta), -cos(phi) cos(theta))
-    vertical_length_in_symmetry_plane = np.hypot(sin_theta, cos_phi * cos_theta)
-    max_effect_per_unit[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_length_in_symmetry_plane
-    # with beta off: (cos(beta), -sin(beta)) turned, times V
-    max_effect_per_unit[BETA_HYPOTHESIS, CLIMB_TEST] = (
-        h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
-    )
-    # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    max_effect_per_unit[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
-        1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
-    )
-    # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    max_effect_per_unit[PHI_HYPOTHESIS, CLIMB_TEST] = (
-        h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
-    )
-    # with theta off: the vertical is turned, against v
-    max_effect_per_unit[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Signed effects. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi),
     # cos(phi)) is turned by the error
-    signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX] = h * g * cos_theta * cos_phi
-    signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX] = h * g * cos_theta * sin_phi
+    C[PHI_DOWN] = h * g * d2
+    C[PHI_SIDE] = h * g * d1
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
-    pitch_magnitude = abs(previous_reading[THETA])
-    signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX] = (
-        h
-        * g
-        * np.cos(
-            min(
-                pitch_magnitude + 0.5 * angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]),
-                0.5 * pitch_magnitude + 0.25 * np.pi,
-            )
-        )
-    )
-    # alpha: altitude' = V cos(beta) vertical_length_in_symmetry_plane sin(gamma - alpha) + ..., where
+    pitch = abs(y[THETA])
+    mean = min(pitch + 0.5 * angle_of_chord(ini.e[H_THETA]), 0.5 * pitch + 0.25 * np.pi)
+    C[THETA_G] = h * g * np.cos(mean)
+    # alpha: altitude' = V cos(beta) vert sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
-    max_path_angle_midway_to_truth = abs(
-        np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]
-    ) + (0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS]))
-    signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX] = (
-        h
-        * V
-        * cos_beta
-        * vertical_length_in_symmetry_plane
-        * np.cos(min(max_path_angle_midway_to_truth, 0.5 * np.pi))
-    )
-    # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + negative_flow_yaw_rate sin(e / 2)). beta
-    # off by e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of
+    path = abs(np.arctan2(-d0, d2) - y[ALPHA]) + (0.5 * angle_of_chord(ini.e[H_ALPHA]))
+    C[ALPHA_CLIMB] = h * V * cb * vert * np.cos(min(path, 0.5 * np.pi))
+    # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta
+    # off by e: alpha' changes by x cos(e / 2) roll over both cosines. The part of the force, of
     # either sign, is an uncertainty of both
-    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX] = h * flow_roll_rate
-    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX] = h * negative_flow_yaw_rate
-    signed_effect_per_unit[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = h * abs(sin_beta) * a_max / V
-    signed_effect_per_unit[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = (
-        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * beta_secant * max_beta_secant * abs(a_normal) / V
-    )
+    C[VANE_ROLL] = h * roll
+    C[VANE_YAW] = h * yaw
+    C[ALPHA_FORCE] = h * abs(sb) * n
+    C[BETA_FORCE] = h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(a_normal) / V
     # V: a across the flow, over the airspeed
-    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX] = h * a_normal * beta_secant / V
-    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX] = h * a_side / V
+    C[SPEED_ALPHA] = h * a_normal * sec / V
+    C[SPEED_BETA] = h * a_side / V
 
 
 @kernel
-def update_filtered_effects_per_unit_error(redundancy, initial_errors):
-    """Pass effects per unit error, largest and signed, through the filters of the tests."""
-    filter_decay_by_pole = redundancy.config.filter_decay_by_pole
-    for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        for test_index in range(RPM_TEST):
-            for m in range(filter_decay_by_pole.size):
-                initial_errors.filtered_max_effect_per_unit_error[i, test_index, m] = (
-                    filter_decay_by_pole[m]
-                    * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
-                    + initial_errors.max_effect_per_unit_error[i, test_index]
-                )
-    for signed_effect_index in range(initial_errors.signed_effect_per_unit_error.size):
-        for m in range(filter_decay_by_pole.size):
-            initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m] = (
-                filter_decay_by_pole[m]
-                * initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m]
-                + initial_errors.signed_effect_per_unit_error[signed_effect_index]
-            )
+def filter_effects(red, ini):
+    """H_m <- a_m H_m + H, and C_m <- a_m C_m + C."""
+    a = red.config.decay
+    for i in range(N_INITIAL):
+        for j in range(RPM_TEST):
+            leak(ini.H_m[i, j], a, ini.H[i, j])
+    for n in range(N_EFFECTS):
+        leak(ini.C_m[n], a, ini.C[n])
 
 
 @kernel
-def max_error_effect_allowed_by_residual(redundancy, test_index, pole_index):
-    """Bound the effect of any error on a test through a filter: r + B, in the unit of the residual."""
-    test = redundancy.test[test_index]
-    return abs(test.filtered_residual[pole_index]) + test.filtered_bound[pole_index]
+def allowed_effect(red, j, m):
+    """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
+    test = red.test[j]
+    return abs(test.r[m]) + test.B[m]
 
 
 @kernel
-def max_error_effect_if_constant(redundancy, initial_errors, hypothesis_index, test_index, pole_index):
-    """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
-    through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
-    return (
-        max_error_effect_allowed_by_residual(redundancy, test_index, pole_index)
-        + 2.0
-        * initial_errors.error_change_bound[hypothesis_index]
-        * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, pole_index]
-    )
+def constant_effect(red, ini, h, j, m):
+    """r + B + 2 d H_m: bound on the effect of the present error of hypothesis h, had it been constant, on a
+    test through a filter. The error was up to d larger or smaller while the filter summed it.
+    """
+    return allowed_effect(red, j, m) + 2.0 * ini.d[h] * ini.H_m[h, j, m]
 
 
 @kernel
-def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect_per_unit_error):
-    """Lower the bound on an error whose effect is at most max_effect, and at least min_effect_per_unit_error
-    a unit."""
-    if min_effect_per_unit_error > 0.0:
-        initial_errors.error_bound[hypothesis_index] = min(
-            initial_errors.error_bound[hypothesis_index],
-            max_effect / (MIN_EFFECT_SHARE_WITHIN_FILTER_MEMORY * min_effect_per_unit_error),
-        )
+def tighten(ini, h, most, c):
+    """Lower e of hypothesis h, whose effect is at most `most`, and at least c a unit: e <- most / (0.8 c)."""
+    if c > 0.0:
+        ini.e[h] = min(ini.e[h], most / (EFFECT_LEFT * c))
 
 
 @kernel
-def max_error_effect_on_velocity_mps(redundancy, initial_errors, hypothesis_index, pole_index):
-    """The bound of `max_error_effect_if_constant` on the velocity, m/s, in any direction."""
-    V = max(redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
-    max_flow_angle_effect = np.hypot(
-        max_error_effect_if_constant(
-            redundancy, initial_errors, hypothesis_index, ALPHA_FLOW_TEST, pole_index
-        ),
-        max_error_effect_if_constant(
-            redundancy, initial_errors, hypothesis_index, BETA_FLOW_TEST, pole_index
-        ),
-    )
+def velocity_effect(red, ini, h, m):
+    """The bound of `constant_effect` on the velocity, m/s, in any direction."""
+    V = max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+    angle = np.hypot(constant_effect(red, ini, h, ALPHA_TEST, m), constant_effect(red, ini, h, BETA_TEST, m))
+    return np.hypot(constant_effect(red, ini, h, SPEED_TEST, m), V * angle)
+
+
+@kernel
+def turn_effect(red, ini, h, m):
+    """The bound of `constant_effect` on the rotation about the body's second and third axes, rad."""
     return np.hypot(
-        max_error_effect_if_constant(redundancy, initial_errors, hypothesis_index, SPEED_TEST, pole_index),
-        V * max_flow_angle_effect,
+        constant_effect(red, ini, h, TURN_TEST + 1, m), constant_effect(red, ini, h, TURN_TEST + 2, m)
     )
 
 
 @kernel
-def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_index, pole_index):
-    """The bound of `max_error_effect_if_constant` on the rotation about the body's second and third axes,
-    rad."""
-    return np.hypot(
-        max_error_effect_if_constant(
-            redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 1, pole_index
-        ),
-        max_error_effect_if_constant(
-            redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 2, pole_index
-        ),
-    )
-
-
-@kernel
-def tighten_all_error_bounds(redundancy, initial_errors):
+def tighten_all(red, ini):
     """Lower the bound on each error to what the tests allow, filter by filter."""
-    for m in range(redundancy.config.filter_decay_by_pole.size):
-        filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, m]
-        tighten_error_bound(
-            initial_errors,
-            PHI_HYPOTHESIS,
-            max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(
-                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
-                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
-            ),
-        )
-        tighten_error_bound(
-            initial_errors,
-            PHI_HYPOTHESIS,
-            max_error_effect_on_velocity_mps(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(
-                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX],
-                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX],
-            ),
-        )
-        tighten_error_bound(
-            initial_errors,
-            THETA_HYPOTHESIS,
-            max_error_effect_on_velocity_mps(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            filtered_signed_effects_at_pole[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX],
-        )
-        max_rotation_effect = np.hypot(
-            max_error_effect_if_constant(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
-            max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-        )
-        tighten_error_bound(
-            initial_errors,
-            THETA_HYPOTHESIS,
-            max_rotation_effect,
-            abs(filtered_signed_effects_at_pole[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX]),
-        )
-        tighten_vane_error_bounds(redundancy, initial_errors, m)
-        tighten_airspeed_error_bound(redundancy, initial_errors, m)
+    for m in range(red.config.decay.size):
+        C = ini.C_m[:, m]
+        tighten(ini, H_PHI, turn_effect(red, ini, H_PHI, m), np.hypot(C[PHI_Q], C[PHI_R]))
+        tighten(ini, H_PHI, velocity_effect(red, ini, H_PHI, m), np.hypot(C[PHI_DOWN], C[PHI_SIDE]))
+        tighten(ini, H_THETA, velocity_effect(red, ini, H_THETA, m), C[THETA_G])
+        turn = np.hypot(constant_effect(red, ini, H_THETA, TURN_TEST, m), turn_effect(red, ini, H_THETA, m))
+        tighten(ini, H_THETA, turn, abs(C[THETA_TURN]))
+        tighten_vanes(red, ini, m)
+        tighten_airspeed(red, ini, m)
 
 
 @kernel
-def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
+def tighten_vanes(red, ini, m):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
-    max_half_alpha_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
-    min_effect_per_unit_error = (
-        np.cos(max_half_alpha_error)
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX])
-        - np.sin(max_half_alpha_error)
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX])
-        - filtered_signed_effects_at_pole[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
-    )
-    tighten_error_bound(
-        initial_errors,
-        ALPHA_HYPOTHESIS,
-        max_error_effect_if_constant(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        filtered_signed_effects_at_pole[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX],
-    )
-    tighten_error_bound(
-        initial_errors,
-        ALPHA_HYPOTHESIS,
-        max_error_effect_if_constant(
-            redundancy, initial_errors, ALPHA_HYPOTHESIS, BETA_FLOW_TEST, pole_index
-        ),
-        min_effect_per_unit_error,
-    )
-    min_effect_per_unit_error = (
-        np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX])
-        - filtered_signed_effects_at_pole[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
-    )
-    tighten_error_bound(
-        initial_errors,
-        BETA_HYPOTHESIS,
-        max_error_effect_if_constant(
-            redundancy, initial_errors, BETA_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
-        ),
-        min_effect_per_unit_error,
-    )
+    C = ini.C_m[:, m]
+    half = 0.5 * angle_of_chord(ini.e[H_ALPHA])
+    c = np.cos(half) * abs(C[VANE_ROLL]) - np.sin(half) * abs(C[VANE_YAW]) - C[ALPHA_FORCE]
+    tighten(ini, H_ALPHA, constant_effect(red, ini, H_ALPHA, CLIMB_TEST, m), C[ALPHA_CLIMB])
+    tighten(ini, H_ALPHA, constant_effect(red, ini, H_ALPHA, BETA_TEST, m), c)
+    c = np.cos(0.5 * angle_of_chord(ini.e[H_BETA])) * abs(C[VANE_ROLL]) - C[BETA_FORCE]
+    tighten(ini, H_BETA, constant_effect(red, ini, H_BETA, ALPHA_TEST, m), c)
 
 
 @kernel
-def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
+def tighten_airspeed(red, ini, m):
     """Lower the bound on the error of the airspeed to what flow and density allow.
 
-    The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
+    The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
-    max_reading_over_truth = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]
-    tighten_error_bound(
-        initial_errors,
-        AIRSPEED_HYPOTHESIS,
-        max_reading_over_truth
-        * max_error_effect_if_constant(
-            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
-        ),
-        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX]),
+    C = ini.C_m[:, m]
+    ratio = 1.0 + ini.e[H_AIRSPEED]
+    tighten(
+        ini, H_AIRSPEED, ratio * constant_effect(red, ini, H_AIRSPEED, ALPHA_TEST, m), abs(C[SPEED_ALPHA])
     )
-    tighten_error_bound(
-        initial_errors,
-        AIRSPEED_HYPOTHESIS,
-        max_reading_over_truth
-        * max_error_effect_if_constant(
-            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
-        ),
-        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX]),
+    tighten(ini, H_AIRSPEED, ratio * constant_effect(red, ini, H_AIRSPEED, BETA_TEST, m), abs(C[SPEED_BETA]))
+    change = (
+        2.0 * ratio * allowed_effect(red, SPEED_TEST, m) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
     )
-    max_error_change_effect_on_density = (
-        2.0
-        * max_reading_over_truth
-        * max_error_effect_allowed_by_residual(redundancy, SPEED_TEST, pole_index)
-        / max(redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
-    )
-    tighten_error_bound(
-        initial_errors,
-        AIRSPEED_HYPOTHESIS,
-        max_error_effect_if_constant(
-            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index
-        )
-        + max_error_change_effect_on_density,
-        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX]),
+    tighten(
+        ini,
+        H_AIRSPEED,
+        constant_effect(red, ini, H_AIRSPEED, DENSITY_TEST, m) + change,
+        abs(C[SPEED_DENSITY]),
     )
 
 
 @kernel
-def update_initial_error_bounds(redundancy, initial_errors, readings):
-    """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
-    if pitch_is_too_steep(redundancy, readings):
-        initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
+def update_bounds(red, ini, y):
+    """Update all bounds by the sample y, which has just been tested."""
+    if too_steep(red, y):
+        ini.C_m[:] = 0.0
         return
-    update_recent_change_and_widen_bounds(redundancy, initial_errors)
-    fill_effects_per_unit_error(redundancy, initial_errors, readings)
-    update_filtered_effects_per_unit_error(redundancy, initial_errors)
-    tighten_all_error_bounds(redundancy, initial_errors)
+    widen_bounds(red, ini)
+    fill_effects(red, ini, y)
+    filter_effects(red, ini)
+    tighten_all(red, ini)
 
 
 @kernel
-def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis_index, test_index):
-    """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
-    pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
-    test = redundancy.test[test_index]
-    error_bound_with_recent_change = (
-        initial_errors.error_bound[hypothesis_index] + initial_errors.error_change_bound[hypothesis_index]
-    )
-    if test_index >= RPM_TEST:
-        return test.residual_bound_ratio > 1.0
-    bound_factor = 1.0 + (
-        error_bound_with_recent_change
-        if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST
-        else 0.0
-    )
-    for m in range(redundancy.config.filter_decay_by_pole.size):
-        max_error_effect = (
-            error_bound_with_recent_change
-            * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
-        )
-        if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + max_error_effect:
+def refutes_initial(red, ini, h, j):
+    """Whether a test's residual is larger than sound sensors and the error of hypothesis h explain: for a
+    pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
+    ones.
+    """
+    test = red.test[j]
+    x = ini.e[h] + ini.d[h]
+    if j >= RPM_TEST:
+        return test.ratio > 1.0
+    factor = 1.0 + (x if h == H_AIRSPEED and j >= SPEED_TEST else 0.0)
+    for m in range(red.config.decay.size):
+        effect = x * ini.H_m[h, j, m]
+        if abs(test.r[m]) > factor * test.B[m] + effect:
             return True
     return False
 
 
 @kernel
-def store_error_bounds_at_alarm(initial_errors):
-    """Keep the bounds of the moment of the alarm: later residuals may be the effect of another error."""
-    initial_errors.error_bound_at_alarm[:] = initial_errors.error_bound
+def effect_at_alarm(ini, h, j, m):
+    """e_alarm H_m: bound on the effect, on a test through a filter, of an error as large as that of
+    hypothesis h could be at the alarm; in the unit of the residual.
+    """
+    return ini.e_alarm[h] * ini.H_m[h, j, m]
 
 
 @kernel
-def max_error_effect_at_alarm(initial_errors, hypothesis_index, test_index, pole_index):
-    """Bound the effect on a test, through a filter, of an error as large as that of a hypothesis could be at
-    the alarm: b W_tm, in the unit of the residual."""
-    return (
-        initial_errors.error_bound_at_alarm[hypothesis_index]
-        * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, pole_index]
-    )
+def latch_refuted(red, ini, exceeded):
+    """Record by which of `exceeded` (N_TESTS,) each hypothesis is refuted."""
+    refuted = ini.refuted
+    for i in range(N_INITIAL):
+        for j in range(exceeded.size):
+            if exceeded[j] and not refuted[i, j] and refutes_initial(red, ini, i, j):
+                refuted[i, j] = 1
 
 
 @kernel
-def latch_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
-    """Record by which of `tests_exceeded_since_alarm` (N_TESTS,) each hypothesis is refuted."""
-    refutations_by_hypothesis_and_test = initial_errors.refutations_by_hypothesis_and_test
-    for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        for test_index in range(tests_exceeded_since_alarm.size):
-            if (
-                tests_exceeded_since_alarm[test_index]
-                and not refutations_by_hypothesis_and_test[i, test_index]
-                and exceeds_bound_with_initial_error(redundancy, initial_errors, i, test_index)
-            ):
-                refutations_by_hypothesis_and_test[i, test_index] = 1
-
-
-@kernel
-def test_reacts_to_error_change(hypothesis_index, test_index):
+def reacts_at_once(h, j):
     """Whether a test reacts at once to a change of the error of a hypothesis."""
-    if hypothesis_index in (PHI_HYPOTHESIS, THETA_HYPOTHESIS):
-        return test_index < FIRST_ANGLE_TEST or test_index == index_of_test_showing_error_change(
-            hypothesis_index
-        )
-    return test_index == index_of_test_showing_error_change(hypothesis_index) or (
-        hypothesis_index == AIRSPEED_HYPOTHESIS and test_index == DENSITY_TEST
-    )
+    if h in (H_PHI, H_THETA):
+        return j < ANGLE_TEST or j == change_test(h)
+    return j == change_test(h) or (h == H_AIRSPEED and j == DENSITY_TEST)
 
 
 @kernel
-def initial_error_explains_exceeded_tests(initial_errors, hypothesis_index, alarm_test_index):
+def explains_exceeded(ini, h, alarm):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
     If the test that raised the alarm reacts at once to such a change, sensor_monitor.py judges changes: here
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
-    for test_index in range(initial_errors.refutations_by_hypothesis_and_test.shape[1]):
-        if initial_errors.refutations_by_hypothesis_and_test[hypothesis_index, test_index] and (
-            test_reacts_to_error_change(hypothesis_index, alarm_test_index)
-            or not test_reacts_to_error_change(hypothesis_index, test_index)
-        ):
+    for j in range(ini.refuted.shape[1]):
+        if ini.refuted[h, j] and (reacts_at_once(h, alarm) or not reacts_at_once(h, j)):
             return False
     return True

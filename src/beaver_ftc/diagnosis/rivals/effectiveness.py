@@ -150,7 +150,7 @@ class AugmentedEkf(EffectivenessFilter):
         gusts = slice(N_STATES_WITHOUT_GUSTS, None)
         self.constant_jacobian = np.eye(self.n_states)
         self.constant_jacobian[:3, gusts] = self.turbulence_model.rate_effect
-        self.constant_jacobian[gusts, gusts] = np.diag(self.turbulence_model.decay_factor)
+        self.constant_jacobian[gusts, gusts] = np.diag(self.turbulence_model.a)
 
     def propagate(self, measured: Measured) -> None:
         """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""
@@ -162,7 +162,7 @@ class AugmentedEkf(EffectivenessFilter):
         )
         if self.turbulence_model.n_states:
             self.z[:3] += self.turbulence_model.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
-            self.z[N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.decay_factor
+            self.z[N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.a
         self.P = F @ self.P @ F.T
         self.P[self.diagonal] += self.process_noise_variances(measured)
 
@@ -223,7 +223,7 @@ class AugmentedUkf(EffectivenessFilter):
             propagated_points[:, :3] += (
                 state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.turbulence_model.rate_effect.T
             )
-            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.decay_factor
+            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.turbulence_model.a
         return propagated_points
 
     def update_statistic(self, normalised_innovation_square: float) -> float:

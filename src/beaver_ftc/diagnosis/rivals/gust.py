@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.informed_test import context_with_measured_gust
+from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
 PITCHING, YAWING = 1, 2
 _TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
@@ -33,7 +33,7 @@ class VaneGust:
         self._is_measured = declared.air and self._airspeed > 0.0
         self.context = context
         if self._is_measured:
-            self.context = context_with_measured_gust(context, self._noise(context))
+            self.context = with_measured_gust(context, self._noise(context))
 
     def _noise(self, context: Context) -> np.ndarray:
         """Standard deviation (3,) rad/s2 of the effect, by the noise of a sample of each instrument."""

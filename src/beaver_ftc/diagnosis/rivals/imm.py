@@ -94,7 +94,7 @@ class InteractingMultipleModels:
         self.F = np.eye(3 + self.turbulence_model.n_states)
         self.F[:3, 3:], self.F[3:, 3:] = (
             self.turbulence_model.rate_effect,
-            np.diag(self.turbulence_model.decay_factor),
+            np.diag(self.turbulence_model.a),
         )
         acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
         acceleration_noise_scale[-1] = self.options["unknown_noise"]

@@ -19,16 +19,16 @@ from beaver_ftc.design.context import Context
 class TurbulenceModel:
     """The model of turbulence: rotation of the air about n_states axes, 3, or 0 if no turbulence is declared.
 
-    decay_factor (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
+    a (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
     rate_effect (3, n): dt B, change of the rates over a frame per rad/s of the air.
     """
 
     def __init__(self, context: Context) -> None:
         declared_uncertainty, dt = context.declared, context.dt_s
         self.n_states = 3 if declared_uncertainty.air else 0
-        self.decay_factor = np.exp(-dt / declared_uncertainty.gust_time_s[: self.n_states])
+        self.a = np.exp(-dt / declared_uncertainty.gust_time_s[: self.n_states])
         self.initial_variance = declared_uncertainty.gust_rad_s[: self.n_states] ** 2
-        self.process_noise_variance = (1.0 - self.decay_factor**2) * self.initial_variance
+        self.process_noise_variance = (1.0 - self.a**2) * self.initial_variance
         self.rate_effect = dt * declared_uncertainty.gust_effect[:, : self.n_states]
 
 

@@ -100,11 +100,11 @@ class ConstantThresholdObserver:
         context = self.vane_gust.context
         self.leading_surface_indices, self.leaders = list(context.leading), context.leaders
         pole_per_s = self.options["pole_per_s"]
-        self.dt_s, self.decay_factor = context.dt_s, exp(-pole_per_s * context.dt_s)
+        self.dt_s, self.a = context.dt_s, exp(-pole_per_s * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
         self.threshold = self.options["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole_per_s
         if context.declared.errors:
-            self.threshold = self.options["alarm"] * healthy_residual_std(context, self.decay_factor)
+            self.threshold = self.options["alarm"] * healthy_residual_std(context, self.a)
         self.eps, self.residual_since_alarm, self.filtered_effects = (
             np.zeros(3),
             np.zeros(3),
@@ -120,10 +120,10 @@ class ConstantThresholdObserver:
         measured = self.vane_gust.subtracted(measured)
         if self.previous_rates is not None:
             rate_innovation = measured.x - self.previous_rates - self.dt_s * measured.acceleration
-            self.eps = self.decay_factor * self.eps + rate_innovation
-            self.residual_since_alarm = self.decay_factor * self.residual_since_alarm + rate_innovation
+            self.eps = self.a * self.eps + rate_innovation
+            self.residual_since_alarm = self.a * self.residual_since_alarm + rate_innovation
             self.filtered_effects = (
-                self.decay_factor * self.filtered_effects
+                self.a * self.filtered_effects
                 + self.dt_s * measured.contribution[:, self.leading_surface_indices]
             )
         self.previous_rates = measured.x

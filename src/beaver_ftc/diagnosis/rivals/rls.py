@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis.rivals import rival_options
 class RecursiveLeastSquaresFit:
     """y = w' phi, learnt sample by sample.
 
-    forgetting_factor: lam in (0, 1]. prior_variance: of the parameters at the start; it also bounds P, which
+    forget: lam in (0, 1]. prior_variance: of the parameters at the start; it also bounds P, which
     would otherwise grow without excitation.
     """
 

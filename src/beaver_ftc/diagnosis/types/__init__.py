@@ -21,20 +21,24 @@ constant while it is there, is never excluded, and so never misnamed. What canno
 candidate.
 
 A file under table/ describes fault types; its `TYPES` are the rows. This file says what is in a row
-(`FaultType`) and has two parts of a surface's record, which no other file writes:
+(`FaultType`) and has two parts of a surface's record:
 
 - Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
   once its set is empty, and stays excluded until the surface's diagnosis restarts.
 - Observations: where the surface was, if it alone is at fault, in three frames or blocks:
-  `last_observation` is of the elapsed frame, `judged_observation` of the one before it,
-  `earlier_observation` of the one before that. Positions in rad.
+  `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
 
 registry.py reads the rows into arrays and records; in each frame it finds where each surface was and tests
 every type. verdict.py and pairs.py conclude; they name no type.
 
-type_index: the number of a type, the same in every array over types. config: TYPES_CONFIG of registry.py;
-surface: a record of its `surface_types_dtype`. k: number of the judged frame, which is the frame before the
-elapsed one.
+    s, srf          surface, and its record (`registry.surface_types_dtype`)
+    h               type: its number, the same in every array over types
+    k               judged frame, the one before the elapsed
+    u, p            command and deflection of the surface, rad; u is where a healthy one is
+    lo, hi          interval, rad
+    nu, nu_max (3,) innovation and its bound without a fault, rad/s2
+    c, M            TYPES_CONFIG of registry.py, memory of a type
+    est, fie, eff   estimators of the isolation, one of them, what it supposes of the frame (EFFECT_RECORD)
 """
 
 from collections.abc import Callable
@@ -60,9 +64,9 @@ REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE, REST_POSITION_IS_PAR
 
 
 @kernel
-def reachable_range(config, surface, type_index, k):
+def reachable_range(c, srf, h, k):
     """Anywhere within reach."""
-    return surface.actuator.reachable_low, surface.actuator.reachable_high
+    return srf.actuator.reach_lo, srf.actuator.reach_hi
 
 
 class DeflectionRelation(NamedTuple):
@@ -71,15 +75,15 @@ class DeflectionRelation(NamedTuple):
     p = command_gain u + theta, or p = (command_gain + theta) u where theta is a share of the command
     (theta_is_share).
 
-    theta_range_for_travel(low, high): returns the least and greatest theta; low, high: the travel, rad.
+    theta_span(low, high): returns the least and greatest theta; low, high: the travel, rad.
     """
 
     command_gain: float
     theta_is_share: bool
-    theta_range_for_travel: Callable[[float, float], tuple[float, float]]
+    theta_span: Callable[[float, float], tuple[float, float]]
 
 
-def _return_none_as_estimate(fdi: np.void, s: int, type_index: int) -> None:
+def _no_estimate(fdi: np.void, s: int, h: int) -> None:
     """No parameter to estimate."""
 
 
@@ -95,46 +99,43 @@ class FaultType:
 
     The feasible set; kernels:
 
-    consistent_interval(config, surface, type_index, k)
+    consistent_interval(c, srf, h, k)
                             the parameters (low, high) that explain the judged frame, in which something was
                             wrong; UNLIMITED_SET if every one does, EMPTY_SET (low > high) excludes the
                             type
-    parameter_range(surface)
-                            the parameters (low, high) that there are; unlimited if left out
-    feasible_set_after_frame(surface, type_index)
+    parameter_range(srf)    the parameters (low, high) that there are; unlimited if left out
+    set_after_frame(srf, h)
                             the set (low, high) to go on with after a frame; the one there is if left out
     memory_dtype, memory_record_name
-                            a record of its own, found at `surface.<memory_record_name>`
-    reset_memory(surface, type_index)
-                            its memory is reset: nothing is known yet
-    before_judging_frame(config, surface, type_index)
+                            a record of its own, found at `srf.<memory_record_name>`
+    reset_memory(srf, h)    its memory is reset: nothing is known yet
+    before_judging_frame(c, srf, h)
                             called for every frame, before it is judged
-    on_skipped_frame(config, surface, type_index, k)  called for a frame that is not judged
-    on_possible_release(config, surface, type_index, k)
+    on_skipped_frame(c, srf, h, k)
+                            called for a frame that is not judged
+    on_possible_release(c, srf, h, k)
                             a repair may have released the surface as the frame began
-    propagate_release(config, surface, type_index)    advance such a release by a frame (held_surface.py)
-    possible_deflection_range(config, surface, type_index, k)
+    propagate_release(c, srf, h)
+                            advance such a release by a frame (held_surface.py)
+    possible_deflection_range(c, srf, h, k)
                             least and greatest deflection under it by the elapsed frame, rad; of a constant
                             type
 
     The evidence that a verdict needs:
 
-    has_shown(surface)      kernel: whether the type has shown itself. A type with this part explains a flight
+    has_shown(srf)          kernel: whether the type has shown itself. A type with this part explains a flight
                             only once it has shown itself
-    shows_within_half_cycles
-                            half-cycles of the slowest oscillation within which such a type shows itself
+    show_half_cycles        half-cycles of the slowest oscillation within which such a type shows itself
     evidence_at_rest        what a surface that was given up, and stays where it was, says of the type:
                             REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE (it may be there all
                             the same) or REST_POSITION_IS_PARAMETER (its parameter is the deflection at
                             which the surface stands)
-    half_cycles_before_isolating_other_surface
-                            half-cycles of evidence that a fault on another surface needs while this type is
+    wait_half_cycles        half-cycles of evidence that a fault on another surface needs while this type is
                             left here
-    error_depends_on_command
-                            whether the deflection error depends on the command. While a type that does not
+    follows_command         whether the deflection error depends on the command. While a type that does not
                             is left on one surface, no other surface is isolated in its place
     can_look_like           names of types that this one can look like: they are not named while it is left
-    motion_rules_out(surface, stop_direction)
+    motion_rules_out(srf, stop)
                             kernel: whether the surface has moved as this type cannot, towards the stop
                             of that direction (0: of a type without one)
     stop_direction          the stop that it runs to: 1 upper, -1 lower, 0 neither
@@ -144,10 +145,9 @@ class FaultType:
     accommodation_mode      SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET or WAIT_FOR_SURFACE
     other_accommodation_modes
                             other modes that serve it
-    type_name_at_end_of_range
-                            name of the type that it becomes at the end of its range: where both are left, the
+    end_type                name of the type that it becomes at the end of its range: where both are left, the
                             modes of that one serve this one too
-    deflection_error(surface, type_index)
+    deflection_error(srf, h)
                             kernel: how far the surface is off its command, rad; not finite if not known
     deflection_error_precedence
                             of the types left, the one with the least number gives the deflection error
@@ -156,17 +156,16 @@ class FaultType:
 
     deflection_relation     deflection by command and one parameter, where that is all that the type says; of
                             a type that is not constant theta may differ from frame to frame
-    multi_frame_exclusion_test_name
-                            name of the comparison of frames that excludes it, where one frame or two do not
+    frames_test             name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
     Words, Python functions (verdict.py):
 
-    estimate_parameter(fdi, s, type_index)
+    estimate_parameter(fdi, s, h)
                             its parameter, None without one
-    estimate_parameter_interval(fdi, s, type_index)
+    estimate_parameter_interval(fdi, s, h)
                             the set that the parameter is certain to lie in, or None
-    estimate_frequency_rad_s(fdi, s, type_index)
+    estimate_frequency_rad_s(fdi, s, h)
                             of a periodic type, or None
     """
 
@@ -176,7 +175,7 @@ class FaultType:
     description: str = ""
     sort_rank: int = 100
     parameter_range: Kernel | None = None
-    feasible_set_after_frame: Kernel | None = None
+    set_after_frame: Kernel | None = None
     memory_dtype: np.dtype | None = None
     memory_record_name: str = ""
     reset_memory: Kernel | None = None
@@ -186,265 +185,142 @@ class FaultType:
     propagate_release: Kernel | None = None
     possible_deflection_range: Kernel = reachable_range
     has_shown: Kernel | None = None
-    shows_within_half_cycles: int = 0
+    show_half_cycles: int = 0
     evidence_at_rest: int = REST_IS_UNINFORMATIVE
-    half_cycles_before_isolating_other_surface: int = 1
-    error_depends_on_command: bool = True
+    wait_half_cycles: int = 1
+    follows_command: bool = True
     can_look_like: tuple[str, ...] = ()
     motion_rules_out: Kernel | None = None
     stop_direction: int = 0
     accommodation_mode: int = SUBTRACT_OFFSET
     other_accommodation_modes: tuple[int, ...] = ()
-    type_name_at_end_of_range: str = ""
+    end_type: str = ""
     deflection_error: Kernel | None = None
     deflection_error_precedence: int = 100
     deflection_relation: DeflectionRelation | None = None
-    multi_frame_exclusion_test_name: str = ""
-    estimate_parameter: Callable[[np.void, int, int], float | None] = _return_none_as_estimate
-    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = (
-        _return_none_as_estimate
-    )
-    estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _return_none_as_estimate
+    frames_test: str = ""
+    estimate_parameter: Callable[[np.void, int, int], float | None] = _no_estimate
+    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
+    estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
 
 
 @kernel
-def limit_to_travel(surface, deflection_rad):
-    """A deflection (rad), cut off by the stops."""
-    return min(max(deflection_rad, surface.actuator.travel_low), surface.actuator.travel_high)
+def clip_travel(srf, p):
+    """p, cut off by the stops, rad."""
+    return min(max(p, srf.actuator.stop_lo), srf.actuator.stop_hi)
 
 
 @kernel
-def feasible_set_midpoint(surface, type_index):
+def set_middle(srf, h):
     """The middle of a type's set."""
-    return 0.5 * (surface.feasible_sets.low[type_index] + surface.feasible_sets.high[type_index])
+    return 0.5 * (srf.sets.low[h] + srf.sets.high[h])
 
 
-def feasible_set(fdi: np.void, s: int, type_index: int) -> tuple[float, float]:
+def feasible_set(fdi: np.void, s: int, h: int) -> tuple[float, float]:
     """The set of a type's parameter on surface s."""
-    surface = fdi["types"]["surface"][s]
-    return float(surface["feasible_sets"]["low"][type_index]), float(
-        surface["feasible_sets"]["high"][type_index]
-    )
+    srf = fdi["types"]["surface"][s]
+    return float(srf["sets"]["low"][h]), float(srf["sets"]["high"][h])
 
 
-def midpoint_parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
+def middle_estimate(fdi: np.void, s: int, h: int) -> float:
     """The middle of the feasible set of a type's parameter on surface s."""
-    set_low, set_high = feasible_set(fdi, s, type_index)
-    return 0.5 * (set_low + set_high)
+    lo, hi = feasible_set(fdi, s, h)
+    return 0.5 * (lo + hi)
 
 
 @kernel
-def reset_feasible_sets_and_exclusions(surface):
-    """Allow every type with any parameter."""
-    surface.feasible_sets.low[:], surface.feasible_sets.high[:] = -np.inf, np.inf
-    surface.feasible_sets.excluded[:] = 0
-
-
-@kernel
-def set_feasible_set(surface, type_index, interval):
+def put_set(srf, h, interval):
     """Put an interval in place of the set of a type."""
-    surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index] = interval
+    srf.sets.low[h], srf.sets.high[h] = interval
 
 
 @kernel
-def intersect_set_or_exclude_type(surface, type_index, other_interval):
-    """Keep of the set of a type what is also in other_interval; exclude the type when nothing is left. The
-    set then holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type
-    that it excludes keeps its set."""
-    interval_low, interval_high = other_interval
-    if interval_low == np.inf:
-        surface.feasible_sets.excluded[type_index] = 1
-        return
-    surface.feasible_sets.low[type_index] = max(surface.feasible_sets.low[type_index], interval_low)
-    surface.feasible_sets.high[type_index] = min(surface.feasible_sets.high[type_index], interval_high)
-    if surface.feasible_sets.low[type_index] > surface.feasible_sets.high[type_index]:
-        surface.feasible_sets.excluded[type_index] = 1
-
-
-@kernel
-def mark_type_excluded(surface, type_index):
-    """Exclude a type."""
-    surface.feasible_sets.excluded[type_index] = 1
-
-
-@kernel
-def restore_first_pitch_fault_sets(surface):
-    """Restore the sets that were stored when the surface was isolated (pairs.py)."""
-    surface.feasible_sets.low[:], surface.feasible_sets.high[:] = (
-        surface.first_pitch_fault_sets.low,
-        surface.first_pitch_fault_sets.high,
-    )
-    surface.feasible_sets.excluded[:] = surface.first_pitch_fault_sets.excluded
-
-
-# healthy_position: where a healthy surface was; position_low, position_high: where this one can have been;
-# is_anomalous: whether more than the declared uncertainty was at work;
-# weighted_mean_error_per_position_range: (G_max - G_min) / (4 |mean G|), by so much of the range of its
-# positions a mean weighted by G may be off; stop_can_hide_deflection: whether
-# the lower and the upper stop can cut a deflection off unseen.
-OBSERVATION_RECORD = record(
-    healthy_position=float,
-    position_low=float,
-    position_high=float,
-    is_anomalous=int,
-    weighted_mean_error_per_position_range=float,
-    stop_can_hide_deflection=(int, 2),
-)
-
-
-@kernel
-def set_last_position_to_reachable_range(surface):
-    """The surface may have been anywhere within reach."""
-    surface.last_observation.position_low, surface.last_observation.position_high = (
-        surface.actuator.reachable_low,
-        surface.actuator.reachable_high,
-    )
-
-
-@kernel
-def shift_observations(surface):
-    """Shift the observations by one frame: the last becomes the judged one, and that one the earlier one."""
-    copy_observation(surface.earlier_observation, surface.judged_observation)
-    copy_observation(surface.judged_observation, surface.last_observation)
-
-
-@kernel
-def copy_observation(target_observation, source_observation):
-    """Copy one observation to another."""
-    (
-        target_observation.healthy_position,
-        target_observation.position_low,
-        target_observation.position_high,
-        target_observation.is_anomalous,
-        target_observation.weighted_mean_error_per_position_range,
-    ) = (
-        source_observation.healthy_position,
-        source_observation.position_low,
-        source_observation.position_high,
-        source_observation.is_anomalous,
-        source_observation.weighted_mean_error_per_position_range,
-    )
-    target_observation.stop_can_hide_deflection[:] = source_observation.stop_can_hide_deflection
-
-
-@kernel
-def fill_last_observation_from_innovation(
-    config,
-    surface,
-    fie,
-    most_affected_axis,
-    innovation_by_axis,
-    innovation_bound_by_axis,
-    fault_effect_record,
-):
-    """Find where a surface can have been: what agrees with innovation_by_axis (3,) within
-    innovation_bound_by_axis (3,), rad/s2.
-
-    fie: its estimator of a position; most_affected_axis: on which it has most effect;
-    fault_effect_record: what that supposes of the same frame or block, dtype FAULT_EFFECT_RECORD.
+def intersect_set(srf, h, other):
+    """Keep of the set of a type what is also in `other`; exclude the type when nothing is left. The set then
+    holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type that it excludes
+    keeps its set.
     """
-    last_observation, command_record = surface.last_observation, surface.commands
-    last_observation.healthy_position = (
-        -fault_effect_record.acceleration_at_zero_theta[most_affected_axis]
-        / fault_effect_record.regressor[most_affected_axis]
-    )
-    last_observation.weighted_mean_error_per_position_range = (
-        0.25
-        * (command_record.max_acceleration_per_rad - command_record.min_acceleration_per_rad)
-        / abs(fault_effect_record.regressor[most_affected_axis])
-    )
-    last_observation.position_low, last_observation.position_high = fie.theta_min, fie.theta_max
+    lo, hi = other
+    if lo == np.inf:
+        srf.sets.excluded[h] = 1
+        return
+    srf.sets.low[h] = max(srf.sets.low[h], lo)
+    srf.sets.high[h] = min(srf.sets.high[h], hi)
+    if srf.sets.low[h] > srf.sets.high[h]:
+        srf.sets.excluded[h] = 1
+
+
+# u: where a healthy surface was; lo, hi: where this one can have been; anomalous: whether more than the
+# declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
+# positions a mean weighted by G may be off; hides: whether the lower and the upper stop can cut a deflection
+# off unseen.
+OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
+
+
+@kernel
+def copy_observation(to, of):
+    """Copy one observation to another."""
+    (to.u, to.lo, to.hi, to.anomalous, to.kappa) = (of.u, of.lo, of.hi, of.anomalous, of.kappa)
+    to.hides[:] = of.hides
+
+
+@kernel
+def set_anomalous(srf, anomalous):
+    """Say of the last observation of a surface whether more than the declared uncertainty was at work."""
+    srf.last.anomalous = anomalous
+
+
+@kernel
+def forget_anomalies(srf):
+    """Nothing but the declared uncertainty was at work in what is kept of a surface."""
+    srf.last.anomalous = srf.judged.anomalous = srf.earlier.anomalous = 0
+
+
+@kernel
+def observe_surface(c, srf, fie, m, nu, nu_max, eff):
+    """Find where a surface can have been: the p that agree with |nu - G (p - u)| <= nu_max on every axis.
+
+    m: the axis on which it has most effect.
+    """
+    last, cmd = srf.last, srf.commands
+    last.u = -eff.base[m] / eff.regressor[m]
+    last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.regressor[m])
+    last.lo, last.hi = fie.theta_min, fie.theta_max
     for i in range(3):
-        if (
-            config.frames_per_block > 1
-            and i != most_affected_axis
-            and fault_effect_record.regressor[i] != 0.0
-        ):
+        if c.frames_per_block > 1 and i != m and eff.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
-        axis_position_low, axis_position_high = isolation.consistent_theta_interval_on_axis(
-            innovation_by_axis, innovation_bound_by_axis, fie, fault_effect_record, i
-        )
-        last_observation.position_low, last_observation.position_high = (
-            max(last_observation.position_low, axis_position_low),
-            min(last_observation.position_high, axis_position_high),
-        )
-    mark_stops_that_can_hide_deflection(
-        surface,
-        2.0
-        * (innovation_bound_by_axis[most_affected_axis] + fault_effect_record.error_bound[most_affected_axis])
-        / abs(fault_effect_record.regressor[most_affected_axis]),
-    )
+        lo, hi = isolation.consistent_on(nu, nu_max, fie, eff, i)
+        last.lo, last.hi = (max(last.lo, lo), min(last.hi, hi))
+    mark_stops(srf, 2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]))
 
 
 @kernel
-def mark_stops_that_can_hide_deflection(surface, position_interval_width):
-    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than
-    `position_interval_width` (rad), that of the interval which holds the true deflection."""
-    surface.last_observation.stop_can_hide_deflection[0] = (
-        surface.commands.min_healthy_position[0] - surface.actuator.travel_low < position_interval_width
-    )
-    surface.last_observation.stop_can_hide_deflection[1] = (
-        surface.actuator.travel_high - surface.commands.max_healthy_position[0] < position_interval_width
-    )
+def mark_stops(srf, width):
+    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad) of
+    the interval which holds the true deflection.
+    """
+    srf.last.hides[0] = srf.commands.u_min[0] - srf.actuator.stop_lo < width
+    srf.last.hides[1] = srf.actuator.stop_hi - srf.commands.u_max[0] < width
 
 
 @kernel
-def fill_observation_and_check_reach(surface, deflection_error, deflection_error_tolerance):
-    """A surface was off its command by deflection_error +- deflection_error_tolerance (rad). False:
-    nowhere within its reach."""
-    last_observation, actuator_limits = surface.last_observation, surface.actuator
-    last_observation.position_low = max(
-        actuator_limits.reachable_low,
-        last_observation.healthy_position + deflection_error - deflection_error_tolerance,
-    )
-    last_observation.position_high = min(
-        actuator_limits.reachable_high,
-        last_observation.healthy_position + deflection_error + deflection_error_tolerance,
-    )
-    last_observation.is_anomalous = abs(deflection_error) > deflection_error_tolerance
-    mark_stops_that_can_hide_deflection(surface, 2.0 * deflection_error_tolerance)
-    return last_observation.position_low <= last_observation.position_high
+def observe_error(srf, e, tol):
+    """A surface was off its command by e +- tol (rad). False: nowhere within its reach."""
+    last, act = srf.last, srf.actuator
+    last.lo = max(act.reach_lo, last.u + e - tol)
+    last.hi = min(act.reach_hi, last.u + e + tol)
+    last.anomalous = abs(e) > tol
+    mark_stops(srf, 2.0 * tol)
+    return last.lo <= last.hi
 
 
 @kernel
-def set_known_position_and_clear_anomaly(surface, position_low, position_high):
-    """Set the interval (position_low, position_high) rad in which a surface with a known fault was;
-    the frame is no longer anomalous for it."""
-    (
-        surface.last_observation.position_low,
-        surface.last_observation.position_high,
-        surface.last_observation.is_anomalous,
-    ) = position_low, position_high, 0
+def last_error(srf):
+    """p - u in the elapsed frame, rad, p in the middle of where it can have been."""
+    return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u
 
 
-@kernel
-def set_is_anomalous(surface, innovation_exceeds_uncertainty):
-    """Set whether the elapsed frame is anomalous: more than the declared uncertainty was at work."""
-    surface.last_observation.is_anomalous = innovation_exceeds_uncertainty
-
-
-@kernel
-def mark_observations_not_anomalous(surface):
-    """Mark all three observations as not anomalous."""
-    surface.last_observation.is_anomalous = surface.judged_observation.is_anomalous = (
-        surface.earlier_observation.is_anomalous
-    ) = 0
-
-
-@kernel
-def last_midpoint_deflection_error(surface):
-    """Return the deflection error of the surface in the elapsed frame, rad: the middle of where it can have
-    been."""
-    return (
-        0.5 * (surface.last_observation.position_low + surface.last_observation.position_high)
-        - surface.last_observation.healthy_position
-    )
-
-
-def read_last_midpoint_deflection_error(surface: np.void) -> float:
-    """`last_midpoint_deflection_error` of a record outside compiled code, rad."""
-    last_observation = surface["last_observation"]
-    return float(
-        0.5 * (last_observation["position_low"] + last_observation["position_high"])
-        - last_observation["healthy_position"]
-    )
+def read_last_error(srf: np.void) -> float:
+    """`last_error` of a record outside compiled code, rad."""
+    last = srf["last"]
+    return float(0.5 * (last["lo"] + last["hi"]) - last["u"])

@@ -12,496 +12,309 @@ whose deflection follows from what is known of the first, taken to last. If noth
 explains that either, the name of the first is withdrawn. Anything else stays open.
 
 A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
-previous_conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+past: of `conclusion_dtype`, of the frame before; bank: the detection filters. Other symbols:
+types/__init__.py.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
-from beaver_ftc.diagnosis.state import LATERAL_SURFACE_GROUP, PITCH, PITCH_SURFACE_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    fill_observation_and_check_reach,
-    last_midpoint_deflection_error,
-    mark_observations_not_anomalous,
+    forget_anomalies,
+    last_error,
+    observe_error,
     registry,
-    restore_first_pitch_fault_sets,
-    set_is_anomalous,
-    set_known_position_and_clear_anomaly,
+    set_anomalous,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import (
-    ACCOMMODATION_MODE_BY_TYPE,
-    N_CONSTANT_PARAMETER_TYPES,
-    possible_deflection_range,
-)
-from beaver_ftc.diagnosis.types.verdict import (
-    NO_SURFACE,
-    any_constant_parameter_type_remains,
-    estimator_or_deduction_allows_fault,
-    type_is_not_excluded,
-)
+from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
 @kernel
-def latch_group_alarms(pair_record, filter_bank):
+def latch_groups(pair, bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
-    for axis in range(3):
-        group_index = PITCH_SURFACE_GROUP if axis == PITCH else LATERAL_SURFACE_GROUP
-        for filter_index in range(filter_bank.config.n_filters):
-            if (
-                abs(filter_bank.output.residual[filter_index, axis])
-                > filter_bank.output.threshold[filter_index, axis]
-            ):
-                pair_record.group_has_alarm[group_index] = 1
+    for i in range(3):
+        group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
+        for m in range(bank.config.n_filters):
+            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
+                pair.group_alarm[group] = 1
 
 
 @kernel
-def locate_lateral_and_flag_unreachable(
-    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
-):
-    """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
-    innovation_by_axis (3,), |eta| <= innovation_bound_by_axis (3,) rad/s2."""
-    aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
-    aileron_effect_record = estimators[layout.position_estimator[aileron_index]].frame_mean_effect
-    rudder_effect_record = estimators[layout.position_estimator[rudder_index]].frame_mean_effect
-    aileron_roll_acceleration_per_rad = aileron_effect_record.regressor[ROLL]
-    aileron_yaw_acceleration_per_rad = aileron_effect_record.regressor[YAW]
-    rudder_roll_acceleration_per_rad = rudder_effect_record.regressor[ROLL]
-    rudder_yaw_acceleration_per_rad = rudder_effect_record.regressor[YAW]
-    roll_innovation, yaw_innovation = innovation_by_axis[ROLL], innovation_by_axis[YAW]
-    roll_innovation_tolerance = (
-        innovation_bound_by_axis[ROLL]
-        + aileron_effect_record.error_bound[ROLL]
-        + rudder_effect_record.error_bound[ROLL]
-    )
-    yaw_innovation_tolerance = (
-        innovation_bound_by_axis[YAW]
-        + aileron_effect_record.error_bound[YAW]
-        + rudder_effect_record.error_bound[YAW]
-    )
-    determinant = (
-        aileron_roll_acceleration_per_rad * rudder_yaw_acceleration_per_rad
-        - aileron_yaw_acceleration_per_rad * rudder_roll_acceleration_per_rad
-    )
-    abs_determinant = abs(determinant)
-    aileron_deflection_error = (
-        roll_innovation * rudder_yaw_acceleration_per_rad - yaw_innovation * rudder_roll_acceleration_per_rad
-    ) / determinant
-    aileron_deflection_error_tolerance = (
-        roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
-        + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
-    ) / abs_determinant
-    aileron_is_within_reach = fill_observation_and_check_reach(
-        types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
-    )
-    rudder_deflection_error = (
-        yaw_innovation * aileron_roll_acceleration_per_rad
-        - roll_innovation * aileron_yaw_acceleration_per_rad
-    ) / determinant
-    rudder_deflection_error_tolerance = (
-        yaw_innovation_tolerance * abs(aileron_roll_acceleration_per_rad)
-        + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
-    ) / abs_determinant
-    if not (
-        fill_observation_and_check_reach(
-            types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
-        )
-        and aileron_is_within_reach
-    ):
-        types.pair.lateral_fault_outside_class = 1
+def locate_one(srf, own, other, nu, nu_max):
+    """Find where one of ailerons and rudder was in the elapsed frame: nu = G (p - u) + eta solved for p, with
+
+    p - u = (nu_L N - nu_N L) / (L1 N - N1 L),    |eta| <= nu_max + e
+
+    L, N: roll and yaw acceleration, rad/s2; L1, N1 per rad of this surface (own), L, N of the other. False:
+    nowhere within its reach.
+    """
+    L, N = other.regressor[ROLL], other.regressor[YAW]
+    det = own.regressor[ROLL] * N - own.regressor[YAW] * L
+    e_L = nu_max[ROLL] + own.e[ROLL] + other.e[ROLL]
+    e_N = nu_max[YAW] + own.e[YAW] + other.e[YAW]
+    return observe_error(srf, (nu[ROLL] * N - nu[YAW] * L) / det, (e_L * abs(N) + e_N * abs(L)) / abs(det))
 
 
 @kernel
-def constant_parameter_types_deflection_range(config, surface, k):
-    """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
-    of a constant that are left."""
-    min_deflection, max_deflection = np.inf, -np.inf
-    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-        if type_is_not_excluded(surface, type_index):
-            type_min_deflection, type_max_deflection = possible_deflection_range(
-                config, surface, type_index, k
-            )
-            min_deflection = min(min_deflection, type_min_deflection)
-            max_deflection = max(max_deflection, type_max_deflection)
-    reachable_low, reachable_high = surface.actuator.reachable_low, surface.actuator.reachable_high
-    return (
-        min(max(min_deflection, reachable_low), reachable_high),
-        min(max(max_deflection, reachable_low), reachable_high),
-    )
+def locate_lateral(types, layout, est, nu, nu_max):
+    """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
+    a, r = layout.main[ROLL], layout.main[YAW]
+    ail, rud = est[layout.position[a]].effect, est[layout.position[r]].effect
+    reached = locate_one(types.surface[a], ail, rud, nu, nu_max)
+    if not (locate_one(types.surface[r], rud, ail, nu, nu_max) and reached):
+        types.pair.lateral_outside = 1
 
 
 @kernel
-def flag_pitch_anomaly_or_locate_second(
-    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
-):
+def constant_range(c, srf, k):
+    """Least and greatest deflection of a surface by frame k over the types of a constant left, rad."""
+    lo, hi = np.inf, -np.inf
+    for h in range(N_CONSTANT):
+        if type_remains(srf, h):
+            h_lo, h_hi = possible_deflection_range(c, srf, h, k)
+            lo = min(lo, h_lo)
+            hi = max(hi, h_hi)
+    reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi
+    return (min(max(lo, reach_lo), reach_hi), min(max(hi, reach_lo), reach_hi))
+
+
+@kernel
+def observe_pitch(types, layout, est, nu, nu_max):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
-    first_fault_surface_index = types.pair.first_pitch_fault_surface
-    if (
-        first_fault_surface_index != NO_SURFACE
-        and not types.surface[first_fault_surface_index].status.may_be_sole_fault
-    ):
-        locate_second_pitch_or_deduce_healthy(
-            types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
-        )
+    s1 = types.pair.first_pitch
+    if s1 != NO_SURFACE and not types.surface[s1].status.may_be_sole:
+        locate_second(types, layout, est, nu, nu_max)
         return
-    for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_SURFACE_GROUP:
-            set_is_anomalous(surface, abs(innovation_by_axis[PITCH]) > innovation_bound_by_axis[PITCH])
+    for s, srf in enumerate(types.surface):
+        if layout.group[s] == PITCH_GROUP:
+            set_anomalous(srf, abs(nu[PITCH]) > nu_max[PITCH])
 
 
 @kernel
-def locate_second_pitch_or_deduce_healthy(
-    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
-):
-    """Find the position of the second surface, given the sets of the first."""
-    first_fault_surface_index = types.pair.first_pitch_fault_surface
-    second_surface_index = layout.partner[first_fault_surface_index]
-    first_effect_record = estimators[layout.position_estimator[first_fault_surface_index]].frame_mean_effect
-    second_effect_record = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
-    first_surface = types.surface[first_fault_surface_index]
-    first_surface_min_deflection, first_surface_max_deflection = constant_parameter_types_deflection_range(
-        types.config, first_surface, types.frame_index
-    )
-    set_known_position_and_clear_anomaly(
-        first_surface, first_surface_min_deflection, first_surface_max_deflection
-    )
-    second_pitch_acceleration_per_rad = second_effect_record.regressor[PITCH]
-    first_pitch_acceleration_per_rad = first_effect_record.regressor[PITCH]
-    first_fault_acceleration = first_pitch_acceleration_per_rad * last_midpoint_deflection_error(
-        first_surface
-    )
-    acceleration_tolerance = (
-        abs(first_pitch_acceleration_per_rad)
-        * 0.5
-        * (first_surface_max_deflection - first_surface_min_deflection)
-    )
-    acceleration_tolerance += (
-        innovation_bound_by_axis[PITCH]
-        + first_effect_record.error_bound[PITCH]
-        + second_effect_record.error_bound[PITCH]
-    )
-    if not fill_observation_and_check_reach(
-        types.surface[second_surface_index],
-        (innovation_by_axis[PITCH] - first_fault_acceleration) / second_pitch_acceleration_per_rad,
-        acceleration_tolerance / abs(second_pitch_acceleration_per_rad),
-    ):
-        types.surface[second_surface_index].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
+def locate_second(types, layout, est, nu, nu_max):
+    """Find the position of the second surface, given the sets of the first: p - u = (nu - M1 (p1 - u1)) /
+    M2.
+
+    M1, M2: pitch acceleration by the first and by the second surface, rad/s2 per rad.
+    """
+    s1 = types.pair.first_pitch
+    s2 = layout.partner[s1]
+    eff1 = est[layout.position[s1]].effect
+    eff2 = est[layout.position[s2]].effect
+    srf1 = types.surface[s1]
+    lo, hi = constant_range(types.config, srf1, types.frame_index)
+    srf1.last.lo, srf1.last.hi = lo, hi
+    set_anomalous(srf1, 0)
+    M1, M2 = eff1.regressor[PITCH], eff2.regressor[PITCH]
+    acc1 = M1 * last_error(srf1)
+    tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
+    if not observe_error(types.surface[s2], (nu[PITCH] - acc1) / M2, tol / abs(M2)):
+        types.surface[s2].status.basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
-def observe_pairs_and_judge_previous(types, layout, estimators, filter_bank, innovation_bound_by_axis):
-    """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound_by_axis (3,):
-    bound on the innovation."""
-    latch_group_alarms(types.pair, filter_bank)
-    registry.shift_observations_and_infer_positions(
-        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
-    )
-    locate_lateral_and_flag_unreachable(
-        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
-    )
-    flag_pitch_anomaly_or_locate_second(
-        types, layout, estimators, filter_bank.output.innovation, innovation_bound_by_axis
-    )
-    registry.judge_previous_and_advance_frame(types)
+def observe_pairs(types, layout, est, bank, nu_max):
+    """Observe the elapsed frame, plane by plane, and judge the one before."""
+    nu = bank.output.innovation
+    latch_groups(types.pair, bank)
+    registry.observe_surfaces(types, layout, est, nu, nu_max)
+    locate_lateral(types, layout, est, nu, nu_max)
+    observe_pitch(types, layout, est, nu, nu_max)
+    registry.judge_frame(types)
 
 
 @kernel
-def update_isolation_type_and_times(surface, is_isolated, type_index, t):
+def update_status(srf, is_isolated, kind, t):
     """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
-    type_index = type_index if is_isolated else -1
-    finding_record = surface.status
-    if is_isolated and not finding_record.is_isolated:
-        finding_record.isolated_at_s = t
-    if type_index != finding_record.fault_type:
-        finding_record.type_decided_at_s = t
-    finding_record.is_isolated, finding_record.fault_type = is_isolated, type_index
+    kind = kind if is_isolated else -1
+    status = srf.status
+    if is_isolated and not status.is_isolated:
+        status.isolated_at_s = t
+    if kind != status.fault_type:
+        status.typed_at_s = t
+    status.is_isolated, status.fault_type = is_isolated, kind
 
 
 @kernel
-def isolate_lateral_or_find_unanticipated(types, layout, t):
-    """Set the isolation of the surfaces of roll and yaw. Returns whether the fault of this plane is outside
-    the class."""
-    config, pair_record = types.config, types.pair
-    roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_alone_can_be_at_fault = estimator_or_deduction_allows_fault(roll_surface)
-    yaw_alone_can_be_at_fault = estimator_or_deduction_allows_fault(yaw_surface)
-    both_must_be_at_fault = not roll_alone_can_be_at_fault and not yaw_alone_can_be_at_fault
-    class_is_refuted = (
-        pair_record.lateral_fault_outside_class == 1
-        or not verdict.any_type_remains(roll_surface)
-        or not verdict.any_type_remains(yaw_surface)
-    )
-    fault_is_outside_class = both_must_be_at_fault and class_is_refuted
-    types_do_not_explain_flight_yet = both_must_be_at_fault and not (
-        verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
-    )
-    can_isolate = pair_record.group_has_alarm[LATERAL_SURFACE_GROUP] == 1 and not (
-        fault_is_outside_class or types_do_not_explain_flight_yet
-    )
-    update_isolation_type_and_times(
-        roll_surface,
-        can_isolate and not yaw_alone_can_be_at_fault,
-        verdict.fault_type_on_surface(config, roll_surface),
-        t,
-    )
-    update_isolation_type_and_times(
-        yaw_surface,
-        can_isolate and not roll_alone_can_be_at_fault,
-        verdict.fault_type_on_surface(config, yaw_surface),
-        t,
-    )
-    return fault_is_outside_class
+def isolate_lateral(types, layout, t):
+    """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
+    class.
+    """
+    c, pair = types.config, types.pair
+    roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
+    roll_alone = can_be_faulty(roll)
+    yaw_alone = can_be_faulty(yaw)
+    both = not roll_alone and not yaw_alone
+    refuted = pair.lateral_outside == 1 or not verdict.left(roll, ALL) or not verdict.left(yaw, ALL)
+    outside = both and refuted
+    open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
+    isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
+    update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
+    update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
+    return outside
 
 
 @kernel
-def update_first_fault_surface_and_sets(types, s):
+def store_first(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
-    pair_record, surface, has_new_exclusion = types.pair, types.surface[s], False
-    stored_sets = surface.first_pitch_fault_sets
-    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-        has_new_exclusion = (
-            has_new_exclusion
-            or surface.feasible_sets.excluded[type_index] != stored_sets.excluded[type_index]
-        )
-    pair_record.n_frames_since_unstored_exclusion = (
-        pair_record.n_frames_since_unstored_exclusion + 1 if has_new_exclusion else 0
-    )
-    if (
-        pair_record.first_pitch_fault_surface != s
-        or pair_record.n_frames_since_unstored_exclusion >= types.config.slowest_half_cycle_frames
-    ):
-        pair_record.first_pitch_fault_surface, pair_record.n_frames_since_unstored_exclusion = s, 0
-        stored_sets.low[:], stored_sets.high[:] = surface.feasible_sets.low, surface.feasible_sets.high
-        stored_sets.excluded[:] = 1
-        stored_sets.excluded[:N_CONSTANT_PARAMETER_TYPES] = surface.feasible_sets.excluded[
-            :N_CONSTANT_PARAMETER_TYPES
-        ]
+    pair, srf, new = types.pair, types.surface[s], False
+    kept = srf.first_sets
+    for h in range(N_CONSTANT):
+        new = new or srf.sets.excluded[h] != kept.excluded[h]
+    pair.n_unstored = pair.n_unstored + 1 if new else 0
+    if pair.first_pitch != s or pair.n_unstored >= types.config.half_frames:
+        pair.first_pitch, pair.n_unstored = s, 0
+        kept.low[:], kept.high[:] = srf.sets.low, srf.sets.high
+        kept.excluded[:] = 1
+        kept.excluded[:N_CONSTANT] = srf.sets.excluded[:N_CONSTANT]
 
 
 @kernel
-def begin_second_pitch_fault(types, layout):
+def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
-    first_surface = types.surface[types.pair.first_pitch_fault_surface]
-    second_surface = types.surface[layout.partner[types.pair.first_pitch_fault_surface]]
-    restore_first_pitch_fault_sets(first_surface)
-    registry.restart_surface_sets_and_evidence(second_surface)
-    for surface in (first_surface, second_surface):
-        surface.status.may_be_sole_fault, surface.status.can_be_at_fault_basis = 0, verdict.DEDUCED_FAULTY
-        mark_observations_not_anomalous(surface)
+    srf1 = types.surface[types.pair.first_pitch]
+    srf2 = types.surface[layout.partner[types.pair.first_pitch]]
+    srf1.sets.low[:] = srf1.first_sets.low
+    srf1.sets.high[:] = srf1.first_sets.high
+    srf1.sets.excluded[:] = srf1.first_sets.excluded
+    registry.restart_surface(srf2)
+    for srf in (srf1, srf2):
+        srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
+        forget_anomalies(srf)
 
 
 @kernel
-def varying_types_can_be_dismissed(config, surface):
+def dismiss_varying(c, srf):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    command_independent_type_may_imitate = verdict.can_be_another_type(
-        surface, verdict.sole_constant_type_or_undecided(surface), False
-    )
-    varying_type_may_imitate = (
-        command_independent_type_may_imitate or verdict.short_anomaly_may_be_rest_hidden_type(config, surface)
-    )
-    anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
-    return (
-        anomaly_spans_half_cycle
-        and verdict.types_would_have_shown(config, surface)
-        and not varying_type_may_imitate
-    )
+    imitated = verdict.can_be_another(srf, verdict.sole(srf, CONSTANT), False)
+    doubt = imitated or verdict.may_be_hidden(c, srf)
+    long_enough = srf.evidence.n_anomalous >= c.half_frames
+    return long_enough and verdict.would_have_shown(c, srf) and not doubt
 
 
 @kernel
-def detect_and_begin_second_pitch_fault(types, layout):
+def detect_second(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
-    if (
-        types.pair.first_pitch_fault_surface == NO_SURFACE
-        or layout.partner[types.pair.first_pitch_fault_surface] < 0
-    ):
+    if types.pair.first_pitch == NO_SURFACE or layout.partner[types.pair.first_pitch] < 0:
         return False
-    first_surface = types.surface[types.pair.first_pitch_fault_surface]
-    if first_surface.status.may_be_sole_fault and not (
-        estimator_or_deduction_allows_fault(first_surface)
-        and any_constant_parameter_type_remains(first_surface)
-    ):
-        begin_second_pitch_fault(types, layout)
-    return not first_surface.status.may_be_sole_fault
+    srf1 = types.surface[types.pair.first_pitch]
+    if srf1.status.may_be_sole and not (can_be_faulty(srf1) and constant_remains(srf1)):
+        begin_second(types, layout)
+    return not srf1.status.may_be_sole
 
 
 @kernel
-def pitch_type_unless_mode_gives_up(config, surface):
-    """The type of the one fault of pitch, or -1 while it is open.
-
-    A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
-    """
-    fault_type = verdict.fault_type_on_surface(config, surface)
-    return (
-        verdict.TYPE_UNDECIDED
-        if fault_type >= 0 and ACCOMMODATION_MODE_BY_TYPE[fault_type] == GIVE_UP
-        else fault_type
-    )
-
-
-@kernel
-def decide_pitch_isolation(types, layout, t):
+def isolate_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if detect_and_begin_second_pitch_fault(types, layout):
-        first_surface = types.surface[types.pair.first_pitch_fault_surface]
-        second_surface_index = layout.partner[types.pair.first_pitch_fault_surface]
-        second_surface = types.surface[second_surface_index]
-        second_is_anomalous = second_surface.evidence.n_anomalous_frames > 0
-        second_may_be_at_fault = estimator_or_deduction_allows_fault(
-            second_surface
-        ) and verdict.any_type_remains(second_surface)
-        update_isolation_type_and_times(
-            first_surface,
-            second_may_be_at_fault or not second_is_anomalous,
-            first_surface.status.fault_type,
-            t,
-        )
-        second_shows_fault = (
-            second_is_anomalous
-            and second_may_be_at_fault
-            and verdict.any_type_explains_flight(second_surface)
-        )
-        update_isolation_type_and_times(
-            second_surface, second_shows_fault, verdict.fault_type_on_surface(types.config, second_surface), t
-        )
+    if detect_second(types, layout):
+        srf1 = types.surface[types.pair.first_pitch]
+        s2 = layout.partner[types.pair.first_pitch]
+        srf2 = types.surface[s2]
+        anomalous = srf2.evidence.n_anomalous > 0
+        possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
+        update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
+        shows = anomalous and possible and verdict.explains_flight(srf2)
+        update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
         return
-    sole_surface_index = find_and_store_sole_pitch_fault(types, layout)
-    for surface_index, surface in enumerate(types.surface):
-        if layout.group[surface_index] == PITCH_SURFACE_GROUP:
-            update_isolation_type_and_times(
-                surface,
-                surface_index == sole_surface_index,
-                pitch_type_unless_mode_gives_up(types.config, surface)
-                if surface_index == sole_surface_index
-                else -1,
-                t,
-            )
+    sole = sole_pitch(types, layout)
+    for s, srf in enumerate(types.surface):
+        if layout.group[s] == PITCH_GROUP:
+            kind = verdict.type_on_surface(types.config, srf) if s == sole else -1
+            # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
+            open_yet = kind >= 0 and MODE[kind] == GIVE_UP
+            update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
 
 
 @kernel
-def find_and_store_sole_pitch_fault(types, layout):
+def sole_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = (
-        verdict.find_isolated_surface_or_unanticipated(types, layout)
-        if types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
-        else NO_SURFACE
-    )
-    if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
+    s = verdict.find_surface(types, layout) if types.pair.group_alarm[PITCH_GROUP] else NO_SURFACE
+    if s < 0 or not constant_remains(types.surface[s]):
         return NO_SURFACE
-    if varying_types_can_be_dismissed(types.config, types.surface[s]):
-        update_first_fault_surface_and_sets(types, s)
+    if dismiss_varying(types.config, types.surface[s]):
+        store_first(types, s)
     return s
 
 
 @kernel
-def decide_pair_isolation_and_accommodation(types, previous_conclusion, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_isolation_and_accommodation`: its isolated estimator is of the one named first, the law
-    acts on all. previous_conclusion: that of the frame before."""
-    lateral_fault_outside_class = isolate_lateral_or_find_unanticipated(types, layout, t)
-    decide_pitch_isolation(types, layout, t)
-    first_isolated_surface_index = NO_SURFACE
-    for s, surface in enumerate(types.surface):
-        finding_record = surface.status
-        first_finding_record = types.surface[max(first_isolated_surface_index, 0)].status
-        if finding_record.is_isolated and (
-            first_isolated_surface_index < 0
-            or finding_record.isolated_at_s < first_finding_record.isolated_at_s
-        ):
-            first_isolated_surface_index = s
-    isolated_estimator_index, isolated_at_s, fault_type, type_decided_at_s = (
-        first_fault_estimator_type_and_times(
-            types, previous_conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
-        )
-    )
-    accommodated_surface_index, accommodation_mode = accommodate_isolated_surfaces_and_choose_lead(
-        types, layout
-    )
-    return (
-        isolated_estimator_index,
-        isolated_at_s,
-        fault_type,
-        type_decided_at_s,
-        accommodated_surface_index,
-        accommodation_mode,
-    )
+def decide_pairs(types, past, layout, t):
+    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_decision`: its
+    isolated estimator is of the one named first, the law acts on all.
+    """
+    outside = isolate_lateral(types, layout, t)
+    isolate_pitch(types, layout, t)
+    first = NO_SURFACE
+    for s, srf in enumerate(types.surface):
+        status = srf.status
+        earliest = types.surface[max(first, 0)].status
+        if status.is_isolated and (first < 0 or status.isolated_at_s < earliest.isolated_at_s):
+            first = s
+    estimator, isolated_at_s, kind, typed_at_s = first_finding(types, past, layout, first, outside, t)
+    lead, mode = accommodate_pairs(types, layout)
+    return (estimator, isolated_at_s, kind, typed_at_s, lead, mode)
 
 
 @kernel
-def first_fault_estimator_type_and_times(
-    types, previous_conclusion, layout, s, lateral_fault_outside_class, t
-):
+def first_finding(types, past, layout, s, outside, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
     if s >= 0:
-        finding_record = types.surface[s].status
-        isolated_estimator_index = verdict.estimator_of_fault(layout, s, finding_record.fault_type)
-        return (
-            isolated_estimator_index,
-            finding_record.isolated_at_s,
-            finding_record.fault_type,
-            finding_record.type_decided_at_s,
-        )
-    isolated_estimator_index = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
-    isolated_at_s = (
-        t
-        if isolated_estimator_index != previous_conclusion.isolated_estimator
-        else previous_conclusion.isolated_at_s
-    )
-    return isolated_estimator_index, isolated_at_s, -1, previous_conclusion.type_decided_at_s
+        status = types.surface[s].status
+        estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
+        return (estimator, status.isolated_at_s, status.fault_type, status.typed_at_s)
+    estimator = state.UNANTICIPATED if outside else state.NOT_ISOLATED
+    isolated_at_s = t if estimator != past.isolated_estimator else past.isolated_at_s
+    return estimator, isolated_at_s, -1, past.typed_at_s
 
 
 @kernel
-def any_pitch_surface_is_isolated(types, layout):
+def pitch_isolated(types, layout):
     """Whether a surface of pitch is named."""
-    for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_SURFACE_GROUP and surface.status.is_isolated:
+    for s, srf in enumerate(types.surface):
+        if layout.group[s] == PITCH_GROUP and srf.status.is_isolated:
             return True
     return False
 
 
 @kernel
-def is_isolated_or_likeliest_in_pitch(types, layout, s):
+def acts_on(types, layout, s):
     """Whether the law is to act on surface s: it is isolated, or it is the most likely one in pitch."""
     if types.surface[s].status.is_isolated:
         return True
     if (
-        layout.group[s] != PITCH_SURFACE_GROUP
-        or any_pitch_surface_is_isolated(types, layout)
-        or not types.pair.group_has_alarm[PITCH_SURFACE_GROUP]
+        layout.group[s] != PITCH_GROUP
+        or pitch_isolated(types, layout)
+        or not types.pair.group_alarm[PITCH_GROUP]
     ):
         return False
-    sole_possible_surface_index = verdict.sole_possible_surface(types.surface, True)
-    return s == (sole_possible_surface_index if sole_possible_surface_index >= 0 else layout.main[PITCH])
+    sole = verdict.sole_surface(types.surface, True)
+    return s == (sole if sole >= 0 else layout.main[PITCH])
 
 
 @kernel
-def accommodate_isolated_surfaces_and_choose_lead(types, layout):
+def accommodate_pairs(types, layout):
     """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
     is done about it: a replaced elevator leads before all others."""
-    accommodated_surface_index, accommodation_mode = NO_SURFACE, -1
-    for s, surface in enumerate(types.surface):
-        verdict.set_accommodation_mode(surface, -1)
-        if is_isolated_or_likeliest_in_pitch(types, layout, s):
-            fault_is_possible = surface.status.is_isolated == 1 or estimator_or_deduction_allows_fault(
-                surface
-            )
-            surface_mode = (
-                verdict.choose_accommodation_mode(surface) if fault_is_possible else SUBTRACT_OFFSET
-            )
-            if verdict.update_fault_presence(types.config, surface, surface_mode, fault_is_possible):
-                verdict.set_accommodation_mode(surface, surface_mode)
-                elevator_is_scaled_or_given_up = s == layout.main[PITCH] and surface_mode in (
-                    SCALE_COMMAND,
-                    GIVE_UP,
-                )
-                if accommodated_surface_index == NO_SURFACE or elevator_is_scaled_or_given_up:
-                    accommodated_surface_index, accommodation_mode = s, surface_mode
-    return accommodated_surface_index, accommodation_mode
+    lead, mode = NO_SURFACE, -1
+    for s, srf in enumerate(types.surface):
+        srf.accommodation.mode = -1
+        if acts_on(types, layout, s):
+            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
+            own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
+            if verdict.fault_shows(types.config, srf, own, possible):
+                srf.accommodation.mode = own
+                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
+                if lead == NO_SURFACE or leads:
+                    lead, mode = s, own
+    return lead, mode

@@ -30,23 +30,21 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import PITCH_SURFACE_GROUP
+from beaver_ftc.diagnosis.state import PITCH_GROUP
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
     OBSERVATION_RECORD,
     REST_EXCLUDES_TYPE,
+    REST_HIDES_TYPE,
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
-    fill_last_observation_from_innovation,
-    intersect_set_or_exclude_type,
-    mark_type_excluded,
-    reset_feasible_sets_and_exclusions,
-    set_feasible_set,
-    set_is_anomalous,
-    set_last_position_to_reachable_range,
-    shift_observations,
+    copy_observation,
+    intersect_set,
+    observe_surface,
+    put_set,
+    set_anomalous,
     table,
 )
 from beaver_ftc.scenario.declared import Declared
@@ -54,199 +52,129 @@ from beaver_ftc.scenario.declared import Declared
 BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
 )
-DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S = (
-    pi / 3.0
-)  # of an actuator with no declared rate limit: the aircraft's default
+DEFAULT_SERVO_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
-def _load_ordered_types() -> tuple[FaultType, ...]:
+def _load_types() -> tuple[FaultType, ...]:
     """Those of a constant parameter first, then by rank: a type's number is its place."""
-    module_names = sorted(
-        f"{table.__name__}.{module_info.name}" for module_info in pkgutil.iter_modules(table.__path__)
-    )
-    rows = [row for module_name in module_names for row in import_module(module_name).TYPES]
+    names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
+    rows = [row for name in names for row in import_module(name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.has_constant_parameter, row.sort_rank, row.name)))
 
 
-TYPES = _load_ordered_types()
+TYPES = _load_types()
 N_TYPES = len(TYPES)
-N_CONSTANT_PARAMETER_TYPES = sum(row.has_constant_parameter for row in TYPES)
+N_CONSTANT = sum(row.has_constant_parameter for row in TYPES)
 TYPE_NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
 DESCRIPTIONS_IN_TYPE_ORDER: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
-FIRST_TYPE_WITH_SAME_NAME = tuple(
-    TYPE_NAMES.index(name) for name in TYPE_NAMES
-)  # the first type of the same name
+SAME_NAME = tuple(TYPE_NAMES.index(name) for name in TYPE_NAMES)  # the first type of the same name
 
 
-def _column_of_types(column_name: str) -> np.ndarray:
+def _type_column(name: str) -> np.ndarray:
     """A column of whole numbers or flags of the table, by type."""
-    return np.array([int(getattr(row, column_name)) for row in TYPES])
+    return np.array([int(getattr(row, name)) for row in TYPES])
 
 
-def _kernels_by_type(part_name: str) -> dict[int, Kernel]:
+def _parts_of(name: str) -> dict[int, Kernel]:
     """This part of each type that has it."""
-    part_by_type = {type_index: getattr(row, part_name) for type_index, row in enumerate(TYPES)}
-    return {type_index: part for type_index, part in part_by_type.items() if part is not None}
-
-
-def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
-    return other_type.name in fault_type.can_look_like
+    parts = {h: getattr(row, name) for h, row in enumerate(TYPES)}
+    return {h: part for h, part in parts.items() if part is not None}
 
 
 # The columns that verdict.py reads; `FaultType` says what they are.
-ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, MEANING_OF_REST_BY_TYPE = (
-    _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
+MODE, STOP_SIDE, REST = (
+    _type_column(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
-SHOWS_WITHIN_HALF_CYCLES = _column_of_types("shows_within_half_cycles")
-HALF_CYCLES_BEFORE_ISOLATING_OTHER_SURFACE = _column_of_types("half_cycles_before_isolating_other_surface")
-ERROR_DEPENDS_ON_COMMAND = _column_of_types("error_depends_on_command")
-MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
-CAN_LOOK_LIKE = np.array(
-    [[_can_look_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]
+SHOW_HALF_CYCLES = _type_column("show_half_cycles")
+WAIT_HALF_CYCLES = _type_column("wait_half_cycles")
+FOLLOWS_COMMAND = _type_column("follows_command")
+MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
+CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] for row in TYPES])
+SERVES = np.array(
+    [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
 )
-MODE_SERVES_TYPE = np.array(
-    [
-        [
-            accommodation_mode == row.accommodation_mode
-            or accommodation_mode in row.other_accommodation_modes
-            for row in TYPES
-        ]
-        for accommodation_mode in range(4)
-    ]
-)
+# Masks of types (N_TYPES,): all, those of a constant parameter, others; of these, those that must show
+# themselves and those that need not; those of one mode, and those that can look like one type.
+ALL, CONSTANT = np.ones(N_TYPES, bool), np.arange(N_TYPES) < N_CONSTANT
+VARYING = ~CONSTANT
+VARYING_SHOWN, VARYING_QUIET = VARYING & MUST_SHOW, VARYING & ~MUST_SHOW
+VARYING_OF_MODE = VARYING & (np.arange(4)[:, None] == MODE)
+VARYING_LIKE = VARYING & CAN_LOOK_LIKE.T
+HIDDEN_AT_REST = REST == REST_HIDES_TYPE
+# The same of one name, by the first type of it; of any name, by TYPE_UNDECIDED (-1)
+NAMED = np.array([*(np.array(SAME_NAME) == h for h in range(N_TYPES)), ALL])
 # Types that give the deflection error of a surface, in the order in which they are used.
-DEFLECTION_ERROR_TYPES_BY_PRECEDENCE = np.array(
-    sorted(
-        _kernels_by_type("deflection_error"),
-        key=lambda type_index: TYPES[type_index].deflection_error_precedence,
-    ),
-    dtype=int,
+ERROR_TYPES = np.array(
+    sorted(_parts_of("deflection_error"), key=lambda h: TYPES[h].deflection_error_precedence), dtype=int
 )
-TYPE_INDEX_AT_END_OF_RANGE = np.array(
-    [
-        TYPE_NAMES.index(row.type_name_at_end_of_range) if row.type_name_at_end_of_range else -1
-        for row in TYPES
-    ]
-)
+END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
 
 def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direction: int = 0) -> int:
     """The number of a type, by its name in the table; stop_direction: of the stop to which it runs."""
-    sought_type_attributes = (name, has_constant_parameter, stop_direction)
-    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(
-        sought_type_attributes
-    )
+    sought = (name, has_constant_parameter, stop_direction)
+    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _compile_kernel(
-    name: str, argument_list: str, body_lines: list[str], namespace: dict[str, Any]
-) -> Kernel:
-    """A kernel whose body is `body_lines`, in which `part_3` is a part of type 3.
+def _write_kernel(name: str, arguments: str, given: str, line: str, last: str, **names: Any) -> Kernel:
+    """A kernel of these arguments with a line for each type that has the part `name`, {call} in it.
 
-    Compiled code calls only what it can name, so the calls are written out, one a type.
+    Compiled code calls only what it can name, so the calls are written out: part_3(srf, 3) is that of type 3,
+    for a part that is given srf and h.
     """
-    source_code = "\n    ".join([f"def {name}({argument_list}):", *body_lines])
-    exec(compile(source_code, __file__, "exec"), namespace)
-    return kernel(namespace[name])
+    parts = _parts_of(name)
+    calls = {h: ", ".join(str(h) if each == "h" else each for each in given.split(", ")) for h in parts}
+    lines = [line.format(h=h, call=f"part_{h}({call})") for h, call in calls.items()]
+    names |= {"__name__": __name__, **{f"part_{h}": part for h, part in parts.items()}}
+    source = "\n    ".join([f"def {name}_of_types({arguments}):", *lines, last])
+    exec(compile(source, __file__, "exec"), names)
+    return kernel(names[f"{name}_of_types"])
 
 
-def _call_expression(type_index: int, argument_list: str) -> str:
-    """The call of a part of type `type_index`; the argument of that name is its number."""
-    call_arguments = (
-        str(type_index) if argument == "type_index" else argument for argument in argument_list.split(", ")
-    )
-    return f"part_{type_index}({', '.join(call_arguments)})"
+def _call_each(name: str, given: str, result: Kernel | None = None) -> Kernel:
+    """A kernel that calls this part of every type, and result(srf, h, interval) with what that returns."""
+    arguments = ", ".join(each for each in given.split(", ") if each != "h")
+    line = "result(srf, {h}, {call})" if result else "{call}"
+    return _write_kernel(name, arguments, given, line, "return", result=result)
 
 
-def _kernel_namespace(part_kernels: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
-    """The names that a kernel which calls these parts needs."""
-    return {
-        "__name__": __name__,
-        **{f"part_{type_index}": part for type_index, part in part_kernels.items()},
-        **other_names,
-    }
+def _call_one(name: str, given: str, default: Any) -> Kernel:
+    """A kernel that returns what this part of type h returns; `default` for a type without it."""
+    arguments = given if "h" in given.split(", ") else f"{given}, h"
+    line = "if h == {h}: return {call}"
+    return _write_kernel(name, arguments, given, line, "return default", default=default)
 
 
-def _kernel_calling_each_type(
-    part_name: str, argument_list: str, result_kernel: Kernel | None = None
-) -> Kernel:
-    """A kernel that calls this part of every type; result_kernel(surface, type_index, interval): called with
-    what that returns."""
-    part_kernels = _kernels_by_type(part_name)
-    parameter_list = ", ".join(argument for argument in argument_list.split(", ") if argument != "type_index")
-    call_expressions = {
-        type_index: _call_expression(type_index, argument_list) for type_index in part_kernels
-    }
-    body_lines = [
-        f"result_kernel(surface, {type_index}, {call_expression})" if result_kernel else call_expression
-        for type_index, call_expression in call_expressions.items()
-    ]
-    return _compile_kernel(
-        f"{part_name}_each",
-        parameter_list,
-        [*body_lines, "return"],
-        _kernel_namespace(part_kernels, result_kernel=result_kernel),
-    )
+reset_memory_each = _call_each("reset_memory", "srf, h")
+parameter_range_each = _call_each("parameter_range", "srf", put_set)
+before_judging_frame_each = _call_each("before_judging_frame", "c, srf, h")
+on_skipped_frame_each = _call_each("on_skipped_frame", "c, srf, h, k")
+consistent_each = _call_each("consistent_interval", "c, srf, h, k", intersect_set)
+on_possible_release_each = _call_each("on_possible_release", "c, srf, h, k")
+set_after_each = _call_each("set_after_frame", "srf, h", put_set)
+propagate_release_each = _call_each("propagate_release", "c, srf, h")
+has_shown = _call_one("has_shown", "srf", True)
+motion_rules_out = _call_one("motion_rules_out", "srf, stop", False)
+possible_deflection_range = _call_one("possible_deflection_range", "c, srf, h, k", EMPTY_SET)
+error_of_type = _call_one("deflection_error", "srf, h", np.nan)
 
-
-def _kernel_calling_one_type(part_name: str, argument_list: str, default_result: Any) -> Kernel:
-    """A kernel that returns what this part of the type `type_index` returns; `default_result` for
-    a type without it."""
-    part_kernels = _kernels_by_type(part_name)
-    body_lines = [
-        f"if type_index == {type_index}: return {_call_expression(type_index, argument_list)}"
-        for type_index in part_kernels
-    ]
-    parameter_list = (
-        argument_list if "type_index" in argument_list.split(", ") else f"{argument_list}, type_index"
-    )
-    return _compile_kernel(
-        f"{part_name}_of",
-        parameter_list,
-        [*body_lines, "return default"],
-        _kernel_namespace(part_kernels, default=default_result),
-    )
-
-
-_FRAME_KERNEL_ARGUMENTS = "config, surface, type_index, k"
-reset_memory_each = _kernel_calling_each_type("reset_memory", "surface, type_index")
-set_parameter_range_each = _kernel_calling_each_type("parameter_range", "surface", set_feasible_set)
-before_judging_frame_each = _kernel_calling_each_type("before_judging_frame", "config, surface, type_index")
-on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_KERNEL_ARGUMENTS)
-intersect_consistent_interval_each = _kernel_calling_each_type(
-    "consistent_interval", _FRAME_KERNEL_ARGUMENTS, intersect_set_or_exclude_type
-)
-on_possible_release_each = _kernel_calling_each_type("on_possible_release", _FRAME_KERNEL_ARGUMENTS)
-set_feasible_set_after_frame_each = _kernel_calling_each_type(
-    "feasible_set_after_frame", "surface, type_index", set_feasible_set
-)
-propagate_release_each = _kernel_calling_each_type("propagate_release", "config, surface, type_index")
-has_shown = _kernel_calling_one_type("has_shown", "surface", True)
-motion_rules_out = _kernel_calling_one_type("motion_rules_out", "surface, stop_direction", False)
-possible_deflection_range = _kernel_calling_one_type(
-    "possible_deflection_range", _FRAME_KERNEL_ARGUMENTS, EMPTY_SET
-)
-deflection_error_under_type = _kernel_calling_one_type("deflection_error", "surface, type_index", np.nan)
-
-MAX_FRAMES_PER_BLOCK = 256  # frames of a block
-N_COMMAND_BLOCKS_KEPT = (
-    3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
-)
+MAX_BLOCK = 256  # frames of a block
+N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
 # Commands to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
 COMMANDS_RECORD = record(
-    command_history=(N_COMMAND_BLOCKS_KEPT, MAX_FRAMES_PER_BLOCK), min_command=N_COMMAND_BLOCKS_KEPT,
-    max_command=N_COMMAND_BLOCKS_KEPT,
-    min_healthy_position=2, max_healthy_position=2,  # where a healthy surface was within it
+    history=(N_KEPT, MAX_BLOCK), cmd_min=N_KEPT,
+    cmd_max=N_KEPT,
+    u_min=2, u_max=2,  # where a healthy surface was within it
     # G of the surface within the elapsed frame or block, on its dominant axis, rad/s2 per rad
-    min_acceleration_per_rad=float, max_acceleration_per_rad=float,
+    G_min=float, G_max=float,
 )  # fmt: skip
 
 # Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
 # to zero.
 ACTUATOR_CONFIG_RECORD = record(
-    travel_low=float, travel_high=float, reachable_low=float, reachable_high=float, min_runaway_rate=float,
-    approach_share_per_substep=float, max_motion_per_substep=float, min_rate_limited_motion_per_substep=float,
+    stop_lo=float, stop_hi=float, reach_lo=float, reach_hi=float, runaway=float,
+    approach_share=float, step=float, slow_step=float,
 )  # fmt: skip
 
 # The set of each type's parameter: types/__init__.py.
@@ -255,391 +183,265 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 # Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
 # rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
 # was in it, rad.
-ANOMALOUS_FRAME_EVIDENCE_RECORD = record(
-    n_anomalous_frames=int,
-    n_rest_frames=int,
-    n_anomalous_frames_since_stop_could_hide=int,
-    first_anomalous_frame=int,
-    first_anomalous_position_low=float,
-    first_anomalous_position_high=float,
+EVIDENCE_RECORD = record(
+    n_anomalous=int, n_rest=int, n_unhidden=int, k_first=int, first_lo=float, first_hi=float
 )
 
 # Whether the surface may be the only one at fault; what decides whether it can be at fault:
-# ESTIMATOR_DECIDES_POSSIBLE_FAULT, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
+# BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
-SURFACE_FINDING_RECORD = record(
-    may_be_sole_fault=int,
-    can_be_at_fault_basis=int,
-    is_isolated=int,
-    isolated_at_s=float,
-    fault_type=int,
-    type_decided_at_s=float,
+STATUS_RECORD = record(
+    may_be_sole=int, basis=int, is_isolated=int, isolated_at_s=float, fault_type=int, typed_at_s=float
 )
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
-ACCOMMODATION_RECORD = record(mode=int, n_frames_without_sign_of_fault=int)
+ACCOMMODATION_RECORD = record(mode=int, n_silent=int)
 
 # Where a surface can be that a type has held and released, rad: table/held_surface.py.
-POSSIBLE_RELEASES_BY_TYPE_RECORD = record(
-    return_position_low=(2, N_TYPES), return_position_high=(2, N_TYPES), has_released=(int, N_TYPES),
-    held_position_min=N_TYPES, held_position_max=N_TYPES,  # where it is held by then
+RELEASE_RECORD = record(
+    back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES),
+    held_lo=N_TYPES, held_hi=N_TYPES,  # where it is held by then
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
-FIRST_PITCH_FAULT_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+FIRST_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
 TYPES_CONFIG_RECORD = record(
-    frame_shows_single_instant=int, n_substeps=int, released_surface_returns_via_actuator=int,
-    slowest_half_cycle_frames=int,
-    abrupt=int,
-    has_surface_term_errors=int, frames_per_block=int, block_duration_s=float,
-    dt=float,
+    single_instant=int, n_substeps=int, returns_lagged=int, half_frames=int, abrupt=int, has_eG=int,
+    frames_per_block=int, block_duration_s=float, dt=float,
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-# n_frames_since_unstored_exclusion: frames since a type was excluded on its surface that is not yet excluded
-# in the stored sets.
+# n_unstored: frames since a type was excluded on its surface that is not yet excluded in the stored sets.
 FAULT_PAIR_RECORD = record(
-    enabled=int,
-    group_has_alarm=(int, 2),
-    lateral_fault_outside_class=int,
-    first_pitch_fault_surface=int,
-    n_frames_since_unstored_exclusion=int,
+    enabled=int, group_alarm=(int, 2), lateral_outside=int, first_pitch=int, n_unstored=int
 )
 
 # Blocks of frames.
-FRAME_BLOCK_RECORD = record(
-    n_frames_so_far=int, mean_innovation=3, mean_innovation_bound=3, changing_gyro_error_bound_at_start=3
-)
+FRAME_BLOCK_RECORD = record(n_so_far=int, nu=3, nu_bound=3, n_start=3)
 
 
 @lru_cache
 def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
-    what is concluded. position_estimator_excluded: as verdict.py keeps it."""
-    memory_dtype_by_name = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
+    what is concluded. not_at_position: as verdict.py keeps it."""
+    memories = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
-        actuator=ACTUATOR_CONFIG_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
-        judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
-        evidence=ANOMALOUS_FRAME_EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD,
-        release=POSSIBLE_RELEASES_BY_TYPE_RECORD,
-        **memory_dtype_by_name,
-        position_estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
-        first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
+        actuator=ACTUATOR_CONFIG_RECORD, commands=COMMANDS_RECORD, last=OBSERVATION_RECORD,
+        judged=OBSERVATION_RECORD, earlier=OBSERVATION_RECORD,
+        evidence=EVIDENCE_RECORD, sets=FEASIBLE_SETS_RECORD,
+        release=RELEASE_RECORD,
+        **memories,
+        not_at_position=int, status=STATUS_RECORD, accommodation=ACCOMMODATION_RECORD,
+        first_sets=FIRST_SETS_RECORD,
     )  # fmt: skip
 
 
 @sized
-def fault_types_dtype(n_surfaces: int) -> np.dtype:
+def fault_types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
     return record(
         config=TYPES_CONFIG_RECORD,
         frame_index=int,
         pair=FAULT_PAIR_RECORD,
         block=FRAME_BLOCK_RECORD,
-        surface=(surface_types_dtype(), n_surfaces),
+        surface=(surface_types_dtype(), n),
     )
 
 
-def configure_fault_types(
-    types: np.void,
-    layout: np.void,
-    prediction_actuators: np.void,
-    declared: Declared,
-    travel_low_and_high: np.ndarray,
+def configure_types(
+    types: np.void, layout: np.void, servos: np.void, declared: Declared, travel: np.ndarray
 ) -> None:
-    """Fill the configuration of the types and the actuator of each surface; travel_low_and_high (2, n): the
-    stops, rad."""
-    config, types_config, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
-    types_config["frames_per_block"] = frames_per_block = (
+    """Fill the configuration of the types and the actuator of each surface; travel (2, n): the stops, rad."""
+    fdi, c, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
+    c["frames_per_block"] = n_block = (
         ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     )
-    types_config["frame_shows_single_instant"] = declared.substeps == 1 and frames_per_block == 1
-    types_config["block_duration_s"] = frames_per_block * dt
-    half_cycle_frames = pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
-    types_config["slowest_half_cycle_frames"] = ceil(min(half_cycle_frames, 1e9))  # longer than any flight
-    types_config["n_substeps"], types_config["released_surface_returns_via_actuator"], types_config["dt"] = (
-        declared.substeps,
-        prediction_actuators["real"],
-        dt,
-    )
-    types_config["abrupt"] = config.fault_profile == "abrupt"
-    types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
-    surface_names, substep_s = declared.aircraft.surfaces, dt / declared.substeps
-    for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
-        zip(surface_names, types["surface"], *travel_low_and_high, strict=True)
-    ):
-        rate_limit_deg_s = getattr(declared.servos, surface_name).rate_limit_deg_s
-        actuator_record = surface_record["actuator"]
-        actuator_record["travel_low"], actuator_record["travel_high"] = travel_low, travel_high
-        actuator_record["reachable_low"], actuator_record["reachable_high"] = (
-            min(travel_low, 0.0),
-            max(travel_high, 0.0),
-        )
-        actuator_record["approach_share_per_substep"], actuator_record["max_motion_per_substep"] = (
-            prediction_actuators["approach"][s],
-            prediction_actuators["step"][s],
-        )
-        actuator_record["min_runaway_rate"] = 0.5 * (
-            radians(rate_limit_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S
-        )
-        actuator_record["min_rate_limited_motion_per_substep"] = min(
-            radians(config.slowest_rate_deg_s) * substep_s, actuator_record["max_motion_per_substep"]
-        )
-        surface_record["status"]["may_be_sole_fault"] = (
-            not config.pairs or layout["group"][s] == PITCH_SURFACE_GROUP
-        )
-        surface_record["accommodation"]["mode"] = surface_record["status"]["fault_type"] = -1
+    c["single_instant"] = declared.substeps == 1 and n_block == 1
+    c["block_duration_s"] = n_block * dt
+    half = pi / fdi.slowest_oscillation_rad_s / (n_block * dt)
+    c["half_frames"] = ceil(min(half, 1e9))  # longer than any flight
+    c["n_substeps"], c["returns_lagged"], c["dt"] = (declared.substeps, servos["real"], dt)
+    c["abrupt"] = fdi.fault_profile == "abrupt"
+    types["pair"]["first_pitch"], types["pair"]["enabled"] = -1, fdi.pairs
+    names, h = declared.aircraft.surfaces, dt / declared.substeps
+    for s, (name, srf, lo, hi) in enumerate(zip(names, types["surface"], *travel, strict=True)):
+        rate_deg_s = getattr(declared.servos, name).rate_limit_deg_s
+        act = srf["actuator"]
+        act["stop_lo"], act["stop_hi"] = lo, hi
+        act["reach_lo"], act["reach_hi"] = (min(lo, 0.0), max(hi, 0.0))
+        act["approach_share"], act["step"] = (servos["approach"][s], servos["step"][s])
+        act["runaway"] = 0.5 * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
+        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["step"])
+        srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
+        srf["accommodation"]["mode"] = srf["status"]["fault_type"] = -1
 
 
 @kernel
-def restart_fault_types(types):
+def restart_types(types):
     """Nothing is known of any surface yet."""
-    for surface in types.surface:
-        restart_surface_sets_and_evidence(surface)
+    for srf in types.surface:
+        restart_surface(srf)
 
 
 @kernel
-def restart_surface_sets_and_evidence(surface):
+def restart_surface(srf):
     """Nothing is known of this surface yet."""
-    reset_feasible_sets_and_exclusions(surface)
-    set_parameter_range_each(surface)
-    set_last_position_to_reachable_range(surface)
-    surface.evidence.first_anomalous_frame = -1
-    surface.evidence.n_anomalous_frames = surface.evidence.n_rest_frames = (
-        surface.evidence.n_anomalous_frames_since_stop_could_hide
-    ) = 0
-    reset_memory_each(surface)
+    srf.sets.low[:] = -np.inf
+    srf.sets.high[:] = np.inf
+    srf.sets.excluded[:] = 0
+    parameter_range_each(srf)
+    srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
+    srf.evidence.k_first = -1
+    srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
+    reset_memory_each(srf)
 
 
 @kernel
-def record_commands(types, commanded_rad, effectiveness_and_position_extremes):
-    """Add a frame to the commands of the surfaces: commanded_rad (n,); positions of healthy surfaces and
-    their least and greatest effectiveness within it: effectiveness_and_position_extremes, of a
-    `model_prediction.frame_means_dtype`.
+def record_commands(types, u, ext):
+    """Add a frame to the commands u (n,) of the surfaces; ext: extremes, within it, of where healthy
+    surfaces were and of G, of a `model_prediction.frame_means_dtype`.
     """
-    frames_per_block = types.config.frames_per_block
-    for s, surface in enumerate(types.surface):
-        command_record = surface.commands
-        if types.block.n_frames_so_far == 0:
-            for blocks_ago in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
-                command_record.command_history[blocks_ago, :frames_per_block] = (
-                    command_record.command_history[blocks_ago - 1, :frames_per_block]
-                )
-                command_record.min_command[blocks_ago], command_record.max_command[blocks_ago] = (
-                    command_record.min_command[blocks_ago - 1],
-                    command_record.max_command[blocks_ago - 1],
-                )
-            command_record.min_command[0], command_record.max_command[0] = np.inf, -np.inf
-            command_record.min_healthy_position[1], command_record.max_healthy_position[1] = (
-                command_record.min_healthy_position[0],
-                command_record.max_healthy_position[0],
-            )
-            command_record.min_healthy_position[0], command_record.max_healthy_position[0] = np.inf, -np.inf
-            command_record.min_acceleration_per_rad, command_record.max_acceleration_per_rad = np.inf, -np.inf
-        limited_command = min(
-            max(commanded_rad[s], surface.actuator.travel_low), surface.actuator.travel_high
-        )
-        command_record.command_history[0, types.block.n_frames_so_far] = limited_command
-        command_record.min_command[0], command_record.max_command[0] = (
-            min(command_record.min_command[0], limited_command),
-            max(command_record.max_command[0], limited_command),
-        )
-        command_record.min_healthy_position[0] = min(
-            command_record.min_healthy_position[0], effectiveness_and_position_extremes.u_min[s]
-        )
-        command_record.max_healthy_position[0] = max(
-            command_record.max_healthy_position[0], effectiveness_and_position_extremes.u_max[s]
-        )
-        command_record.min_acceleration_per_rad = min(
-            command_record.min_acceleration_per_rad, effectiveness_and_position_extremes.G_min[s]
-        )
-        command_record.max_acceleration_per_rad = max(
-            command_record.max_acceleration_per_rad, effectiveness_and_position_extremes.G_max[s]
-        )
+    n = types.config.frames_per_block
+    for s, srf in enumerate(types.surface):
+        cmd = srf.commands
+        if types.block.n_so_far == 0:
+            for b in range(N_KEPT - 1, 0, -1):
+                cmd.history[b, :n] = cmd.history[b - 1, :n]
+                cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
+            cmd.cmd_min[0], cmd.cmd_max[0] = np.inf, -np.inf
+            cmd.u_min[1], cmd.u_max[1] = (cmd.u_min[0], cmd.u_max[0])
+            cmd.u_min[0], cmd.u_max[0] = np.inf, -np.inf
+            cmd.G_min, cmd.G_max = np.inf, -np.inf
+        p = min(max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi)
+        cmd.history[0, types.block.n_so_far] = p
+        cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
+        cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
+        cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
+        cmd.G_min = min(cmd.G_min, ext.G_min[s])
+        cmd.G_max = max(cmd.G_max, ext.G_max[s])
 
 
 @kernel
-def shift_observations_and_infer_positions(
-    types, layout, estimators, innovation_by_axis, innovation_bound_by_axis
-):
-    """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
-
-    innovation_bound_by_axis (3,): on innovation_by_axis (3,) without a fault, rad/s2.
-    """
-    innovation_exceeds_uncertainty = not isolation.uncertainty_explains_innovation(
-        innovation_by_axis, innovation_bound_by_axis
-    )
-    for s, surface in enumerate(types.surface):
-        shift_observations(surface)
-        set_is_anomalous(surface, innovation_exceeds_uncertainty)
-        fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        mean_effect_record = (
-            fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
-        )
-        fill_last_observation_from_innovation(
-            types.config, surface, fie, axis, innovation_by_axis, innovation_bound_by_axis, mean_effect_record
-        )
+def observe_surfaces(types, layout, est, nu, nu_max):
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
+    anomalous = not isolation.eta_explains(nu, nu_max)
+    for s, srf in enumerate(types.surface):
+        copy_observation(srf.earlier, srf.judged)
+        copy_observation(srf.judged, srf.last)
+        set_anomalous(srf, anomalous)
+        fie, axis = est[layout.position[s]], layout.dominant_axis[s]
+        eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
+        observe_surface(types.config, srf, fie, axis, nu, nu_max, eff)
 
 
 @kernel
-def increment_anomalous_frame_counts(surface):
-    """Count a frame as evidence, and as evidence since a stop could last hide a swing
-    (`judge_previous_and_advance_frame`)."""
-    surface.evidence.n_anomalous_frames += 1
-    surface.evidence.n_anomalous_frames_since_stop_could_hide += 1
+def count_anomaly(srf):
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
+    srf.evidence.n_anomalous += 1
+    srf.evidence.n_unhidden += 1
 
 
 @kernel
-def store_first_anomaly_and_narrow_sets(config, surface, k):
+def judge_types(c, srf, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    anomaly_evidence, judged_observation = surface.evidence, surface.judged_observation
-    if judged_observation.position_low > judged_observation.position_high:
+    ev, now = srf.evidence, srf.judged
+    if now.lo > now.hi:
         return
-    if anomaly_evidence.first_anomalous_frame < 0:
-        (
-            anomaly_evidence.first_anomalous_frame,
-            anomaly_evidence.first_anomalous_position_low,
-            anomaly_evidence.first_anomalous_position_high,
-        ) = (
-            k,
-            judged_observation.position_low,
-            judged_observation.position_high,
-        )
-    intersect_consistent_interval_each(config, surface, k)
+    if ev.k_first < 0:
+        (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
+    consistent_each(c, srf, k)
 
 
 @kernel
-def judge_previous_and_advance_frame(types):
+def judge_frame(types):
     """Judge the frame before the elapsed one."""
-    config, k = types.config, types.frame_index - 1
-    for s, surface in enumerate(types.surface):
-        before_judging_frame_each(config, surface)
-        if config.released_surface_returns_via_actuator and types.frame_index > 0:
-            on_possible_release_each(config, surface, k)
-        if (
-            config.abrupt
-            and surface.accommodation.mode == GIVE_UP
-            and not surface.judged_observation.is_anomalous
-        ):
-            count_rest_evidence_and_exclude_types(types, s)
-        elif surface.judged_observation.is_anomalous and (
-            config.frame_shows_single_instant
-            or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
-        ):
-            increment_anomalous_frame_counts(surface)
-            store_first_anomaly_and_narrow_sets(config, surface, k)
+    c, k = types.config, types.frame_index - 1
+    for s, srf in enumerate(types.surface):
+        before_judging_frame_each(c, srf)
+        if c.returns_lagged and types.frame_index > 0:
+            on_possible_release_each(c, srf, k)
+        if c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous:
+            count_rest(types, s)
+        elif srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous)):
+            count_anomaly(srf)
+            judge_types(c, srf, k)
         else:
-            on_skipped_frame_each(config, surface, k)
-        if config.released_surface_returns_via_actuator and types.frame_index > 0:
-            set_feasible_set_after_frame_each(surface)
-            propagate_release_each(config, surface)
-        if (
-            surface.judged_observation.stop_can_hide_deflection[0]
-            or surface.judged_observation.stop_can_hide_deflection[1]
-        ):
-            surface.evidence.n_anomalous_frames_since_stop_could_hide = 0
+            on_skipped_frame_each(c, srf, k)
+        if c.returns_lagged and types.frame_index > 0:
+            set_after_each(srf)
+            propagate_release_each(c, srf)
+        if srf.judged.hides[0] or srf.judged.hides[1]:
+            srf.evidence.n_unhidden = 0
     types.frame_index += 1
 
 
 @kernel
-def observe_frame_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record):
+def observe_frame(types, layout, est, nu, bound):
     """Observe the elapsed frame, or the block that it completes, and judge the one before."""
     if types.config.frames_per_block > 1:
-        advance_block_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record)
+        extend_block(types, layout, est, nu, bound)
         return
-    shift_observations_and_infer_positions(
-        types, layout, estimators, innovation_by_axis, bound_record.frame_innovation_bound
-    )
-    judge_previous_and_advance_frame(types)
+    observe_surfaces(types, layout, est, nu, bound.nu_max)
+    judge_frame(types)
 
 
 @kernel
-def begin_frame_block(types, layout, estimators, changing_gyro_error_bound_before):
-    """Begin a block with the elapsed frame; changing_gyro_error_bound_before (3,) rad/s: as it began."""
-    block = types.block
-    block.mean_innovation[:], block.mean_innovation_bound[:] = 0.0, 0.0
-    block.changing_gyro_error_bound_at_start[:] = changing_gyro_error_bound_before
-    for estimator_index in layout.position_estimator:
-        isolation.clear_mean_effect(estimators[estimator_index].block_mean_effect)
+def extend_block(types, layout, est, nu, bound):
+    """Add the elapsed frame to the means over its block; with the last frame, observe the block and judge
+    the one before:
 
-
-@kernel
-def add_frame_to_block(types, layout, estimators, innovation_by_axis, eta_bar):
-    """Add the elapsed frame to the means over the block."""
-    block, frame_share_of_block = types.block, 1.0 / types.config.frames_per_block
+    nu_bound = mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+    """
+    c, block = types.config, types.block
+    share = 1.0 / c.frames_per_block
+    if block.n_so_far == 0:
+        block.nu[:] = block.nu_bound[:] = 0.0
+        block.n_start[:] = bound.n_old
+    for j in layout.position:
+        if block.n_so_far == 0:
+            isolation.clear_mean_effect(est[j].mean_effect)
+        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share)
+    block.n_so_far += 1
     for i in range(3):
-        block.mean_innovation[i] += frame_share_of_block * innovation_by_axis[i]
-        block.mean_innovation_bound[i] += frame_share_of_block * eta_bar[i]
-    for estimator_index in layout.position_estimator:
-        isolation.add_frame_to_block_mean_effect(
-            estimators[estimator_index].block_mean_effect,
-            estimators[estimator_index].frame_mean_effect,
-            frame_share_of_block,
-        )
+        block.nu[i] += share * nu[i]
+        block.nu_bound[i] += share * bound.eta_bar[i]
+        if block.n_so_far == c.frames_per_block:
+            block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
+    if block.n_so_far == c.frames_per_block:
+        block.n_so_far = 0
+        observe_surfaces(types, layout, est, block.nu, block.nu_bound)
+        judge_frame(types)
 
 
 @kernel
-def advance_block_and_judge_previous(types, layout, estimators, innovation_by_axis, bound_record):
-    """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
-    config, block = types.config, types.block
-    if block.n_frames_so_far == 0:
-        begin_frame_block(types, layout, estimators, bound_record.changing_gyro_error_bound_before)
-    add_frame_to_block(types, layout, estimators, innovation_by_axis, bound_record.eta_bar)
-    block.n_frames_so_far += 1
-    if block.n_frames_so_far < config.frames_per_block:
-        return
-    block.n_frames_so_far = 0
-    for i in range(3):
-        block.mean_innovation_bound[i] += (
-            block.changing_gyro_error_bound_at_start[i] + bound_record.changing_gyro_error_bound[i]
-        ) / config.block_duration_s
-    shift_observations_and_infer_positions(
-        types, layout, estimators, block.mean_innovation, block.mean_innovation_bound
-    )
-    judge_previous_and_advance_frame(types)
-
-
-@kernel
-def count_rest_evidence_and_exclude_types(types, surface_index):
+def count_rest(types, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
     fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
-    surface = types.surface[surface_index]
-    if not judged_position_agrees_with_rest_position(surface):
+    srf = types.surface[s]
+    if not agrees_at_rest(srf):
         return
-    for each_surface_index, each_surface in enumerate(types.surface):
-        if each_surface_index == surface_index or (
-            surface.status.may_be_sole_fault and each_surface.status.may_be_sole_fault
-        ):
-            increment_anomalous_frame_counts(each_surface)
-    surface.evidence.n_rest_frames += 1
-    if (
-        surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
-        and not types.config.has_surface_term_errors
-    ):
-        for type_index in range(N_TYPES):
-            if MEANING_OF_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
-                mark_type_excluded(surface, type_index)
+    for i, other in enumerate(types.surface):
+        if i == s or (srf.status.may_be_sole and other.status.may_be_sole):
+            count_anomaly(other)
+    srf.evidence.n_rest += 1
+    if srf.evidence.n_rest > types.config.half_frames and not types.config.has_eG:
+        for h in range(N_TYPES):
+            if REST[h] == REST_EXCLUDES_TYPE:
+                srf.sets.excluded[h] = 1
 
 
 @kernel
-def judged_position_agrees_with_rest_position(surface):
+def agrees_at_rest(srf):
     """Whether the judged frame agrees with where the surface is known to stand."""
-    for type_index in range(N_TYPES):
-        set_low, set_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
-        judged_position_is_outside_set = (
-            surface.judged_observation.position_low > set_high
-            or surface.judged_observation.position_high < set_low
-        )
-        if (
-            MEANING_OF_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER
-            and judged_position_is_outside_set
-        ):
+    for h in range(N_TYPES):
+        outside = srf.judged.lo > srf.sets.high[h] or srf.judged.hi < srf.sets.low[h]
+        if REST[h] == REST_POSITION_IS_PARAMETER and outside:
             return False
     return True

@@ -29,8 +29,8 @@ def flying(value, ground_m, slow_mps):
     return 0
 
 
-def unlimited(bound, eta_bar, decay, dt):
-    """Stands in for `filters.advance_residual_bound`."""
+def unlimited(e, eta, a, dt, n=0.0):
+    """Stands in for `filters.advance_bound`."""
     return UNLIMITED_RAD_S
 
 
@@ -47,21 +47,21 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the design model, the detection estimator and its bank of filters
     "fdae": {
         "design.model.response": nothing, "loop.frame.effect_of_faults": nothing,
-        "diagnosis.model_prediction.evaluate_bound_and_frame_means": nothing, "loop.frame.diagnose": nothing,
+        "diagnosis.model_prediction.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
     "fies": {
-        "diagnosis.isolation.update_all_fault_effects_and_reach": nothing,
+        "diagnosis.isolation.update_effects": nothing,
         "diagnosis.isolation.advance_estimators": nothing,
         "diagnosis.isolation.start_estimators": nothing,
-        "diagnosis.schemes.adaptive_estimators.start_or_continue_isolation": nothing,
+        "diagnosis.schemes.adaptive_estimators.continue_isolation": nothing,
     },
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {
         "diagnosis.bounds.add_published_bound": nothing,
-        "diagnosis.detection.filters.advance_residual_bound": unlimited,
+        "diagnosis.detection.filters.advance_bound": unlimited,
         "diagnosis.detection.filters.residual_interval": all_residuals,
-        "diagnosis.detection.filters.published_threshold_interval": all_residuals,
+        "diagnosis.detection.filters.published_interval": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
     "network": {

@@ -14,7 +14,7 @@ from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
     BETA_CENTRES_RAD,
-    N_ALPHA_PLUS_BETA_CENTRES,
+    N_BASIS,
 )
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.declared import Declared
@@ -72,8 +72,8 @@ class Estimators:
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
         self.x_hat, self.threshold, self.residual = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.weights = np.zeros((3, N_ALPHA_PLUS_BETA_CENTRES))
-        self.basis = np.zeros(N_ALPHA_PLUS_BETA_CENTRES)
+        self.weights = np.zeros((3, N_BASIS))
+        self.basis = np.zeros(N_BASIS)
         self.detected = False
         self.excluded = np.zeros(3, bool)
         self.fie = np.zeros((3, 3))

@@ -13,10 +13,10 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.informed_test import (
     WhiteningFilter,
-    context_with_measured_gust,
     detection_probability,
-    healthy_surface_positions,
-    unit_term_acceleration,
+    healthy_positions,
+    term_acceleration,
+    with_measured_gust,
 )
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
@@ -42,17 +42,15 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     at_s = scenario.faults[0].at_s
     struck = kept["t_s"] > at_s + 0.5 * context.dt_s
     off_rad = np.where(
-        struck, kept[f"{surface}_effective_rad"] - healthy_surface_positions(context, kept, surface), 0.0
+        struck, kept[f"{surface}_effective_rad"] - healthy_positions(context, kept, surface), 0.0
     )
     own = [term for term in aircraft.moments if term.surface == surface]
-    phi = np.sum([term.value * unit_term_acceleration(aircraft, term, kept, off_rad) for term in own], axis=0)
+    phi = np.sum([term.value * term_acceleration(aircraft, term, kept, off_rad) for term in own], axis=0)
     unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
-    regressors = [
-        unit_term_acceleration(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown
-    ]
+    regressors = [term_acceleration(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
-    d = WhiteningFilter(context).deflection_coefficient_with_unknowns(phi, beside, sigma)
+    d = WhiteningFilter(context).deflection_with_unknowns(phi, beside, sigma)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}
 
@@ -70,8 +68,6 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = context_of(loop.frames, exact, loop.trimmed, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.gust.subtracts_measured_gust:
-        context = context_with_measured_gust(
-            context, np.sqrt(diagnosis.acceleration_variance_from_input_noise)
-        )
+        context = with_measured_gust(context, np.sqrt(diagnosis.acceleration_variance_from_input_noise))
     loop.release()
     return context, coefficients

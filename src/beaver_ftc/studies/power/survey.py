@@ -228,9 +228,7 @@ def deflections(
         return [0.0] * len(within_s)
     place = recording.context.surfaces.index(surface)
     moment = np.array([measured.contribution[:, place] for measured in since])
-    d = WhiteningFilter(VaneGust(recording.context).context).deflection_coefficient_by_frame(
-        -magnitude * moment
-    )
+    d = WhiteningFilter(VaneGust(recording.context).context).deflection_by_frame(-magnitude * moment)
     frames = [round(s / recording.context.dt_s) for s in within_s]
     return [float(d[min(n, len(d)) - 1]) for n in frames]
 

@@ -329,7 +329,7 @@ def test_what_counts_next_to_nothing_moves_no_term(trainer):
 def test_how_unlike_mirrored_engines_pull_is_declared_box_by_box(off, known, monkeypatch):
     """1.3 times the most in a box or one inside, and 1e-7 more, of the yawing moment that thrust does not
     explain; where that is a millionth, the engines are not mirrored, and nothing is declared."""
-    monkeypatch.setattr(fit, "healthy_yawing_moment_per_thrust", lambda aircraft: {"jet": -0.03}[aircraft])
+    monkeypatch.setattr(fit, "yaw_per_thrust", lambda aircraft: {"jet": -0.03}[aircraft])
     thrust = numbers(5, seed=3)
     apart_by = np.array([2e-7, -3e-7, -off, 1e-7, 4e-7])
     alike = SimpleNamespace(

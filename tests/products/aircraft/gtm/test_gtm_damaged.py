@@ -11,8 +11,8 @@ from tools.gtm.envelope import Envelope
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.schema import AircraftFile, DamageSection
 from beaver_ftc.diagnosis.detection.statistical import (
-    MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S,
-    drift_uncertainty_frequency_rad_s,
+    DAMAGE_FREQUENCY_RAD_S,
+    drift_frequency,
 )
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
@@ -107,10 +107,10 @@ def test_only_where_damage_takes_surfaces_is_the_drift_that_of_a_slow_swing():
     for takes in ([], ["rudder"]):
         damage = {"one": DamageSection(property="failures/damage/one", takes=takes)}
         known.append(Aircraft(SPLIT.file.model_copy(update={"damage": damage}), SPLIT.folder))
-    assert [drift_uncertainty_frequency_rad_s(given, of) for of in known] == [
+    assert [drift_frequency(given, of) for of in known] == [
         15.0,
         15.0,
-        MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S,
+        DAMAGE_FREQUENCY_RAD_S,
     ]
 
 

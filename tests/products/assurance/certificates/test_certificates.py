@@ -648,21 +648,21 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
     watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=2, size=0.3)
-    watch["output"]["worst_test_index"], watch["output"]["worst_residual_bound_ratio"] = (
+    watch["output"]["worst_test_index"], watch["output"]["top_ratio"] = (
         TESTS.index("alpha"),
         1.2,
     )
     redundancy, config = watch["redundancy"], watch["redundancy"]["config"]
     test = redundancy["test"][TESTS.index("alpha")]
-    test["filtered_residual"], test["filtered_bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
+    test["r"], test["B"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
     test["residual"] = turned * 0.9
     apart(
         looked=[
             config["sample_time_s"],
             test["bound_per_s"],
             test["bound_per_sample"],
-            test["residual_per_gust_speed_change"],
-            *config["gust_change_bound_mps"],
+            test["gust_gain"],
+            *config["gust_change"],
         ]
     )
     said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
@@ -674,7 +674,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     assert most == pytest.approx(
         config["sample_time_s"] * test["bound_per_s"]
         + test["bound_per_sample"]
-        + test["residual_per_gust_speed_change"] * config["gust_change_bound_mps"][1]
+        + test["gust_gain"] * config["gust_change"][1]
     )
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)
@@ -685,9 +685,9 @@ def test_an_engines_reading_is_held_against_its_command_alone():
     """There is no filter: one look, with the error of the reading itself, and rounding."""
     watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=3, size=0.3)
     number, redundancy = TESTS.index("manifold_pressure"), watch["redundancy"]
-    watch["output"]["worst_test_index"], watch["output"]["worst_residual_bound_ratio"] = number, 1.2
-    redundancy["memory"]["commanded_engine_readings"] = 1800.0, 20.0
-    redundancy["memory"]["reading_error_bound"][SENSORS.index("manifold_pressure")] = 0.4
+    watch["output"]["worst_test_index"], watch["output"]["top_ratio"] = number, 1.2
+    redundancy["memory"]["engine_commands"] = 1800.0, 20.0
+    redundancy["memory"]["reading_bound"][SENSORS.index("manifold_pressure")] = 0.4
     redundancy["test"]["residual"][number] = -0.5
     said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
     assert said["test"] == "manifold_pressure"

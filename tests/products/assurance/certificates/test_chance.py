@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.detection import NOISE_SHARE_OF_ALARM_LEVEL as NOISE
+from beaver_ftc.diagnosis.detection import LEVEL_NOISE_SHARE as NOISE
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS
 from beaver_ftc_assurance.certificates import chance
 from telling import numbers
@@ -138,7 +138,7 @@ def test_many_constants_at_their_worst_are_one():
 
 
 def test_of_two_axes_the_one_that_a_fault_moves_counts_and_both_where_they_go_together():
-    quiet = {name: np.zeros((3, 2, 2)) for name in ("P_xx", "P_xd", "P_dd", "drift_intensity")}
+    quiet = {name: np.zeros((3, 2, 2)) for name in ("P_xx", "P_xd", "P_dd", "Q_d")}
     moved = np.array([[0.0, 0.0], [0.0, 0.1], [0.0, 0.0]])
     assert chance._affected_axes(quiet, moved, 2) == [1]
     for name in quiet:

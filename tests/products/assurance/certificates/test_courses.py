@@ -36,14 +36,14 @@ ACTUATOR = Actuator(
     -1.0,
     1.0,
     min_runaway_rate_rad_s=2.0,
-    min_rate_limited_motion_per_substep_rad=0.025,
-    approach_share_per_substep=0.5,
+    slow_step_rad=0.025,
+    approach_share=0.5,
 )
 CONFIG = FaultTypesConfig(
-    frame_shows_single_instant=True,
+    single_instant=True,
     n_substeps=2,
-    released_surface_returns_via_actuator=False,
-    slowest_half_cycle_blocks=2,
+    returns_lagged=False,
+    half_blocks=2,
     frames_per_block=1,
     block_duration_s=0.05,
     dt_s=0.5,
@@ -265,7 +265,7 @@ def test_what_nothing_shows_excludes_nothing(rule):
 
 
 def test_of_several_instants_a_runaway_is_held_against_the_frame_before():
-    several = CONFIG._replace(frame_shows_single_instant=False)
+    several = CONFIG._replace(single_instant=False)
     assert [*courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
     (found,) = courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
     np.testing.assert_allclose(found.pairs[-1], (0.3, 0.25))
@@ -292,12 +292,12 @@ def tape(travel=(-0.2, 0.7), blocks=1):
 def test_the_checker_defines_every_type_as_its_row_does(kind):
     """It is written apart from the rows; of the types of the package it takes nothing from the log."""
     row, words, travel = TYPES[kind], DESCRIPTIONS_IN_TYPE_ORDER[kind], (-0.2, 0.7)
-    if row.multi_frame_exclusion_test_name:
+    if row.frames_test:
         assert check_certificate.COURSES[words] == (
-            row.multi_frame_exclusion_test_name.replace(" ", "_"),
+            row.frames_test.replace(" ", "_"),
             row.stop_direction,
         )
-        assert row.multi_frame_exclusion_test_name in courses.RULES
+        assert row.frames_test in courses.RULES
     else:
         expected = (
             row.deflection_relation.command_gain,
@@ -306,7 +306,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
         )
         assert check_certificate.RELATIONS[words](*travel) == (
             *expected,
-            *row.deflection_relation.theta_range_for_travel(*travel),
+            *row.deflection_relation.theta_span(*travel),
         )
     assert kinds.type_definition_columns(tape(), "aileron", 1, kind) == {}
 
@@ -314,7 +314,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
 @pytest.mark.parametrize(("course", "direction"), [("runaway", -1), ("growing offset", 0), ("", 0)])
 def test_what_a_type_is_that_the_checker_does_not_define_stands_in_the_log(monkeypatch, course, direction):
     added = dataclasses.replace(
-        TYPES[STUCK], name="creeps", multi_frame_exclusion_test_name=course, stop_direction=direction,
+        TYPES[STUCK], name="creeps", frames_test=course, stop_direction=direction,
         deflection_relation=None
         if course
         else DeflectionRelation(-1.0, True, lambda low, high: (0.5 * low, high)),

@@ -237,9 +237,9 @@ def test_types_come_last_where_all_of_them_are_diagnosed(monkeypatch):
 
 
 ROWS = {  # what is followed over many frames, what a frame says, and what no rule knows
-    0: SimpleNamespace(multi_frame_exclusion_test_name="swing", deflection_relation=None),
-    1: SimpleNamespace(multi_frame_exclusion_test_name="", deflection_relation="relation"),
-    2: SimpleNamespace(multi_frame_exclusion_test_name="", deflection_relation=None),
+    0: SimpleNamespace(frames_test="swing", deflection_relation=None),
+    1: SimpleNamespace(frames_test="", deflection_relation="relation"),
+    2: SimpleNamespace(frames_test="", deflection_relation=None),
 }
 BY_MANY = {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
 
@@ -360,7 +360,7 @@ def test_of_what_may_come_back_or_stay_at_a_stop_nothing_is_certified(
 ):
     row = SimpleNamespace(has_shown=has_shown, on_possible_release=released)
     monkeypatch.setattr(kinds, "TYPES", ("another", row))
-    config = SimpleNamespace(frame_shows_single_instant=single, released_surface_returns_via_actuator=returns)
+    config = SimpleNamespace(single_instant=single, returns_lagged=returns)
     diagnosis = SimpleNamespace(types_config=config)
     flown = SimpleNamespace(alarm=SimpleNamespace(diagnosis=diagnosis))
     assert kinds.reason_not_certified(flown, 1) == because

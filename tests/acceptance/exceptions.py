@@ -75,6 +75,12 @@ TABLE = (
         r"\1 --no-report && \1\2 --no-report && python worst-so-far.py",
     ),
     Exempt(r"python worst-so-far\.py", "reads a search: runs with the replay of its worst flight"),
+    Exempt(
+        r"(beaver-ftc run elevator-partial-loss --figures pdf,svg)",
+        "the scripts after it draw its flight: with them",
+        r"\1 && python closeup.py && python residual.py",
+    ),
+    Exempt(r"python (closeup|residual)\.py", "draws a flight: runs with the command before it"),
     Exempt(r"\. \.venv/bin/activate", "in a checkout, after make demo has made the environment"),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
@@ -87,7 +93,6 @@ TABLE = (
     ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"beaver-ftc run left-wing-tip-lost\.yaml", "flies the GTM, which is made from NASA's data"),
-    Exempt(r"git clone .*", "needs the network"),
     Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",

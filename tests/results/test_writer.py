@@ -153,3 +153,18 @@ def test_result_is_readable_for_whom_the_umask_allows(tmp_path):
     mask = os.umask(0)
     os.umask(mask)
     assert (tmp_path / "case").stat().st_mode & 0o777 == 0o777 & ~mask
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_a_result_with_figures_of_any_format_can_be_replaced(tmp_path, kind):
+    """A PDF has its metadata at its end."""
+    from matplotlib.figure import Figure
+
+    mark = "Software" if kind == "png" else "Creator"
+    for _ in range(2):
+        with result_folder(tmp_path, "case") as folder:
+            (folder / "figures").mkdir()
+            drawn = Figure()
+            drawn.subplots().plot(range(300))
+            drawn.savefig(folder / f"figures/states.{kind}", metadata={mark: "beaver-ftc"})
+    assert (tmp_path / f"case/figures/states.{kind}").stat().st_size > 4096

@@ -14,12 +14,12 @@ from tools.docs.tables.chosen import (
     ORIGINS,
     RATIO_DRAWS,
     TUNED_DRAWS,
+    _constants,
+    _flights,
+    _others,
     _said,
     choices,
-    chosen_constants,
-    chosen_flights,
     draws_of,
-    not_chosen,
     not_chosen_constants,
 )
 
@@ -71,7 +71,7 @@ def test_each_number_of_the_diagnosis_of_logs_was_chosen_or_has_an_origin(file):
 
 
 def test_a_constant_that_was_not_chosen_has_its_value_of_the_code_and_its_origin():
-    rows = not_chosen().splitlines()
+    rows = _others().splitlines()
     assert (
         "| `_RANGE_QUANTILES` | 0.001, 0.999 | judged | one sample in 500 is an outlier | trust.py |" in rows
     )
@@ -127,11 +127,11 @@ def test_no_flight_of_the_reproduction_is_one_that_its_gains_were_chosen_on():
 
 def test_a_row_says_its_constant_its_flights_and_its_results():
     """Under the same number and name in both tables."""
-    head, _, first, *_ = chosen_constants().splitlines()
+    head, _, first, *_ = _constants().splitlines()
     assert head == "| " + " | ".join(CONSTANT_HEAD) + " |"
     assert first.startswith("| 1 | tuned parameters | all values in `grades` |")
-    assert "| 201 to 205, 211 to 216 |" in chosen_flights().splitlines()[2]
-    assert chosen_flights().splitlines()[2].endswith("| 101 to 111, 301 to 312 |")
-    assert len(chosen_constants().splitlines()) == len(chosen_flights().splitlines())
+    assert "| 201 to 205, 211 to 216 |" in _flights().splitlines()[2]
+    assert _flights().splitlines()[2].endswith("| 101 to 111, 301 to 312 |")
+    assert len(_constants().splitlines()) == len(_flights().splitlines())
     assert _said({"drawn_by": "x", "seeds": [3, 1, 2, 9]}) == "1 to 3, 9"
     assert _said({"says": "none"}) == "-"

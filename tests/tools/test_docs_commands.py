@@ -212,8 +212,8 @@ def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read
 
 
 def test_pages_are_named_as_one_likes():
-    (theory,) = pages.chosen(["theory"])
-    assert pages.chosen(["docs/explanation/theory.md", "theory.md"]) == [theory, theory]
+    (found,) = pages.chosen(["detection"])
+    assert pages.chosen(["docs/explanation/detection.md", "detection.md"]) == [found, found]
     assert pages.chosen([])[0].name == "README.md"
-    with pytest.raises(BadInput, match=r"did you mean docs/explanation/theory\.md"):
-        pages.chosen(["docs/explanation/teory.md"])
+    with pytest.raises(BadInput, match=r"did you mean docs/explanation/detection\.md"):
+        pages.chosen(["docs/explanation/detecton.md"])

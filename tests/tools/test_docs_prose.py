@@ -20,7 +20,7 @@ KEEPS = {
 BREAKS = {
     "caption": (f"The travel follows.\n\n{TABLE}", "caption", 3),
     "second table": (f"*Table 1. Travel.*\n\n{TABLE}\n{TABLE}", "caption", 7),
-    "symbol": (r"The angle $\xi_1$ is small.", "symbol", 1),
+    "symbol": (r"The angle $\Lambda_1$ is small.", "symbol", 1),
     "symbol on a line of its own": ("It holds:\n\n$$x\n= \\Xi$$\n", "symbol", 3),
     "verb": ("It moves. Largest error of the worst signal.", "verb", 1),
     "verb in an item": ("- it moves.\n- the largest error of the worst signal.\n", "verb", 2),
@@ -72,3 +72,9 @@ def test_forms_of_a_verb_are_verbs():
         assert prose._is_verb(verb), verb
     for word in ("surface", "error", "fin", "in"):
         assert not prose._is_verb(word), word
+
+
+def test_numbers_of_results_are_printed():
+    text = "It detects 75 % of them. It detects <!--=own 1.share-->75<!--/--> % of them." + NEXT
+    assert [(kind, line) for kind, line, _ in prose.faults("docs/results/page.md", text)] == [("number", 1)]
+    assert list(prose.faults("docs/how-to/page.md", text)) == []

@@ -1,5 +1,7 @@
 """Tables of pages that group rows, or write what several rows share only once."""
 
+from tools.docs import tables
+from tools.docs.cells import cells
 from tools.docs.tables import mechanisms, reproduction
 
 from beaver_ftc.studies.mechanisms.shown import CRITERIA
@@ -51,3 +53,37 @@ def test_a_long_list_of_settings_that_rows_share_is_written_once():
     rows = [line.split(" | ")[-1].rstrip(" |") for line in text.splitlines()[2:5]]
     assert rows == ["list A", "list A", "Kp halved and Ki matched"]
     assert text.splitlines()[-1] == f"*List A:* Kp halved and Ki matched; {'; '.join(names[1:])}."
+
+
+def test_a_table_beside_the_page_has_cells_without_marks(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = "| law | ratio |\n|---|---|\n| [`lqr`](laws.md) | **1.5** |\n| a, b | 2 |\n"
+    assert tables.aside("laws", "Ratios", table) == "- [Ratios](images/tables/laws.csv)"
+    assert (tmp_path / "images/tables/laws.csv").read_text() == 'law,ratio\nlqr,1.5\n"a, b",2\n'
+
+
+PAGE = """\
+*Table 1. Shares.*
+
+|scheme|light: aileron, % (12)||
+|---|---|---|
+|`ours`|**75**|x|
+|both, default|2.5|-|
+
+Text.
+
+*Table 2. Printed.*
+
+<!-- printed: fly -->
+||n|
+|---|---|
+|a|1|
+<!-- /printed -->
+"""
+
+
+def test_prose_can_take_numbers_of_the_tables_of_a_page():
+    found = cells(PAGE)
+    assert found["1"][0] == {"scheme": "ours", "light_aileron": 75, "row": "x"}
+    assert found["1"][1]["light_aileron"] == 2.5
+    assert found["2"] == [{"row": "a", "n": 1}]

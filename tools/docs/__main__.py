@@ -3,6 +3,7 @@
 python -m tools.docs [PAGE ...]    write every cheap block, number and picture again
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
 python -m tools.docs table NAME    print a table; `constants` and `properties` print those
+python -m tools.docs cells PAGE    print the tables of a page as JSON, for numbers in the prose beside them
 python -m tools.docs screens       take the pictures of report and live page again, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
 python -m tools.docs prose         print how often each page breaks a rule of prose.py, as prose.yaml has it
@@ -22,6 +23,7 @@ def main() -> int:
     first = sys.argv[1] if len(sys.argv) > 1 else ""
     printers = {
         "table": _table,
+        "cells": _cells,
         "constants": _constants,
         "properties": _properties,
         "reference": _reference,
@@ -43,7 +45,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tools.docs", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("pages", nargs="*", metavar="PAGE", help="theory, theory.md; all without any")
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help="detection, detection.md; all without any")
     parser.add_argument("--check", action="store_true", help="write nothing, print what differs")
     parser.add_argument("--dear", action="store_true", help="fly what takes long as well")
     parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")
@@ -90,6 +92,13 @@ def _table(name: str = "") -> str:
     from tools.docs.tables import table
 
     return table(name)
+
+
+def _cells(name: str = "") -> str:
+    from tools.docs.cells import cells
+    from tools.docs.pages import chosen
+
+    return json.dumps(cells(chosen([name])[0].read_text(encoding="utf-8")), indent=1)
 
 
 def _constants() -> str:

@@ -33,7 +33,7 @@ def is_generated(text: str) -> bool:
 
 
 def chosen(names: Iterable[str], root: Path = ROOT) -> list[Path]:
-    """The pages of these names (`docs/explanation/theory.md`, `theory.md` or `theory`),
+    """The pages of these names (`docs/explanation/detection.md`, `detection.md` or `detection`),
     all of them without any.
 
     Raises BadInput for a name that no page has.

@@ -58,7 +58,7 @@ How to read the tables:
 - Symbols of the motion: p, q and r are the body rates in rad/s, V is the airspeed in m/s, and rho is the
   density in kg/m3. A name with `dot` is a derivative with respect to time.
 - Symbols of the aircraft: b is the span in m, c is the chord in m, and S is the wing area in m2. Ix, Iy,
-  Iz and Jxz are the [moments of inertia](reference/beaver.md) in kg m2.
+  Iz and Jxz are the [moments of inertia](results/validation.md#data-sheet-of-the-beaver) in kg m2.
 - Symbols of the engine: n is the engine speed in rpm, pz is the manifold pressure in inHg, and P is the shaft
   power in kW.
 - The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to
@@ -76,8 +76,8 @@ values are those of [TM88].
 _EXAMPLE = "aero/coefficient/CX_dfa"
 _NEXT = """## Next
 
-The [data sheet](reference/beaver.md) has mass, travel and trim of the Beaver. [Other
-tools](how-to/other-tools.md) shows how to fly the model in plain JSBSim."""
+The [data sheet](results/validation.md#data-sheet-of-the-beaver) has mass, travel and trim of the Beaver.
+[Other tools](reference/python.md#other-tools) shows how to fly the model in plain JSBSim."""
 
 
 def as_markdown() -> str:

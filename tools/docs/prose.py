@@ -1,5 +1,5 @@
 """How pages are written: tables have captions, symbols are in the nomenclature, sentences have verbs, and a
-page ends with the next step.
+page ends with the next step. On pages of results, a command prints the numbers of prose.
 
 A page that is older than a rule may break it as often as `prose.yaml` says, and no more often.
 """
@@ -11,13 +11,15 @@ from pathlib import Path
 
 import yaml
 
-from tools.docs.marks import Page
+from tools.docs import bare
+from tools.docs.marks import Page, parsed
 from tools.docs.pages import ROOT, Finding, is_generated
 
 ALLOWED = Path(__file__).with_name("prose.yaml")
 VERBS = Path(__file__).with_name("verbs.txt")
 NOMENCLATURE = ROOT / "docs/reference/nomenclature.md"
-CAPTION, SYMBOL, VERB, NEXT = "caption", "symbol", "verb", "next"
+CAPTION, SYMBOL, VERB, NEXT, NUMBER = "caption", "symbol", "verb", "next", "number"
+RESULTS = "docs/results/"
 _HOME = ("README.md", "docs/README.md")  # they are the way to all pages
 _FENCE = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!--.*?-->", re.DOTALL)
@@ -71,16 +73,23 @@ def counts(pages: Sequence[Page]) -> dict[str, dict[str, int]]:
 
 def faults(name: str, text: str) -> Iterator[tuple[str, int, str]]:
     """(rule, line, what is wrong) of a page."""
-    bare = _MARK.sub(_blank, _FENCE.sub(_blank, text))
-    yield from _tables(bare)
-    yield from _symbols(bare)
-    yield from _verbless(bare)
-    if name.startswith("docs/") and name not in _HOME and not _names_a_next_step(bare):
+    bare_text = _MARK.sub(_blank, _FENCE.sub(_blank, text))
+    yield from _tables(bare_text)
+    yield from _symbols(bare_text)
+    yield from _verbless(bare_text)
+    if name.startswith("docs/") and name not in _HOME and not _names_a_next_step(bare_text):
         yield (
             NEXT,
-            bare.count("\n"),
+            bare_text.count("\n"),
             "the page names no next step, allowed: a last section `## Next` with a link",
         )
+    yield from _unprinted(name, text)
+
+
+def _unprinted(name: str, text: str) -> Iterator[tuple[str, int, str]]:
+    """Sentences of a page of results with a number that no command prints."""
+    for line, words in bare.numbers(parsed(text, name)) if name.startswith(RESULTS) else ():
+        yield NUMBER, line, f'a number that no command prints: "{words[:80]}", allowed: a mark, or no number'
 
 
 def _blank(found: re.Match[str]) -> str:

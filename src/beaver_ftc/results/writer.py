@@ -40,7 +40,7 @@ FILES_OF_A_RUN = frozenset({
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
 SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
-_PICTURE_HEAD_BYTES = 2048  # of a picture: its metadata come first
+_PICTURE_END_BYTES = 2048  # of a picture: its metadata come first, those of a PDF last
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 
@@ -267,7 +267,9 @@ def _is_our_picture(path: Path) -> bool:
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
-        return SOFTWARE_MARK.encode() in file.read(_PICTURE_HEAD_BYTES)
+        head = file.read(_PICTURE_END_BYTES)
+        file.seek(-min(_PICTURE_END_BYTES, path.stat().st_size), os.SEEK_END)
+        return SOFTWARE_MARK.encode() in head + file.read()
 
 
 @contextlib.contextmanager

@@ -11,7 +11,6 @@ PAGES: dict[str, Callable[[], str]] = {
     **{name: lambda name=name: keys.page(name) for name in keys.KINDS},  # type: ignore[misc]
     "columns": columns.page,
     "commands": commands.page,
-    "exit-statuses": commands.statuses_page,
     "properties": properties.as_markdown,
     "python-names": python_names.page,
 }

@@ -125,7 +125,7 @@ print(log.t_s[ratio > 1].iloc[0])
 | WITHIN | a number of seconds: {within} |"""
 _NEXT = """## Next
 
-[Open a flight in other tools](how-to/other-tools.md) shows how to read the files. The
+[Open a flight in other tools](reference/python.md#other-tools) shows how to read the files. The
 [nomenclature](reference/nomenclature.md) has the symbol of each quantity."""
 
 

@@ -19,7 +19,7 @@ from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Place, Sect
 
 _PARTS = ("p", "q", "r", ITEM, NAME)  # of a path: below the key that they are parts of
 EXAMPLES = File(__file__).with_name("examples")  # a whole file of each kind, by the name of its page
-HEAD = ("key", "what it is", "type", "unit", "range", "default", "example")
+HEAD = ("key", "what it is", "value", "range", "default")
 _TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number", "number": "number"}
 _PLURALS = {one: f"{one}s" for one in ("text", "choice", "whole number", "number", "value", "section")}
 
@@ -42,13 +42,14 @@ def page(name: str) -> str:
     sections = list(Sections(kind.schema()))
     more = list(kind.more())
     headings = [part.removeprefix("## ") for part in more if part.startswith("## ")]
-    parts = (_section(section, number, kind.links) for number, section in enumerate(sections, 2))
-    captioned = _captioned(more, len(sections) + 2)
+    groups = list(_groups(sections))
+    parts = (_section(group, number, kind.links) for number, group in enumerate(groups, 2))
+    captioned = _captioned(more, len(groups) + 2)
     return _with_sources(
         "\n\n".join(
             [
-                f"# {kind.title}", kind.says, _whole_file(name), _READ, _contents(sections, headings), *parts,
-                *captioned,
+                f"# {kind.title}", f"{kind.says} {_READ}", _whole_file(name), _contents(sections, headings),
+                *parts, *captioned,
                 f"## Next\n\n{kind.next}",
             ]
         )
@@ -66,25 +67,25 @@ def _whole_file(name: str) -> str:
     return f"## Example\n\n{KINDS[name].example}\n\n```yaml\n{text}```"
 
 
-_READ = """## How to read a table
-
-The file is YAML. Each section of the file has a table below, with a row for each key:
-
-- *what it is*: meaning of the key. The text after "Left out:" says what happens if the key is left out.
-- *type*: kind of value. A link goes to the table of a section below this key. A mapping of names to
-  numbers is written `{aileron: 0.1, rudder: 0.2}`.
-- *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction: 0.4 is 40 %.
-- *range*: allowed values. The value of a key of the type "choice" is one of the listed values.
-- *default*: value that is used if the key is left out. "required": the key must be in the file. "left
-  out": there is no value. "none": the value is empty. "see section": the keys of the section have their own
-  defaults.
-- *example*: the key with an allowed value. Some examples need a second key. The column *what it is*
-  then names this key.
-
-In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose or that the
-aircraft has. A label in brackets, such as [Zhang2005], refers to an entry of the
-[sources](../REFERENCES.md). The [glossary](reference/glossary.md) explains the terms, and the
-[nomenclature](reference/nomenclature.md) explains symbols, axes and signs."""
+_READ = "[How to read these tables](reference/README.md#tables-of-keys) explains the columns."
+# Sections that have most of their keys in common, by title: they share a table. What a member is called.
+_FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("Kinds of signals", ("Sine", "Doublet", "Step", "Square", "Ramp", "Chirp", "Csv")),
+    ("Legs of a flight path", ("AltitudeLeg", "AirspeedLeg", "HeadingLeg", "BankLeg")),
+    (
+        "Faults of surfaces",
+        ("Damage", "LossOfEffectiveness", "Stuck", "Hardover", "Float", "Bias", "RateLimit", "Oscillatory",
+         "Unanticipated"),
+    ),
+    ("Faults of sensors", ("SensorBias", "SensorNoise", "SensorScale", "SensorFreeze", "SensorLost")),
+    (
+        "Errors of one sensor",
+        ("RateGyro", "FlowVane", "Airspeed", "DynamicPressure", "AttitudeAngle", "Altimeter", "Tachometer",
+         "ManifoldGauge", "Accelerometer"),
+    ),
+    ("Limits of a rate", ("Level", "QuantileLevel")),
+)  # fmt: skip
+_IN_UNITS = ("noise_std_", "bias_", "quantum_")  # of a sensor: its unit follows
 _CONTENTS = "*Table 1. The keys at the top level of the file, and the sections that belong to each key.*"
 
 
@@ -115,15 +116,115 @@ def _captioned(parts: Iterable[str], number: int) -> Iterator[str]:
         yield part
 
 
-def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
+def _groups(sections: Iterable[Section]) -> Iterator[tuple[str, list[Section]]]:
+    """Sections that share a table, under its heading; the heading of one alone is empty."""
+    titles = {title: heading for heading, of in _FAMILIES for title in of}
+    whole = list(sections)
+    done = set[str]()
+    for section in whole:
+        heading = titles.get(section.title, "")
+        if not heading:
+            yield "", [section]
+        elif heading not in done:
+            done.add(heading)
+            yield heading, [one for one in whole if titles.get(one.title) == heading]
+
+
+def _section(group: tuple[str, list[Section]], number: int, links: Mapping[str, str]) -> str:
+    heading, members = group
+    if not heading:
+        return _alone(members[0], number, links)
+    first = members[0]
+    parts = [f"## {heading}"]
+    units = _unit_in_names(members)
+    parts += ["\n".join(_member(section, units.get(section.title, "")) for section in members)]
+    if page := _link(first, links):
+        parts.append(f"More: {page}.")
+    typed = any(key.name == "type" for key in first.keys)
+    says = "Each section also needs `type`, its name. " if typed else ""
+    parts.append(f'*Table {number}. Keys of these sections. {says}"in": the sections that have the key.*')
+    parts.append(markdown_table(("in", *HEAD), _shared(members)))
+    return "\n\n".join(parts)
+
+
+def _member(section: Section, unit: str) -> str:
+    says = " ".join(section.says.split())
+    path = section.places[0].path
+    elsewhere = (
+        f" Also: {found}." if not unit and path[0] == "expect" and (found := _elsewhere(section)) else ""
+    )
+    ends = f" UNIT is `{unit}`." if unit else ""
+    return f'- <a id="{_anchor(section.title)}"></a>{_in_family(section)}: {says}{ends}{elsewhere}'
+
+
+def _unit_in_names(members: list[Section]) -> dict[str, str]:
+    """Title -> the end of its keys that is a unit, where sections have the same keys in other units."""
+    found: dict[str, str] = {}
+    if not all(any(key.name.startswith(_IN_UNITS[0]) for key in section.keys) for section in members):
+        return found
+    for section in members:
+        names = [key.name for key in section.keys if key.name.startswith(_IN_UNITS)]
+        if names:
+            found[section.title] = names[0].removeprefix(
+                next(one for one in _IN_UNITS if names[0].startswith(one))
+            )
+    return found
+
+
+def _in_family(section: Section) -> str:
+    """What a section is called among those with which it shares a table."""
+    kind = next((key.choices[0] for key in section.keys if key.name == "type"), "")
+    if kind:
+        return f"`{kind}`"
+    path = section.places[0].path
+    if path[-1] == ITEM:
+        return f"`{path[-2]}`"
+    return ", ".join(f"`{one[-1]}`" for one in _beside(section))
+
+
+def _shared(members: list[Section]) -> list[tuple[str, ...]]:
+    """A row for each meaning; what differs between sections stands with their names."""
+    found: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
+    for section in members:
+        for key in section.keys:
+            row = _row(key, section.places)
+            if key.name != "type":  # it is what the section is called
+                found.setdefault(row[1], []).append((_in_family(section), row))
+    return [_of_all(of, [_in_family(section) for section in members]) for of in found.values()]
+
+
+def _of_all(rows: list[tuple[str, tuple[str, ...]]], every: list[str]) -> tuple[str, ...]:
+    cells = []
+    begins = next((one for one in _IN_UNITS if len(rows) > 1 and rows[0][1][0].startswith(f"`{one}")), "")
+    if begins and len({row[0] for _, row in rows}) > 1:
+        rows = [(name, (f"`{begins}UNIT`", row[1], "number in UNIT", *row[3:])) for name, row in rows]
+    for column in range(len(HEAD)):
+        names: dict[str, list[str]] = {}
+        for name, row in rows:
+            names.setdefault(row[column], []).append(name)
+        several = len(names) > 1
+        cells.append(
+            "; ".join(f"{text or '-'} ({', '.join(of)})" if several else text for text, of in names.items())
+        )
+    members = [name for name, _ in rows]
+    others = [name for name in every if name not in members]
+    most = f"all but {', '.join(others)}" if others else "all"
+    return (most if len(others) < len(members) else ", ".join(members), *cells)
+
+
+def _link(section: Section, links: Mapping[str, str]) -> str:
+    return links.get(_SENSOR_FAULTS if _is_of_a_sensor(section) else dotted(section.places[0].path), "")
+
+
+def _alone(section: Section, number: int, links: Mapping[str, str]) -> str:
     parts = [f'<a id="{_anchor(section.title)}"></a>\n\n## {_heading(section)}']
     if _is_also_a_list(section):
         parts.append("The value is one mapping with these keys, or a list of such mappings.")
     elif elsewhere := _elsewhere(section):
         parts.append(f"Sections with the same keys: {elsewhere}.")
-    if section.says:
+    if section.says and section.places[0].path:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
-    if page := links.get(_SENSOR_FAULTS if _is_of_a_sensor(section) else dotted(section.places[0].path)):
+    if page := _link(section, links):
         parts.append(f"More: {page}.")
     parts.append(f"*Table {number}. Keys {_called_file(section)}.*")
     parts.append(markdown_table(HEAD, [_row(key, section.places) for key in section.keys]))
@@ -213,11 +314,18 @@ def _together(above: Path, names: list[str]) -> str:
 
 def _row(key: Key, places: list[Place]) -> tuple[str, ...]:
     units = list(dict.fromkeys(key.unit(place) for place in places)) if key.number else []
-    wanted = ", ".join(f"`{name}: {in_a_line(value)}`" for name, value in key.needs.items())
-    says = _without_unit(key.says, units) + (f". The example also needs {wanted}" if wanted else "")
-    example = "" if key.example is None else f"`{key.name}: {in_a_line(key.example)}`"
+    says = _without_unit(key.says, units)
+    if key.example is not None and _is_long(key.example):
+        also = "".join(f", {name}: {in_a_line(value)}" for name, value in key.needs.items())
+        says += f". *Example:* `{key.name}: {in_a_line(key.example)}{also}`"
     unit = _unit(key, places) if key.number else ""
-    return f"`{key.name}`", says, _type(key), unit, _range(key), _default(key), example
+    value = ", ".join(filter(None, (_type(key), "" if unit == "1" else unit)))
+    return f"`{key.name}`", says, value, _range(key), _default(key)
+
+
+def _is_long(example: Any) -> bool:
+    """Whether it shows more than a value of the range."""
+    return isinstance(example, Mapping | list)
 
 
 def _unit(key: Key, places: list[Place]) -> str:
@@ -381,7 +489,7 @@ _LINKS = {
     "reference": f"[reference signals]({_SCENARIOS}#reference-signals)",
     "autopilot": f"[flight path]({_SCENARIOS}#flight-path), [outer loops](explanation/laws.md#outer-loops)",
     "faults[]": f"[faults]({_SCENARIOS}#faults), [fault types](explanation/fault-types.md), "
-    "[signs of the surfaces](reference/beaver.md#surfaces-and-signs)",
+    "[signs of the surfaces](results/validation.md#surfaces-and-signs)",
     _SENSOR_FAULTS: f"[names and units of the sensors]({_SCENARIOS}#instruments-that-fail), "
     "[sensor monitor](explanation/instruments.md)",
     "uncertainty": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
@@ -439,7 +547,7 @@ KINDS = {
         f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
         "This sweep flies 50 losses of the elevator. The size of the loss and the airspeed are random. At "
         "least 90 % of the losses must be detected, and half of the losses must be detected within 0.2 s.",
-        "[Results of a sweep](reference/sweep-results.md) has the files and statistics that a sweep writes.",
+        "[Results of a sweep](how-to/sweeps.md#what-a-sweep-writes) has the files and statistics of a sweep.",
     ),
     "plan-keys": Kind(
         plan_json_schema,

@@ -5,8 +5,6 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
 import beaver_ftc as bf
@@ -19,42 +17,16 @@ public function, class and record, for readers who write Python. [Python](refere
 use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
 READING = """## How to read an entry
 
-- **Heading.** The name without `beaver_ftc.` in front. A name without a dot needs no further import: for the
-  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write
-  `from beaver_ftc.results.model import Fault`.
-- **Signature.** The value after `=` is the default of an argument. `= ...` means that the default is
-  computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The text
-  below the signature explains the types.
-- **Arguments and fields.** Each item of a list has the name, the shape if it is an array, the unit, and the
-  meaning.
-- **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
-  each surface, in the order of the aircraft file. `(3, surfaces)` has three rows, and one column for each
-  surface. The letters n and m stand for other sizes.
-- **Units.** If a name ends in a unit, its value has this unit, for example `altitude_m`. Otherwise the text
-  states the unit.
-- **Methods.** The methods of a class follow the class. Each heading has the name of the class in front. Call
-  the method of an object instead: for the heading `Flight.plot` write `flight.plot(...)`.
-- **Errors.** The text after "Raises" names the exceptions of the package. [Errors](#errors) explains the two
-  base classes.
-
-The records of a flight have the fields of `metrics.json`. The table of a sweep has these fields as columns
-with dotted names: the column `isolation.withdrawn` is the field `withdrawn` of `Isolation`.
-[Columns](reference/columns.md) lists all of these columns."""
+The name stands without `beaver_ftc.` in front. Arguments after `*` must be given by name. This page has
+the first sentence of each entry. The whole text, with types, defaults, fields, shapes, units and errors, is
+in the docstring: the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a
+flight have the fields of `metrics.json`; [columns](reference/columns.md) lists them with their units."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
 
 RECORDS = "results.model"
 _CONTENTS = "*Table 1. The sections of this page, and the names in each.*"
-LONGEST_LINE = 88  # of a signature
-_MODULES = re.compile(r"\b(?:[a-z_]+\.)+(?=\w)")  # before a name in a signature
-_SHORT = {  # types of NumPy that are written out as a line of their parts
-    _MODULES.sub("", inspect.formatannotation(written)): short
-    for written, short in (
-        (ArrayLike | None, "ArrayLike | None"), (ArrayLike, "ArrayLike"), (NDArray[np.float64], "ndarray"),
-    )
-}  # fmt: skip
-
 # Headings, the names below each as after `beaver_ftc.`, and the members that are shown where not all are.
 NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Scenarios and flights": {
@@ -117,7 +89,7 @@ SAYS = {
 
 
 def page() -> str:
-    """The page, for a terminal or a reader of Markdown."""
+    """The page for a terminal or a reader of Markdown: signatures, and the first words of each docstring."""
     return _joined(_described)
 
 
@@ -173,8 +145,7 @@ def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
     what = found(name)
     own = vars(what) if name.startswith(RECORDS) else None
     yield f"### {name}"
-    yield f"```python\n{_signature(name.rpartition('.')[2], what)}\n```"
-    yield _text(what)
+    yield f"`{_signature(name.rpartition('.')[2], what)}`: {_first(what)}"
     if inspect.isclass(what):
         for member, of in inspect.getmembers(what, inspect.isfunction):
             shown = member in members if members else not member.startswith("_")
@@ -185,49 +156,22 @@ def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
                 and of.__module__.startswith("beaver_ftc")
             ):
                 called = f"{name.rpartition('.')[2]}.{member}"
-                yield f"**{called}**"
-                yield f"```python\n{_signature(called, of)}\n```"
-                yield _text(of)
+                yield f"`{_signature(called, of)}`: {_first(of)}"
 
 
 def _signature(name: str, what: Any) -> str:
+    """The call with the names of its arguments; of a record, the name alone."""
     contract = getattr(what, "_is_protocol", False)  # its class needs no arguments
     if contract or (inspect.isclass(what) and issubclass(what, BaseModel | Exception)):
         return name
-    whole = inspect.signature(what)
-    shown = [one for one in whole.parameters.values() if one.name != "self" and not one.name.startswith("_")]
-    returned = inspect.Signature.empty if inspect.isclass(what) else whole.return_annotation
-    written = str(whole.replace(parameters=shown, return_annotation=returned))
-    signature = _MODULES.sub("", written)
-    for written, short in _SHORT.items():
-        signature = signature.replace(written, short)
-    signature = re.sub(r"'([A-Z][^']*)'", r"\1", signature).replace(
-        "<factory>", "..."
-    )  # a name that is imported later
-    return _in_lines(name, signature)
+    shown = [
+        one.replace(annotation=inspect.Parameter.empty, default=inspect.Parameter.empty)
+        for one in inspect.signature(what).parameters.values()
+        if one.name != "self" and not one.name.startswith("_")
+    ]
+    return name + str(inspect.Signature(shown))
 
 
-def _in_lines(name: str, signature: str) -> str:
-    """A signature that is too long for one line, with one argument in each line."""
-    if len(name + signature) <= LONGEST_LINE:
-        return name + signature
-    inside, _, returned = signature[1:].rpartition(")")
-    arguments = _arguments(inside)
-    lines = "".join(f"    {argument},\n" for argument in arguments)
-    return f"{name}(\n{lines}){returned}"
-
-
-def _arguments(inside: str) -> list[str]:
-    """The arguments of a signature; a comma in brackets separates none."""
-    found, depth = [""], 0
-    for part in re.split(r"(, |[\[\](){}])", inside):
-        depth += (part in ("[", "(", "{")) - (part in ("]", ")", "}"))
-        if part == ", " and depth == 0:
-            found.append("")
-        else:
-            found[-1] += part
-    return found
-
-
-def _text(what: Any) -> str:
-    return inspect.getdoc(what) or ""
+def _first(what: Any) -> str:
+    """The first paragraph of the docstring."""
+    return (inspect.getdoc(what) or "").partition("\n\n")[0]

@@ -2,13 +2,17 @@
 
 `python -m tools.docs table NAME` prints what the function of that name returns (a `-` of NAME is a `_`). It
 calls the package's public names or its commands; no number is typed in. What it draws it saves below
-`images/`, which becomes `docs/images/`, and returns the line that shows it: `![...](images/name.png)`.
+`images/`, which becomes `docs/images/`, and returns the line that shows it: `![...](images/name.png)`. A
+table that few readers need it saves as CSV in the same way, by `aside`.
 """
 
 import ast
+import csv
 import inspect
+import io
 import os
 import pickle
+import re
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -81,3 +85,27 @@ def shared(make: Callable[[], T]) -> Callable[[], T]:
         return pickle.loads(path.read_bytes())
 
     return kept
+
+
+def aside(name: str, title: str, text: str) -> str:
+    """Save a Markdown table as CSV beside the pages, and return the item of a list that links to it."""
+    path = Path("images", "tables", f"{name}.csv")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(as_csv(text), encoding="utf-8")
+    return f"- [{title}]({path.as_posix()})"
+
+
+def as_csv(text: str) -> str:
+    """The rows of a Markdown table, without its marks of bold, code and links."""
+    written = io.StringIO()
+    rows = csv.writer(written, lineterminator="\n")
+    for number, line in enumerate(line for line in text.splitlines() if line.startswith("|")):
+        if number != 1:  # the rule below the head
+            cells = re.split(r"(?<!\\)\|", line)[1:-1]
+            rows.writerow(_plain(cell) for cell in cells)
+    return written.getvalue()
+
+
+def _plain(cell: str) -> str:
+    cell = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", cell.strip())
+    return cell.replace("**", "").replace("`", "").replace("\\|", "|")

@@ -32,7 +32,7 @@ DERIVED = (
     "aircraft", "airspeed, m/s", "error p, rad/s²", "error q, rad/s²", "error r, rad/s²",
     "aileron, %", "elevator, %", "rudder, %",
 )  # fmt: skip
-REFUSED = "*Table 2. Aircraft of the package that cannot be derived, and the reason.*"
+REFUSED = "*Table 6. Aircraft of the package that cannot be derived, and the reason.*"
 FLOWN = ("healthy", "false alarms", "losses", "detected", "named", "wrong", "left out", "certain", "late")
 
 

@@ -23,6 +23,7 @@ from beaver_ftc.studies.compare.tune import is_adopted
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import aside
 
 TUNING = Path(__file__).parents[3] / "benchmarks" / "tuning.json"  # how the values in tuned.json were found
 Document = dict[str, Any]
@@ -38,9 +39,10 @@ HIDDEN = (
 PROBED = ("published", "realism", "air-light")  # one of each grade that is tuned
 PROBED_S = 30.0  # the longest flight of the probe: flights of a minute without a fault are left out
 NO_SCHEME = "none"
-SHARES = (1.0, 0.92, 0.75, 0.5, 0.42)  # of which Table 4 has intervals
+SHARES = (1.0, 0.92, 0.75, 0.5, 0.42)  # of which a table has intervals
 _RATIO = "Tracking error divided by the oracle's in the same flight, median; below 1: better than the oracle"
 _RATIO_90 = "Tracking error divided by the oracle's, not exceeded in 90 % of the flights"
+_SHARES = "Wilson 95 % intervals of the shares in Tables 2 and 3, %"
 _LOWER, _UPPER = "Lower 95 % limit of the median {}", "Upper 95 % limit of the median {}"
 ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
 PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
@@ -115,14 +117,19 @@ def _tables(document: Document) -> str:
     return "\n\n".join([
         _block(2, "Faults detected, %", schemes, "detection_rate", _percent, more=True),
         _block(3, "Faults named correctly at the end, %", schemes, "isolation_rate", _percent, more=True),
-        _rates(4, faulted),
-        _block(5, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
-        _block(6, _UPPER.format("delay of Table 5, s"), schemes, "delay_median_high_s", _seconds, None),
-        _alarms(7, _schemes(sets)),
-        _block(8, _RATIO, laws, "ratio_median", _ratio, more=False),
-        _block(9, _LOWER.format("ratio of Table 8"), laws, "ratio_median_low", _ratio, None),
-        _block(10, _UPPER.format("ratio of Table 8"), laws, "ratio_median_high", _ratio, None),
-        _block(11, _RATIO_90, laws, "ratio_90", _ratio, more=False),
+        _block(4, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
+        _alarms(5, _schemes(sets)),
+        _block(6, _RATIO, laws, "ratio_median", _ratio, more=False),
+        _block(7, _RATIO_90, laws, "ratio_90", _ratio, more=False),
+        "\n".join([
+            aside("benchmark-shares", _SHARES, _rates(faulted)),
+            aside("benchmark-delays", _UPPER.format("delay of Table 4, s"),
+                  _limit_of(schemes, "delay_median_high_s", _seconds)),
+            aside("benchmark-ratios-low", _LOWER.format("ratio of Table 6"),
+                  _limit_of(laws, "ratio_median_low", _ratio)),
+            aside("benchmark-ratios-high", _UPPER.format("ratio of Table 6"),
+                  _limit_of(laws, "ratio_median_high", _ratio)),
+        ]),
     ])  # fmt: skip
 
 
@@ -149,25 +156,35 @@ def _alone(lines: list[Document]) -> Document:
     return next(row for row in lines if (row["scheme"], row["law"]) == (NO_SCHEME, LAW))
 
 
-def _block(
-    number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool | None
-) -> str:
-    """A caption and a table of one number a cell. more: whether more is better; None of limits, which are
-    compared with nothing."""
-    counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
-    head = ("", *(f"{name} ({count})" for name, count in counts.items()))
-    ours = SCHEME if SCHEME in next(iter(rows.values())) else LAW
+def _block(number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool) -> str:
+    """A caption and a table of one number a cell. more: whether more is better."""
+    ours = _ours(rows)
 
     def shown(name: str, of: dict[str, Document]) -> str:
         theirs, is_rival = of[name].get(key), name not in (ours, STATISTICAL, ALONE)
-        is_better = more is not None and is_rival and _less(of[ours].get(key), theirs, more)
+        is_better = is_rival and _less(of[ours].get(key), theirs, more)
         return f"**{cell(theirs)}**" if is_better else cell(theirs)
 
-    body = [(_label(name), *(shown(name, of) for of in rows.values())) for name in next(iter(rows.values()))]
-    marked = "" if more is None else f"; bold: a rival's number is better than that of `{ours}`"
+    marked = f"; bold: a rival's number is better than that of `{ours}`"
     caption = _caption(number, f"{title}; in brackets: faulted flights{marked}")
-    parts = [caption, markdown_table(head, body)]
-    return "\n\n".join(parts if more is None else [*parts, _who_is_better(rows, ours, key, cell, more)])
+    return "\n\n".join([caption, _cells(rows, shown), _who_is_better(rows, ours, key, cell, more)])
+
+
+def _ours(rows: Rows) -> str:
+    return SCHEME if SCHEME in next(iter(rows.values())) else LAW
+
+
+def _cells(rows: Rows, shown: Callable[[str, dict[str, Document]], str]) -> str:
+    """A row for each scheme or law, a column for each set."""
+    counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
+    head = ("", *(f"{name} ({count})" for name, count in counts.items()))
+    body = [(_label(name), *(shown(name, of) for of in rows.values())) for name in next(iter(rows.values()))]
+    return markdown_table(head, body)
+
+
+def _limit_of(rows: Rows, key: str, cell: Callable[[Any], str]) -> str:
+    """A table of limits, which are compared with nothing."""
+    return _cells(rows, lambda name, of: cell(of[name].get(key)))
 
 
 def _who_is_better(rows: Rows, ours: str, key: str, cell: Callable[[Any], str], more: bool) -> str:
@@ -230,19 +247,11 @@ def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
     return theirs > ours if more else theirs < ours
 
 
-def _rates(number: int, sets: dict[str, Document]) -> str:
+def _rates(sets: dict[str, Document]) -> str:
     """What the numbers of flights say of a rate."""
     counts = sorted({part["lines"][0]["faults"] for part in sets.values()})
     rows = [(str(n), *(_interval(n, share) for share in SHARES)) for n in counts]
-    head = ("faulted flights", *(f"measured {100 * share:.0f} %" for share in SHARES))
-    return "\n\n".join(
-        [
-            _caption(
-                number, "Wilson 95 % intervals of the shares in Tables 2 and 3, rounded to whole faults, %"
-            ),
-            markdown_table(head, rows),
-        ]
-    )
+    return markdown_table(("faulted flights", *(f"measured {100 * share:.0f} %" for share in SHARES)), rows)
 
 
 def _interval(n: int, share: float) -> str:

@@ -19,6 +19,7 @@ from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, flown,
 from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
 from beaver_ftc.studies.compare.trial import CALIBRATION, DRAW, LAW, SCHEME, Entry
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import aside
 
 Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
@@ -34,7 +35,21 @@ FLIGHT_HEAD = (
 )  # fmt: skip
 
 
-def chosen_constants() -> str:
+def chosen_asides() -> str:
+    """How many groups of constants there are, and their tables as CSV."""
+    links = [
+        aside(
+            "chosen-constants",
+            "C1: constants that flights chose, with the command of each",
+            _constants(),
+        ),
+        aside("chosen-flights", "C2: flights that chose them, beside those of the results", _flights()),
+        aside("chosen-not", "C3: other constants of the diagnosis of logs, each with its origin", _others()),
+    ]
+    return f"{len(choices())} groups of constants were chosen by flights.\n\n" + "\n".join(links)
+
+
+def _constants() -> str:
     """The constants, in rows with a number."""
     return _table(
         CONSTANT_HEAD,
@@ -42,7 +57,7 @@ def chosen_constants() -> str:
     )
 
 
-def not_chosen() -> str:
+def _others() -> str:
     """The other constants of the diagnosis of logs, each with its value in the code and its origin."""
     rows = [
         (f"`{name}`", _value_text(file, name), *_origin_and_reason(origin), Path(file).name)
@@ -68,7 +83,7 @@ def not_chosen_constants() -> dict[str, dict[str, str]]:
     return found
 
 
-def chosen_flights() -> str:
+def _flights() -> str:
     """Of each row, the flights that chose the constant, beside those of the results that depend on it."""
     return _table(
         FLIGHT_HEAD,

@@ -61,7 +61,7 @@ def _row(name: str) -> tuple[str, str, str]:
     path.write_text(_thumbnail(flight), encoding="utf-8")
     description = " ".join(bf.load(name).description.split())
     description = re.sub(r"(Compare it with )([\w-]+)", r"\1`\2`", description)
-    shown = f"![{name}: deflection, and ratio of residual to threshold, over time]({path.as_posix()})"
+    shown = f"![{name}]({path.as_posix()})"
     return shown, f"`{name}`<br>{description}", _outcome(flight)
 
 

@@ -1,4 +1,4 @@
-"""What docs/results/mechanisms.md and mechanisms-tables.md show of the study of `beaver-ftc mechanisms`."""
+"""What docs/results/mechanisms.md shows of the study of `beaver-ftc mechanisms`."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -15,7 +15,7 @@ from beaver_ftc.studies.mechanisms.command import run_mechanisms
 from beaver_ftc.studies.mechanisms.survey import DRAWS, Flight, cases_of, fly_one, scenario_of
 from beaver_ftc.studies.mechanisms.systems import DEFAULT, DIAGNOSIS, LAW, NORM_BOUND, Changes
 from beaver_ftc.studies.present.tables import markdown_table, number
-from tools.docs.tables import shared
+from tools.docs.tables import aside, shared
 
 Document = dict[str, Any]
 SEED = 1
@@ -86,38 +86,38 @@ def mechanisms_net() -> str:
     return _rows(shown.NET_HEAD, shown.net_row)
 
 
-def mechanisms_same() -> str:
-    """In how many flights a mechanism changes nothing."""
-    return _rows(shown.SAME_HEAD, shown.same_row)
-
-
-def mechanisms_medians() -> str:
-    """Delay and tracking with and without each mechanism."""
-    return _rows(shown.MEDIAN_HEAD, shown.median_row)
+def mechanisms_asides() -> str:
+    """Further tables, as CSV."""
+    tables = {
+        "same": ("T1: flights in which a mechanism changes nothing", _rows(shown.SAME_HEAD, shown.same_row)),
+        "medians": (
+            "T2: medians of delay and tracking error, with and without each mechanism",
+            _rows(shown.MEDIAN_HEAD, shown.median_row),
+        ),
+        "by-instruments": (
+            "T3: net share of late alarms by instruments, points", _by("instruments", "late", DIAGNOSIS)
+        ),
+        "by-error": (
+            "T4: net share of lost names by undeclared error, points", _by("error", "names", DIAGNOSIS)
+        ),
+        "by-fault": ("T5: net share of worse tracking by fault, points", _by("fault", "tracking", LAW)),
+        "by-bandwidth": (
+            "T6: net share of worse tracking by bandwidth, points", _by("bandwidth", "tracking", LAW)
+        ),
+        "margins": (
+            "T7: stability margins of the healthy loop",
+            markdown_table(shown.MARGIN_HEAD, shown.margin_rows(_flown()[0])),
+        ),
+        "alarms": (
+            "T8: false alarms, complete and without each mechanism",
+            markdown_table(shown.ALARM_HEAD, shown.alarm_rows(_flown()[0])),
+        ),
+    }  # fmt: skip
+    return "\n".join(aside(f"mechanisms-{name}", *each) for name, each in tables.items())
 
 
 def _rows(head: tuple[str, ...], row_of: Any) -> str:
     return markdown_table(head, [row_of(row) for row in _flown()[0]["mechanisms"]])
-
-
-def mechanisms_by_instruments() -> str:
-    """Late alarms without each mechanism of the diagnosis, by instruments."""
-    return _by("instruments", "late", DIAGNOSIS)
-
-
-def mechanisms_by_error() -> str:
-    """Names lost without each mechanism of the diagnosis, by undeclared error."""
-    return _by("error", "names", DIAGNOSIS)
-
-
-def mechanisms_by_fault() -> str:
-    """Worse tracking without each mechanism of the law, by fault."""
-    return _by("fault", "tracking", LAW)
-
-
-def mechanisms_by_bandwidth() -> str:
-    """Worse tracking without each mechanism of the law, by bandwidth."""
-    return _by("bandwidth", "tracking", LAW)
 
 
 def _by(factor: str, criterion: str, serves: str) -> str:
@@ -125,16 +125,6 @@ def _by(factor: str, criterion: str, serves: str) -> str:
     return markdown_table(
         shown.level_head(document, factor), shown.level_rows(document, factor, criterion, serves)
     )
-
-
-def mechanisms_alarms() -> str:
-    """False alarms, and how many of them are explained."""
-    return markdown_table(shown.ALARM_HEAD, shown.alarm_rows(_flown()[0]))
-
-
-def mechanisms_margins() -> str:
-    """Margins of the healthy loops."""
-    return markdown_table(shown.MARGIN_HEAD, shown.margin_rows(_flown()[0]))
 
 
 def mechanisms_probe() -> str:

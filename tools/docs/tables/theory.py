@@ -1,4 +1,4 @@
-"""Tables of docs/explanation/theory.md."""
+"""Table of the constants, in docs/reference/nomenclature.md."""
 
 import numpy as np
 

@@ -9,9 +9,9 @@ therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
 alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > eta_bar; for a
-bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (theory.md,
-section 3). Slower poles detect more if errors are correlated over frames, as measurement errors are. The
-reach of a fault is its possible effect on the filters since the start of the flight.
+bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (detection.md,
+"The guarantees"). Slower poles detect more if errors are correlated over frames, as measurement errors are.
+The reach of a fault is its possible effect on the filters since the start of the flight.
 
 The fault detection and approximation estimator (FDAE) is always on:
 

@@ -115,8 +115,7 @@ N_SIGNS = {
 # faster; a constant loss explains the rest.
 KAPPA_PER_S = 1.5
 
-# Share of the alarm level reserved for noise in addition to an uncertainty at its bound (theory.md,
-# section 7).
+# Share of the alarm level reserved for noise in addition to an uncertainty at its bound (statistical.md).
 LEVEL_NOISE_SHARE = 0.5
 # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
 DAMAGE_FREQUENCY_RAD_S = 3.0
@@ -340,8 +339,8 @@ def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s:
     """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
 
     An uncertainty of eta sin(omega t) moves the test for a step by eta omega sqrt(2 sqrt 2 / i w0), w0 = (i /
-    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt (theory.md). Almost without
-    noise w0 is the frame rate. The evidence for a loss under a moving command grows together with the
+    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt (statistical.md). Almost
+    without noise w0 is the frame rate. The evidence for a loss under a moving command grows together with the
     uncertainty while both have the same sign: by eta sqrt(omega / i) times 1.204, the largest value of sin(z)
     / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no more
     than the other half.

@@ -1,0 +1,51 @@
+"""The tables of a page as a document, so that prose can take its numbers from the table that it explains."""
+
+import re
+from collections.abc import Iterator
+
+_CAPTION = re.compile(r"\*Table (\d+)\. ")
+_RULE = re.compile(r"\|(?: ?:?-+:? ?\|)+")
+_COLUMNS = re.compile(r"(?<!\\)\|")
+
+
+def cells(text: str) -> dict[str, list[dict[str, str | int | float]]]:
+    """{number of a table: its rows, by the names of the columns}; what stands above the first column without
+    a name is `row`. Names are in small letters without units and brackets: `delay, s (32)` is `delay`.
+    """
+    found: dict[str, list[dict[str, str | int | float]]] = {}
+    lines = text.splitlines()
+    number = ""
+    for at, line in enumerate(lines):
+        caption = _CAPTION.match(line)
+        number = caption[1] if caption else number
+        if number and number not in found and _RULE.fullmatch(line.strip()):
+            names = [_name(head) for head in _row(lines[at - 1])]
+            found[number] = [
+                dict(zip(names, map(_value, row), strict=True)) for row in _rows(lines[at + 1 :])
+            ]
+    return found
+
+
+def _rows(lines: list[str]) -> Iterator[list[str]]:
+    for line in lines:
+        if not line.startswith("|"):
+            return
+        yield _row(line)
+
+
+def _row(line: str) -> list[str]:
+    return [cell.strip().strip("*`") for cell in _COLUMNS.split(line.strip())[1:-1]]
+
+
+def _name(head: str) -> str:
+    plain = re.sub(r"\(.*?\)|, [^,]*$", "", head)
+    return re.sub(r"\W+", "_", plain).strip("_").lower() or "row"
+
+
+def _value(cell: str) -> str | int | float:
+    for kind in (int, float):
+        try:
+            return kind(cell)
+        except ValueError:
+            continue
+    return cell

@@ -5,8 +5,8 @@
 In still air with exact sensors what the design model leaves of the angular acceleration is its own error. It
 may cross its bound, from the map at that instant, as surfaces move, and with `uncertainty_rad_s` as the state
 does (docs/explanation/statistical.md). A row an aircraft: the largest error and the largest change in a
-frame, as shares of the bound; of that change what a move of the surfaces explains by the detector's rule, and what is
-left, rad/s, at 100 frames a second: the least `uncertainty_rad_s` that covers it.
+frame, as shares of the bound; of that change what a move of the surfaces explains by the detector's rule, and
+what is left, rad/s, at 100 frames a second: the least `uncertainty_rad_s` that covers it.
 """
 
 import argparse

@@ -188,7 +188,8 @@ def test_a_folder_is_locked_once(tmp_path, monkeypatch):
     ("name", "content", "ours"),
     [
         ("figures/tracking.png", b"x" * 2038 + b"beaver-ftc", True),
-        ("figures/tracking.png", b"x" * 2039 + b"beaver-ftc", False),
+        ("figures/tracking.png", b"x" * 2039 + b"beaver-ftc" + b"x" * 2039, False),
+        ("figures/tracking.pdf", b"x" * 5000 + b"beaver-ftc", True),
         ("figures/deep/tracking.png", b"beaver-ftc", False),  # a folder is no picture of ours
         ("aircraft/engine/own.xml", b"", True),
         ("aircraft/own.yaml", b"", True),

@@ -315,8 +315,10 @@ def in_box(emap, b):
 @kernel
 def outside_span(emap, i):
     """Whether coordinate i of the state is outside the range that the boxes span together."""
-    n = emap.n_boxes
-    return not is_between(emap.lo[:n, i].min(), emap.coordinates[i], emap.hi[:n, i].max())
+    lo, hi = np.inf, -np.inf
+    for b in range(emap.n_boxes):  # compiled code with a reduction of an array loads scipy.linalg
+        lo, hi = min(lo, emap.lo[b, i]), max(hi, emap.hi[b, i])
+    return not is_between(lo, emap.coordinates[i], hi)
 
 
 @kernel

@@ -65,17 +65,17 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
         raise BadInput(f"--aircraft: {error}") from None
     if scenario is None:
         return DiagnosedAircraft(aircraft)
-    loaded_scenario = load_scenario(scenario)
-    if loaded_scenario.fdi.sensor_monitor == "always":
+    loaded = load_scenario(scenario)
+    if loaded.fdi.sensor_monitor == "always":
         reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded_scenario.fdi.scheme == "none":
+    if loaded.fdi.scheme == "none":
         reason = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded_scenario.airframe.name != aircraft.name:
-        reason = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
+    if loaded.airframe.name != aircraft.name:
+        reason = f"flies {loaded.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    return DiagnosedAircraft(loaded_scenario.airframe, declared_error_sections(loaded_scenario))
+    return DiagnosedAircraft(loaded.airframe, declared_error_sections(loaded))
 
 
 @dataclass(frozen=True)
@@ -99,212 +99,212 @@ class AircraftDiagnosisInputs:
 
 
 def read_diagnosis_inputs(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
+    log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
 ) -> AircraftDiagnosisInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check_log_has_inputs(recording, vehicle, diagnosed_aircraft.aircraft)
+    _check_log_has_inputs(log, vehicle, given.aircraft)
     samples = resample(
-        recording,
+        log,
         vehicle.model_copy(update={"max_rate_hz": _MAX_LOG_RATE_HZ, "reference_airspeed_mps": None}),
     )
     rate_hz = _log_rate_hz(samples)
-    diagnosis = Diagnosis(diagnosed_aircraft.aircraft, rate_hz, **diagnosed_aircraft.declared_errors)
-    needs_attitude = diagnosis.declared.air.moves
-    rates_signals_commands_attitude, mean_age_s_by_held_column = _read_sample_inputs(
-        samples, recording, vehicle, diagnosed_aircraft.aircraft, needs_attitude
+    diagnosis = Diagnosis(given.aircraft, rate_hz, **given.declared_errors)
+    tilted = diagnosis.declared.air.moves
+    arrays, ages = _read_sample_inputs(
+        samples, log, vehicle, given.aircraft, tilted
     )
-    _check_units_plausible(samples.name, rates_signals_commands_attitude, diagnosed_aircraft.aircraft)
-    has_missing_value = np.asarray(~np.isfinite(np.hstack(rates_signals_commands_attitude)).all(axis=1))
-    gap_free_stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
-    if not gap_free_stretches:
+    _check_units_plausible(samples.name, arrays, given.aircraft)
+    missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
+    stretches = _gap_free_stretches(samples, missing, rate_hz)
+    if not stretches:
         raise BadInput(
             f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
             "missing number, allowed: all signals logged at one rate of "
             f"{_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
         )
-    surface_indices = _vehicle_surface_indices(vehicle, diagnosed_aircraft.aircraft)
+    places = _vehicle_surface_indices(vehicle, given.aircraft)
     samples = replace(
-        samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
+        samples, commands=samples.commands[:, places], labels=samples.labels[:, places]
     )
     return AircraftDiagnosisInputs(
         samples,
         diagnosis,
         rate_hz,
-        rates_signals_commands_attitude,
-        mean_age_s_by_held_column,
-        has_missing_value,
-        gap_free_stretches,
-        _full_deflection_rad(vehicle, diagnosed_aircraft.aircraft),
+        arrays,
+        ages,
+        missing,
+        stretches,
+        _full_deflection_rad(vehicle, given.aircraft),
     )
 
 
 def diagnose_with_aircraft_model(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
+    log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
 ) -> tuple[Samples, DiagnosisRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed_aircraft)
-    return aircraft_inputs.samples, *diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
+    inputs = read_diagnosis_inputs(log, vehicle, given)
+    return inputs.samples, *diagnose_aircraft_inputs(inputs, given)
 
 
 def diagnose_aircraft_inputs(
-    aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
+    inputs: AircraftDiagnosisInputs, given: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, aircraft = aircraft_inputs.samples, diagnosed_aircraft.aircraft
-    replayed_flight_verdicts = _replay_flight(aircraft_inputs, aircraft)
-    rows = _rows_of_replayed_flight(aircraft_inputs, aircraft, replayed_flight_verdicts)
+    samples, aircraft = inputs.samples, given.aircraft
+    replay = _replay_flight(inputs, aircraft)
+    rows = _rows_of_replayed_flight(inputs, aircraft, replay)
     if rows.has_credible_alarm():
-        _refuse_reversed_command_without_alarm(aircraft_inputs, aircraft, replayed_flight_verdicts, rows)
-        _refuse_exchanged_commands_without_alarm(aircraft_inputs, aircraft, rows)
+        _refuse_reversed_command_without_alarm(inputs, aircraft, replay, rows)
+        _refuse_exchanged_commands_without_alarm(inputs, aircraft, rows)
     return rows, _verdict_document(
-        samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
+        samples, rows, replay, given, inputs.mean_age_s_by_held_column
     )
 
 
-def _replay_flight(aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft) -> ReplayedVerdicts:
+def _replay_flight(inputs: AircraftDiagnosisInputs, aircraft: Aircraft) -> ReplayedVerdicts:
     """The verdicts of all samples. Raises BadInput if a command has the other sign in every part."""
-    diagnosis = aircraft_inputs.diagnosis
-    replayed_verdicts_by_stretch = []
-    for begin, end in aircraft_inputs.gap_free_stretches:
+    diagnosis = inputs.diagnosis
+    replays = []
+    for begin, end in inputs.gap_free_stretches:
         diagnosis.reset()
-        replayed_verdicts_by_stretch.append(
+        replays.append(
             replay_samples(
                 diagnosis,
-                [array[begin:end] for array in aircraft_inputs.rates_signals_commands_attitude],
-                aircraft_inputs.rate_hz,
+                [array[begin:end] for array in inputs.rates_signals_commands_attitude],
+                inputs.rate_hz,
             )
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(aircraft_inputs.samples.name, aircraft, replayed_verdicts_by_stretch)
+        _check_command_signs(inputs.samples.name, aircraft, replays)
     return _join_stretch_verdicts(
-        len(aircraft_inputs.samples.t_s),
+        len(inputs.samples.t_s),
         len(aircraft.surfaces),
-        aircraft_inputs.gap_free_stretches,
-        replayed_verdicts_by_stretch,
+        inputs.gap_free_stretches,
+        replays,
     )
 
 
 def _rows_of_replayed_flight(
-    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, replayed_flight_verdicts: ReplayedVerdicts
+    inputs: AircraftDiagnosisInputs, aircraft: Aircraft, replay: ReplayedVerdicts
 ) -> DiagnosisRows:
     """The rows, without a verdict where the log is not credible."""
-    t_s, gap_free_stretches = aircraft_inputs.samples.t_s, aircraft_inputs.gap_free_stretches
+    t_s, stretches = inputs.samples.t_s, inputs.gap_free_stretches
     rows = diagnosis_rows_from_replay(
-        t_s, replayed_flight_verdicts, aircraft.surfaces, aircraft_inputs.diagnosis.config
+        t_s, replay, aircraft.surfaces, inputs.diagnosis.config
     )
-    rows_by_reason = _undiagnosable_rows_by_reason(
-        aircraft_inputs.rates_signals_commands_attitude[1],
+    reasons = _undiagnosable_rows_by_reason(
+        inputs.rates_signals_commands_attitude[1],
         aircraft,
-        aircraft_inputs.has_missing_value,
-        gap_free_stretches,
-    ) | _rows_by_reason_after_unanticipated_start(t_s, gap_free_stretches, replayed_flight_verdicts)
+        inputs.has_missing_value,
+        stretches,
+    ) | _rows_by_reason_after_unanticipated_start(t_s, stretches, replay)
     return rows.without_verdict(
-        _drop_empty_add_doubtful_alarm_reason(gap_free_stretches, rows, rows_by_reason)
+        _drop_empty_add_doubtful_alarm_reason(stretches, rows, reasons)
     )
 
 
 def _refuse_reversed_command_without_alarm(
-    aircraft_inputs: AircraftDiagnosisInputs,
+    inputs: AircraftDiagnosisInputs,
     aircraft: Aircraft,
-    replayed_flight_verdicts: ReplayedVerdicts,
+    replay: ReplayedVerdicts,
     rows: DiagnosisRows,
 ) -> None:
     """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
-    for surface_index in np.flatnonzero(replayed_flight_verdicts.relative_command_gains < 0.0):
-        rates, signals, commands, attitude = aircraft_inputs.rates_signals_commands_attitude
-        signs = np.where(np.arange(len(aircraft.surfaces)) == surface_index, -1.0, 1.0)
-        corrected_inputs = replace(
-            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, commands * signs, attitude]
+    for s in np.flatnonzero(replay.relative_command_gains < 0.0):
+        rates, signals, commands, attitude = inputs.rates_signals_commands_attitude
+        signs = np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
+        corrected = replace(
+            inputs, rates_signals_commands_attitude=[rates, signals, commands * signs, attitude]
         )
-        corrected_rows = _rows_of_replayed_flight(
-            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
+        rows_then = _rows_of_replayed_flight(
+            corrected, aircraft, _replay_flight(corrected, aircraft)
         )
-        if corrected_rows.are_healthy_where_credible_in(rows):
+        if rows_then.are_healthy_where_credible_in(rows):
             raise reversed_command_error(
-                aircraft_inputs.samples.name, aircraft.surfaces[surface_index], f"of {aircraft.name}"
+                inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}"
             )
 
 
 def _refuse_exchanged_commands_without_alarm(
-    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, rows: DiagnosisRows
+    inputs: AircraftDiagnosisInputs, aircraft: Aircraft, rows: DiagnosisRows
 ) -> None:
     """Raise BadInput if the log has no alarm once two commands are exchanged."""
-    rates, signals, _, attitude = aircraft_inputs.rates_signals_commands_attitude
+    rates, signals, _, attitude = inputs.rates_signals_commands_attitude
     for first, second in combinations(range(len(aircraft.surfaces)), 2):
         order = np.arange(len(aircraft.surfaces))
         order[[first, second]] = second, first
-        exchanged_commands = aircraft_inputs.samples.commands[:, order] * aircraft_inputs.full_deflection_rad
-        corrected_inputs = replace(
-            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, exchanged_commands, attitude]
+        commands = inputs.samples.commands[:, order] * inputs.full_deflection_rad
+        corrected = replace(
+            inputs, rates_signals_commands_attitude=[rates, signals, commands, attitude]
         )
-        if _raises_any_alarm(corrected_inputs):
+        if _raises_any_alarm(corrected):
             continue
-        corrected_rows = _rows_of_replayed_flight(
-            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
+        rows_then = _rows_of_replayed_flight(
+            corrected, aircraft, _replay_flight(corrected, aircraft)
         )
-        if corrected_rows.are_healthy_where_credible_in(rows):
+        if rows_then.are_healthy_where_credible_in(rows):
             raise BadInput(
-                f"{aircraft_inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
+                f"{inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
                 f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
                 f"{aircraft.name}"
             )
 
 
-def _raises_any_alarm(aircraft_inputs: AircraftDiagnosisInputs) -> bool:
+def _raises_any_alarm(inputs: AircraftDiagnosisInputs) -> bool:
     """Whether an alarm is raised in any stretch; nothing after it is replayed."""
-    for begin, end in aircraft_inputs.gap_free_stretches:
-        aircraft_inputs.diagnosis.reset()
+    for begin, end in inputs.gap_free_stretches:
+        inputs.diagnosis.reset()
         arrays = [
             np.ascontiguousarray(array[begin:end])
-            for array in aircraft_inputs.rates_signals_commands_attitude
+            for array in inputs.rates_signals_commands_attitude
         ]
-        if any(aircraft_inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
+        if any(inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
             return True
     return False
 
 
 def _check_command_signs(
-    flight_name: str, aircraft: Aircraft, replayed_verdicts_by_stretch: list[ReplayedVerdicts]
+    flight: str, aircraft: Aircraft, replays: list[ReplayedVerdicts]
 ) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
-    for surface, gain_upper_bound in zip(
+    for surface, upper in zip(
         aircraft.surfaces,
         np.min(
-            [replayed.relative_command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
+            [replayed.relative_command_gain_upper_bounds for replayed in replays], axis=0
         ),
         strict=True,
     ):
-        if gain_upper_bound < trust.MAX_REVERSED_GAIN:
+        if upper < trust.MAX_REVERSED_GAIN:
             reason = f"the rates answer the command of {surface} the other way round in all of it"
             raise BadInput(
-                f"{flight_name}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
+                f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
             )
 
 
-def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
+def _check_log_has_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
     """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
-    missing_surfaces = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
-    if missing_surfaces:
+    missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
+    if missing:
         reason = (
-            f"surfaces: no {missing_surfaces[0]}, allowed: what the commands make of "
+            f"surfaces: no {missing[0]}, allowed: what the commands make of "
             f"{', '.join(aircraft.surfaces)}"
         )
         raise BadInput(f"vehicle {vehicle.name}: {reason}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
-    flow_names = _flow_input_names(aircraft)
-    for name in flow_names:
+    flow = _flow_input_names(aircraft)
+    for name in flow:
         if name not in vehicle.flow:
-            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow_names)}"
+            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
-    for quantity_column in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
-        if quantity_column.column not in recording.columns:
-            nearest_text = recording.nearest_column_names_text(quantity_column.column)
-            reason = f"no column {quantity_column.column}, allowed: a log that has it; it has {nearest_text}"
-            raise BadInput(f"{recording.name}: {reason}")
+    for quantity in (vehicle.airspeed, *(vehicle.flow[name] for name in flow)):
+        if quantity.column not in log.columns:
+            nearest = log.nearest_column_names_text(quantity.column)
+            reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
+            raise BadInput(f"{log.name}: {reason}")
 
 
 def _flow_input_names(aircraft: Aircraft) -> list[str]:
@@ -322,10 +322,10 @@ def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
-    first_times_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
-    steps_s = np.diff(first_times_s)
-    even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
-    rate_hz = float(f"{1.0 / (even_steps_s.mean() if len(even_steps_s) else samples.dt_s):.4g}")
+    first_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
+    steps_s = np.diff(first_s)
+    even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
+    rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")
     if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
         reason = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
         raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {reason}")
@@ -333,82 +333,82 @@ def _log_rate_hz(samples: Samples) -> float:
 
 
 def _read_sample_inputs(
-    samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
+    samples: Samples, log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, tilted: bool
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.log_column_names_of_each_input`, and
-    the mean age of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
-    si_column_by_name = convert_to_si(recording, vehicle).columns
-    mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
+    the mean age of the values of each held column, s. tilted: if false, the attitude is zeros."""
+    columns = convert_to_si(log, vehicle).columns
+    ages = dict(samples.mean_age_s_by_held_column)
 
-    def sample_values_and_store_age(quantity_column: QuantityColumn) -> Floats:
-        values, mean_age_s = values_and_mean_age_at(
-            si_column_by_name[quantity_column.column], samples.t_s, samples.dt_s
+    def sample_values_and_store_age(quantity: QuantityColumn) -> Floats:
+        values, age_s = values_and_mean_age_at(
+            columns[quantity.column], samples.t_s, samples.dt_s
         )
-        if mean_age_s is not None:
-            mean_age_s_by_held_column[quantity_column.column] = mean_age_s
+        if age_s is not None:
+            ages[quantity.column] = age_s
         return values
 
-    alpha_rad, beta_rad, qdyn_pa, *signals_beyond_flow = (
+    alpha, beta_rad, qdyn_pa, *others = (
         sample_values_and_store_age(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
     assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signal_arrays = [
-        alpha_rad,
+    signals = [
+        alpha,
         beta_rad,
         sample_values_and_store_age(vehicle.airspeed),
         qdyn_pa,
-        *signals_beyond_flow,
+        *others,
     ]
-    surface_indices = _vehicle_surface_indices(vehicle, aircraft)
-    full_deflection_rad = _full_deflection_rad(vehicle, aircraft)
+    places = _vehicle_surface_indices(vehicle, aircraft)
+    full_rad = _full_deflection_rad(vehicle, aircraft)
     attitude = np.zeros_like(samples.rates)
-    if needs_attitude:
-        for axis, angle_name in enumerate(_ATTITUDE_ANGLE_NAMES):
-            quantity_column = getattr(vehicle.attitude, angle_name) if vehicle.attitude else None
-            if quantity_column is None or quantity_column.column not in si_column_by_name:
+    if tilted:
+        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
+            quantity = getattr(vehicle.attitude, angle) if vehicle.attitude else None
+            if quantity is None or quantity.column not in columns:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle_name}: {reason}")
-            attitude[:, axis] = sample_values_and_store_age(quantity_column)
+                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
+            attitude[:, axis] = sample_values_and_store_age(quantity)
     return [
         samples.rates,
-        np.column_stack(signal_arrays),
-        samples.commands[:, surface_indices] * full_deflection_rad,
+        np.column_stack(signals),
+        samples.commands[:, places] * full_rad,
         attitude,
-    ], mean_age_s_by_held_column
+    ], ages
 
 
 def _check_units_plausible(
-    flight_name: str, rates_signals_commands_attitude: list[Floats], aircraft: Aircraft
+    flight: str, arrays: list[Floats], aircraft: Aircraft
 ) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    signals, commands = rates_signals_commands_attitude[1], rates_signals_commands_attitude[2]
-    for signal_index, name in enumerate(("alpha_rad", "beta_rad")):
-        median_flow_angle_magnitude = _median_without_nan(np.abs(signals[:, signal_index]))
-        if median_flow_angle_magnitude > 0.5 * pi:
+    signals, commands = arrays[1], arrays[2]
+    for i, name in enumerate(("alpha_rad", "beta_rad")):
+        median = _median_without_nan(np.abs(signals[:, i]))
+        if median > 0.5 * pi:
             raise BadInput(
-                f"{flight_name}: flow.{name} is {median_flow_angle_magnitude:.3g} in the middle, "
+                f"{flight}: flow.{name} is {median:.3g} in the middle, "
                 "allowed: rad; `unit: deg`?"
             )
-    is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
-    density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
-    median_density_kg_m3 = _median_without_nan(density_kg_m3)
+    flies = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
+    rho = 2.0 * signals[flies, 3] / signals[flies, 2] ** 2
+    median_density_kg_m3 = _median_without_nan(rho)
     if (
-        density_kg_m3.size
+        rho.size
         and not _AIR_DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _AIR_DENSITY_LIMITS_KG_M3[1]
     ):
         reason = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
-        allowed_text = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
-        raise BadInput(f"{flight_name}: {reason}, allowed: {allowed_text}, true airspeed in m/s and Pa")
-    for surface_index, surface in enumerate(aircraft.surfaces):
+        allowed = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
+        raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
+    for s, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
-        max_deflection_rad = max(abs(travel.min_rad), abs(travel.max_rad))
-        max_command_rad = np.nanmax(np.abs(commands[:, surface_index]), initial=0.0)
-        if max_command_rad > _MAX_COMMAND_TO_STOP_RATIO * max_deflection_rad:
+        stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
+        max_rad = np.nanmax(np.abs(commands[:, s]), initial=0.0)
+        if max_rad > _MAX_COMMAND_TO_STOP_RATIO * stop_rad:
             reason = (
-                f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
-                f"{max_deflection_rad:.3g} rad"
+                f"the command of {surface} reaches {max_rad:.3g} rad, allowed: its stop, "
+                f"{stop_rad:.3g} rad"
             )
-            raise BadInput(f"{flight_name}: {reason}; full_deflection_rad says what 1 is")
+            raise BadInput(f"{flight}: {reason}; full_deflection_rad says what 1 is")
 
 
 def _median_without_nan(values: Floats) -> float:
@@ -417,174 +417,174 @@ def _median_without_nan(values: Floats) -> float:
     return float(np.median(numbers)) if numbers.size else float("nan")
 
 
-def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: float) -> list[tuple[int, int]]:
+def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
-    is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
-    is_known = ~has_missing_value
-    joins_next_row = is_known[1:] & is_known[:-1] & ~is_uneven_step
-    stretch_edges = np.flatnonzero(np.diff(np.concatenate([[False], joins_next_row, [False]]).astype(int)))
-    first_rows_and_last_rows_inclusive = zip(
-        stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True
+    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
+    is_known = ~missing
+    joins = is_known[1:] & is_known[:-1] & ~uneven
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], joins, [False]]).astype(int)))
+    ends = zip(
+        edges[::2].tolist(), edges[1::2].tolist(), strict=True
     )
     return [
         (first, last + 1)
-        for first, last in first_rows_and_last_rows_inclusive
+        for first, last in ends
         if last + 1 - first >= _MIN_STRETCH_SAMPLES
     ]
 
 
 def _join_stretch_verdicts(
-    n_samples: int,
-    n_surfaces: int,
-    gap_free_stretches: list[tuple[int, int]],
-    replayed_verdicts_by_stretch: list[ReplayedVerdicts],
+    n: int,
+    n_s: int,
+    stretches: list[tuple[int, int]],
+    replays: list[ReplayedVerdicts],
 ) -> ReplayedVerdicts:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
-    verdicts = [Verdict()] * n_samples
-    effectiveness_low = np.zeros((n_samples, n_surfaces))
-    effectiveness_high = np.ones((n_samples, n_surfaces))
-    least_gains, least_gain_upper_bounds = (
-        np.min([getattr(replayed, name) for replayed in replayed_verdicts_by_stretch], axis=0)
+    verdicts = [Verdict()] * n
+    low = np.zeros((n, n_s))
+    high = np.ones((n, n_s))
+    gains, upper = (
+        np.min([getattr(replayed, name) for replayed in replays], axis=0)
         for name in ("relative_command_gains", "relative_command_gain_upper_bounds")
     )
-    for (begin, end), replayed in zip(gap_free_stretches, replayed_verdicts_by_stretch, strict=True):
-        verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
+    for (begin, end), replayed in zip(stretches, replays, strict=True):
+        verdicts[begin:end], low[begin:end], high[begin:end] = (
             replayed.verdicts,
             replayed.single_fault_effectiveness_low,
             replayed.single_fault_effectiveness_high,
         )
     return ReplayedVerdicts(
-        verdicts, effectiveness_low, effectiveness_high, least_gains, least_gain_upper_bounds
+        verdicts, low, high, gains, upper
     )
 
 
 def _undiagnosable_rows_by_reason(
-    signals: Floats, aircraft: Aircraft, has_missing_value: Mask, gap_free_stretches: list[tuple[int, int]]
+    signals: Floats, aircraft: Aircraft, missing: Mask, stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """For each reason the rows (n,) for which there is no verdict."""
-    min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
-    min_alpha_rad, max_alpha_rad = aircraft.alpha_rad
-    is_outside_stretches = np.ones(len(signals), dtype=bool)
-    for begin, end in gap_free_stretches:
-        is_outside_stretches[begin:end] = False
-    airspeed_mps, alpha_rad = signals[:, 2], signals[:, 0]
+    low_mps, high_mps = aircraft.envelope.airspeed_mps
+    alpha_min, alpha_max = aircraft.alpha_rad
+    outside = np.ones(len(signals), dtype=bool)
+    for begin, end in stretches:
+        outside[begin:end] = False
+    V, alpha = signals[:, 2], signals[:, 0]
     return {
-        "a number is missing": has_missing_value,
-        "samples are not evenly spaced": is_outside_stretches & ~has_missing_value,
-        f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (
-            airspeed_mps < min_airspeed_mps
+        "a number is missing": missing,
+        "samples are not evenly spaced": outside & ~missing,
+        f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (
+            low_mps > V
         )
-        | (airspeed_mps > max_airspeed_mps),
-        f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (
-            alpha_rad < min_alpha_rad
+        | (high_mps < V),
+        f"angle of attack is outside {alpha_min:.3g} to {alpha_max:.3g} rad": (
+            alpha < alpha_min
         )
-        | (alpha_rad > max_alpha_rad),
+        | (alpha > alpha_max),
     }
 
 
 def _rows_by_reason_after_unanticipated_start(
-    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight_verdicts: ReplayedVerdicts
+    t_s: Floats, stretches: list[tuple[int, int]], replay: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
-    is_after_unanticipated_fault_alarm = np.zeros(len(t_s), dtype=bool)
-    for begin, end in gap_free_stretches:
-        first_second_end_row = begin + int(
+    after = np.zeros(len(t_s), dtype=bool)
+    for begin, end in stretches:
+        stop = begin + int(
             np.searchsorted(t_s[begin:end], t_s[begin] + _UNANTICIPATED_FAULT_AT_START_WINDOW_S)
         )
         if any(
             verdict.isolated == "unanticipated"
-            for verdict in replayed_flight_verdicts.verdicts[begin:first_second_end_row]
+            for verdict in replay.verdicts[begin:stop]
         ):
-            first_alarm_row = next(
-                k for k in range(begin, first_second_end_row) if replayed_flight_verdicts.verdicts[k].detected
+            first = next(
+                k for k in range(begin, stop) if replay.verdicts[k].detected
             )
-            is_after_unanticipated_fault_alarm[first_alarm_row:end] = True
+            after[first:end] = True
     reason = (
         "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
     )
-    return {reason: is_after_unanticipated_fault_alarm}
+    return {reason: after}
 
 
 def _drop_empty_add_doubtful_alarm_reason(
-    gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, rows_by_reason: dict[str, Mask]
+    stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
     a reason of its own."""
-    has_reason = np.logical_or.reduce(list(rows_by_reason.values()))
-    is_after_doubtful_alarm = np.zeros(len(rows.t_s), dtype=bool)
-    for begin, end in gap_free_stretches:
-        alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
-        if alarm_rows.size and has_reason[alarm_rows[0]]:
-            is_after_doubtful_alarm[alarm_rows[0] : end] = True
-    rows_by_reason = rows_by_reason | {
-        "the alarm was raised where nothing can be said": is_after_doubtful_alarm & ~has_reason
+    has_reason = np.logical_or.reduce(list(reasons.values()))
+    after = np.zeros(len(rows.t_s), dtype=bool)
+    for begin, end in stretches:
+        alarms = begin + np.flatnonzero(rows.faulty[begin:end])
+        if alarms.size and has_reason[alarms[0]]:
+            after[alarms[0] : end] = True
+    reasons = reasons | {
+        "the alarm was raised where nothing can be said": after & ~has_reason
     }
     return {
-        reason: has_this_reason for reason, has_this_reason in rows_by_reason.items() if has_this_reason.any()
+        reason: mask for reason, mask in reasons.items() if mask.any()
     }
 
 
 def _verdict_document(
     samples: Samples,
     rows: DiagnosisRows,
-    replayed_flight_verdicts: ReplayedVerdicts,
-    diagnosed_aircraft: DiagnosedAircraft,
-    mean_age_s_by_held_column: dict[str, float],
+    replay: ReplayedVerdicts,
+    given: DiagnosedAircraft,
+    ages: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
-    surfaces = list(diagnosed_aircraft.aircraft.surfaces)
-    alarm_rows = np.flatnonzero(rows.faulty)
-    verdict_of_last_alarm_row = (
-        replayed_flight_verdicts.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    surfaces = list(given.aircraft.surfaces)
+    alarms = np.flatnonzero(rows.faulty)
+    last = (
+        replay.verdicts[alarms[-1]] if alarms.size else Verdict()
     )
-    alarm_rows_with_last_isolation = [
+    since = [
         k
-        for k in alarm_rows.tolist()
-        if replayed_flight_verdicts.verdicts[k].isolated == verdict_of_last_alarm_row.isolated
+        for k in alarms.tolist()
+        if replay.verdicts[k].isolated == last.isolated
     ]
-    held_column_notes = [
-        f"{name} is held, {mean_age_s:.2g} s old on average: errors declared have to cover it"
-        for name, mean_age_s in mean_age_s_by_held_column.items()
+    held = [
+        f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
+        for name, age_s in ages.items()
     ]
     return {
         "flight": samples.name,
-        "aircraft": diagnosed_aircraft.aircraft.name,
-        "declared": diagnosed_aircraft.declared_errors,
+        "aircraft": given.aircraft.name,
+        "declared": given.declared_errors,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
         "recorded_s": len(samples.t_s) * samples.dt_s,
         "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
-        "faulty": bool(alarm_rows.size),
-        "detection_s": float(samples.t_s[alarm_rows[0]]) if alarm_rows.size else None,
-        "isolation_s": float(samples.t_s[alarm_rows_with_last_isolation[0]])
-        if verdict_of_last_alarm_row.isolated
+        "faulty": bool(alarms.size),
+        "detection_s": float(samples.t_s[alarms[0]]) if alarms.size else None,
+        "isolation_s": float(samples.t_s[since[0]])
+        if last.isolated
         else None,
-        "isolated": verdict_of_last_alarm_row.isolated,
-        "type": verdict_of_last_alarm_row.type,
-        "estimate": verdict_of_last_alarm_row.estimate,
-        "candidates": list(verdict_of_last_alarm_row.candidates),
+        "isolated": last.isolated,
+        "type": last.type,
+        "estimate": last.estimate,
+        "candidates": list(last.candidates),
         "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": findings.fault_events(rows, surfaces),
         "can_separate": _excluded_loss_sentences(rows, surfaces),
         "isolability": {"together": []},
-        "notes": [*samples.notes, *held_column_notes],
+        "notes": [*samples.notes, *held],
     }
 
 
 def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
     """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
     the healthy rows."""
-    is_credible_without_alarm = (rows.faulty == 0) & (rows.credible == 1)
-    if not is_credible_without_alarm.any():
+    quiet = (rows.faulty == 0) & (rows.credible == 1)
+    if not quiet.any():
         return []
-    median_least_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
+    losses = 1.0 - np.median(rows.effectiveness_low[quiet], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, median_least_excluded_losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, losses.tolist(), strict=True)
     ]
 
 

@@ -17,31 +17,31 @@ from beaver_ftc_logs.diagnose import DiagnosisRows
 
 
 def write_certificate_and_log(
-    aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path
+    inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path
 ) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
-    stretches_with_alarm = (
+    alarmed = (
         stretch
-        for stretch in aircraft_inputs.gap_free_stretches
+        for stretch in inputs.gap_free_stretches
         if rows.faulty[stretch[0] : stretch[1]].any()
     )
-    begin, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
+    begin, end = next(alarmed, inputs.gap_free_stretches[0])
     stretch_inputs = [
-        np.ascontiguousarray(array[begin:end]) for array in aircraft_inputs.rates_signals_commands_attitude
+        np.ascontiguousarray(array[begin:end]) for array in inputs.rates_signals_commands_attitude
     ]
-    diagnosis = aircraft_inputs.diagnosis
+    diagnosis = inputs.diagnosis
 
     def step_diagnosis_and_yield_index() -> Iterator[int]:
-        for sample_index, sample in enumerate(zip(*stretch_inputs, strict=True)):
+        for k, sample in enumerate(zip(*stretch_inputs, strict=True)):
             diagnosis.step(*sample)
-            yield sample_index
+            yield k
 
     diagnosis.reset()
-    diagnosis_memory, scenario = diagnosis.inside()
-    scenario_named_as_flight = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
+    memory, scenario = diagnosis.inside()
+    scenario_named_as_flight = scenario.model_copy(update={"name": inputs.samples.name})
     log, document = by_frames.proved(
-        scenario_named_as_flight, diagnosis_memory, step_diagnosis_and_yield_index()
+        scenario_named_as_flight, memory, step_diagnosis_and_yield_index()
     )
-    document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[begin])})
+    document = certificate.with_digest(document | {"begins_s": float(inputs.samples.t_s[begin])})
     by_frames.write(scenario_named_as_flight, log, document, folder)

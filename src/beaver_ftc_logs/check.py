@@ -90,144 +90,144 @@ _MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _PLAUSIBLE_LOG_RATE_RANGE_HZ = (4.0, 2000.0)
 
 
-def check_log(path: Path, vehicle: Vehicle | None, reader_name: str | None) -> Document:
+def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
     """Return a description of a log in `lines`, and a `vehicle` for it: the one given, or a guess.
 
     usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
     """
     remarks: list[str] = []
-    guessed_vehicle: Document | None = None
+    guess: Document | None = None
     if vehicle is None:
-        guessed_vehicle = _guess_vehicle(path, reader_name, remarks)
-        if guessed_vehicle is None:
+        guess = _guess_vehicle(path, reader, remarks)
+        if guess is None:
             return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
-        vehicle = Vehicle.model_validate(guessed_vehicle)
-    usable_and_lines_by_part = [
-        _check_recording(recording, vehicle)
-        for recording in read_parts_for_vehicle(path, vehicle, reader_name)
+        vehicle = Vehicle.model_validate(guess)
+    parts = [
+        _check_recording(log, vehicle)
+        for log in read_parts_for_vehicle(path, vehicle, reader)
     ]
-    for part_number, (_, part_lines) in enumerate(usable_and_lines_by_part, 1):
+    for part, (_, lines) in enumerate(parts, 1):
         remarks += (
-            part_lines
-            if len(usable_and_lines_by_part) == 1
-            else [f"part {part_number} of {len(usable_and_lines_by_part)}: {line}" for line in part_lines]
+            lines
+            if len(parts) == 1
+            else [f"part {part} of {len(parts)}: {line}" for line in lines]
         )
     return {
         "log": str(path),
-        "usable": all(is_usable for is_usable, _ in usable_and_lines_by_part),
+        "usable": all(usable for usable, _ in parts),
         "lines": remarks,
-        "vehicle": guessed_vehicle,
+        "vehicle": guess,
     }
 
 
-def _check_recording(recording: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
-    """Whether a recording could be identified or diagnosed, and what is said of it."""
+def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
+    """Whether a log could be identified or diagnosed, and what is said of it."""
     try:
-        samples = resample(recording, vehicle)
+        samples = resample(log, vehicle)
     except BadInput as error:
         return False, [str(error)]
-    motionless_axes = [
+    still = [
         axis
         for axis, rate in zip("pqr", samples.rates.T, strict=True)
         if np.ptp(rate[np.isfinite(rate)]) == 0.0
     ]
-    motionless_lines = [
-        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in motionless_axes
+    lines = [
+        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still
     ]
-    return not motionless_axes, [
+    return not still, [
         _log_size_text(samples),
         *samples.notes,
-        *_compare_rates_and_angles(recording, vehicle),
-        *motionless_lines,
+        *_compare_rates_and_angles(log, vehicle),
+        *lines,
     ]
 
 
 def _log_size_text(samples: Samples) -> str:
-    n_gaps, duration_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
-    longest_gap_text = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
-    size_text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {duration_s:.4g} s"
-    return f"{size_text}; gaps: {n_gaps}{longest_gap_text}"
+    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
+    gap = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
+    text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s"
+    return f"{text}; gaps: {n_gaps}{gap}"
 
 
-def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> list[str]:
+def _compare_rates_and_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, attitude_quantity_columns = recording.columns, vehicle.attitude
-    if attitude_quantity_columns is None or attitude_quantity_columns.roll.column not in columns:
+    columns, angles = log.columns, vehicle.attitude
+    if angles is None or angles.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
-    rate_columns_in_si = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch_quantity_column = attitude_quantity_columns.pitch
+    gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
+    pitch = angles.pitch
     pitch_column_in_si = (
-        _column_in_si(columns, pitch_quantity_column)
-        if pitch_quantity_column is not None and pitch_quantity_column.column in columns
+        _column_in_si(columns, pitch)
+        if pitch is not None and pitch.column in columns
         else None
     )
     roll_fit = physics.fit_roll_angle_to_rates(
-        rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
+        gyros, _column_in_si(columns, angles.roll), pitch_column_in_si
     )
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    comparison_texts = [
-        _angle_rate_fit_text(roll_fit, attitude_quantity_columns.roll.column, vehicle.rates.p.column)
+    texts = [
+        _angle_rate_fit_text(roll_fit, angles.roll.column, vehicle.rates.p.column)
     ]
-    if pitch_quantity_column is not None and pitch_column_in_si is not None:
+    if pitch is not None and pitch_column_in_si is not None:
         pitch_fit = physics.fit_pitch_angle_to_rates(
-            rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
+            gyros, _column_in_si(columns, angles.roll), pitch_column_in_si
         )
-        comparison_texts += (
-            [_angle_rate_fit_text(pitch_fit, pitch_quantity_column.column, vehicle.rates.q.column)]
+        texts += (
+            [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)]
             if pitch_fit
             else []
         )
     if (
-        yaw_quantity_column := attitude_quantity_columns.yaw
-    ) is not None and yaw_quantity_column.column in columns:
+        yaw := angles.yaw
+    ) is not None and yaw.column in columns:
         yaw_fit = physics.fit_yaw_angle_to_rates(
-            rate_columns_in_si,
-            _column_in_si(columns, attitude_quantity_columns.roll),
+            gyros,
+            _column_in_si(columns, angles.roll),
             pitch_column_in_si,
-            _column_in_si(columns, yaw_quantity_column),
+            _column_in_si(columns, yaw),
         )
-        comparison_texts += (
-            [_angle_rate_fit_text(yaw_fit, yaw_quantity_column.column, vehicle.rates.r.column)]
+        texts += (
+            [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)]
             if yaw_fit
             else []
         )
-    return comparison_texts
+    return texts
 
 
-def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column_name: str, rate_column_name: str) -> str:
-    agreement_text = (
+def _angle_rate_fit_text(fit: physics.AngleRateFit, angle: str, rate: str) -> str:
+    verdict = (
         "they agree"
         if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
         else "they tell nothing of one another"
     )
     return (
-        f"the change of {angle_column_name} is {fit.slope:.3f} times the integral of {rate_column_name} "
-        f"(correlation {fit.correlation:.2f}): {agreement_text}"
+        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} "
+        f"(correlation {fit.correlation:.2f}): {verdict}"
     )
 
 
-def _column_in_si(columns: Any, quantity_column: Any) -> Column:
-    column: Column = columns[quantity_column.column]
-    return replace(column, values=quantity_column.to_si(column.values))
+def _column_in_si(columns: Any, quantity: Any) -> Column:
+    column: Column = columns[quantity.column]
+    return replace(column, values=quantity.to_si(column.values))
 
 
-def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> Document | None:
+def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
-    reader_name = reader_name or reader_name_for_path(path)
-    time_column_and_unit = _require_time_column_and_unit(path, remarks) if reader_name == "table" else None
-    recording, names_in_log, mixing = _read_columns_for_guess(path, reader_name, time_column_and_unit)
+    reader = reader or reader_name_for_path(path)
+    time = _require_time_column_and_unit(path, remarks) if reader == "table" else None
+    log, in_log, mixing = _read_columns_for_guess(path, reader, time)
     remarks += mixing.lines
-    names_with_numbers = [
-        name for name, column in recording.columns.items() if np.isfinite(column.values).any()
+    names = [
+        name for name, column in log.columns.items() if np.isfinite(column.values).any()
     ]
-    column_name_by_quantity = {
+    found = {
         quantity: _shortest_matching_column_name(
             pattern,
             [
                 name
-                for name in names_with_numbers
+                for name in names
                 if quantity not in ("roll", "pitch")
                 or not re.search(_ANGLE_DERIVATIVE_PATTERN, _snake_case_name(name))
             ],
@@ -235,171 +235,171 @@ def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> D
         for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
     if not mixing.surfaces:
-        rotors = multicopter_reason(recording.parameters, names_in_log)
+        rotors = multicopter_reason(log.parameters, in_log)
         if rotors is not None:
             remarks.append(
                 f"{path}: is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of "
                 "an aircraft with surfaces"
             )
             return None
-        _guess_surfaces(mixing, recording, names_with_numbers)
-    missing_axes = [axis for axis in "pqr" if column_name_by_quantity[axis] is None]
-    if missing_axes or not mixing.surfaces:
+        _guess_surfaces(mixing, log, names)
+    missing = [axis for axis in "pqr" if found[axis] is None]
+    if missing or not mixing.surfaces:
         problem = (
-            f"no column looks like the rate {missing_axes[0]}, allowed: a vehicle file that names it"
-            if missing_axes
-            else missing_commands_text(names_in_log)
+            f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
+            if missing
+            else missing_commands_text(in_log)
         )
-        nearest_text = nearest_names_text("rate" if missing_axes else "command", names_in_log)
-        remarks.append(f"{path}: {problem}; the log has {nearest_text}")
+        nearest = nearest_names_text("rate" if missing else "command", in_log)
+        remarks.append(f"{path}: {problem}; the log has {nearest}")
         return None
     return _propose_vehicle(
-        path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, mixing
+        path.stem, log, reader, time, found, mixing
     )
 
 
 def _propose_vehicle(
     name: str,
-    recording: RecordedFlight,
-    reader_name: str,
-    time_column_and_unit: tuple[str, str] | None,
-    column_name_by_quantity: dict[str, str | None],
+    log: RecordedFlight,
+    reader: str,
+    time: tuple[str, str] | None,
+    found: dict[str, str | None],
     mixing: Mixing,
 ) -> Document:
-    columns = recording.columns
-    roll_column = columns[column_name_by_quantity["roll"]] if column_name_by_quantity["roll"] else None
+    columns = log.columns
+    roll = columns[found["roll"]] if found["roll"] else None
     angle_unit = (
-        _guess_angle_unit(str(column_name_by_quantity["roll"]), roll_column, reader_name)
-        if roll_column is not None
+        _guess_angle_unit(str(found["roll"]), roll, reader)
+        if roll is not None
         else "rad"
     )
     rate_unit = _guess_rate_unit(
-        recording,
-        [str(column_name_by_quantity[axis]) for axis in "pqr"],
-        roll_column,
+        log,
+        [str(found[axis]) for axis in "pqr"],
+        roll,
         KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
-    vehicle: Document = {"name": _as_vehicle_or_surface_name(name), "reader": reader_name}
-    if time_column_and_unit and time_column_and_unit != (TIME_COLUMN, "s"):
-        vehicle["time"] = {"column": time_column_and_unit[0], "unit": time_column_and_unit[1]}
+    vehicle: Document = {"name": _as_vehicle_or_surface_name(name), "reader": reader}
+    if time and time != (TIME_COLUMN, "s"):
+        vehicle["time"] = {"column": time[0], "unit": time[1]}
     vehicle["rates"] = {
-        axis: _vehicle_file_column_entry(str(column_name_by_quantity[axis]), rate_unit, "rad/s")
+        axis: _vehicle_file_column_entry(str(found[axis]), rate_unit, "rad/s")
         for axis in "pqr"
     }
     vehicle["commands"] = mixing.commands
     vehicle["surfaces"] = mixing.surfaces
-    column_name_by_angle = {
-        axis: column_name_by_quantity[axis] for axis in ("roll", "pitch") if column_name_by_quantity[axis]
+    angles = {
+        axis: found[axis] for axis in ("roll", "pitch") if found[axis]
     }
-    if roll_column is not None:
+    if roll is not None:
         vehicle["attitude"] = {
             axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
-            for axis, name in column_name_by_angle.items()
+            for axis, name in angles.items()
         }
-    if z_acceleration_column_name := column_name_by_quantity["az"]:
-        median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column_name].values)))
-        acceleration_unit = (
-            nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median_magnitude, 2.0)
-            if median_magnitude > 0.0
+    if az := found["az"]:
+        median = float(np.nanmedian(np.abs(columns[az].values)))
+        unit = (
+            nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median, 2.0)
+            if median > 0.0
             else None
         )
-        if acceleration_unit:
+        if unit:
             vehicle["acceleration"] = _vehicle_file_column_entry(
-                z_acceleration_column_name, acceleration_unit, "m/s2"
+                az, unit, "m/s2"
             )
-    if column_name_by_quantity["airspeed"]:
-        vehicle["airspeed"] = column_name_by_quantity["airspeed"]
+    if found["airspeed"]:
+        vehicle["airspeed"] = found["airspeed"]
     return vehicle
 
 
 def _guess_surfaces(
     mixing: Mixing,
-    recording: RecordedFlight,
-    names_with_numbers: Sequence[str],
+    log: RecordedFlight,
+    names: Sequence[str],
 ) -> None:
     """Make a surface of each column that is known to carry a command."""
-    for name in command_names(names_with_numbers, recording.parameters)[:_MAX_PROPOSED_COMMANDS]:
-        mixing.entry_by_column[name] = _vehicle_file_command_entry(name, recording.columns[name].values)
+    for name in command_names(names, log.parameters)[:_MAX_PROPOSED_COMMANDS]:
+        mixing.entry_by_column[name] = _vehicle_file_command_entry(name, log.columns[name].values)
         mixing.surfaces[_as_vehicle_or_surface_name(name)] = {name: 1.0}
 
 
 def _read_columns_for_guess(
-    path: Path, reader_name: str, time_column_and_unit: tuple[str, str] | None
+    path: Path, reader: str, time: tuple[str, str] | None
 ) -> tuple[RecordedFlight, list[str], Mixing]:
     """The columns of a log, of a long table its first part, that may be something; the names of all; the
     mixing by its parameters."""
-    if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS:
-        names_and_parameters = read_flight(path, reader_name, columns=())
-        all_names = list(names_and_parameters.columns)
-        mixing = mixing_of_log(reader_name, names_and_parameters.parameters, all_names)
-        names_to_read = [*_names_of_columns_to_read(all_names, None), *mixing.entry_by_column]
-        return read_flight(path, reader_name, columns=names_to_read), all_names, mixing
-    names_to_read_or_all = _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
-    recording = next(read_parts(path, reader_name, time_column_and_unit, names_to_read_or_all))
+    if reader in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+        log = read_flight(path, reader, columns=())
+        names = list(log.columns)
+        mixing = mixing_of_log(reader, log.parameters, names)
+        names_to_read = [*_names_of_columns_to_read(names, None), *mixing.entry_by_column]
+        return read_flight(path, reader, columns=names_to_read), names, mixing
+    wanted = _names_of_columns_to_read(column_names(path)) if reader == "table" else None
+    recording = next(read_parts(path, reader, time, wanted))
     return recording, list(recording.columns), Mixing()
 
 
 def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
     """Columns that may be something: a log with many is not read whole."""
-    pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
-    names_like_quantity_or_command = [
+    pattern = "|".join(f"({part})" for part in _COLUMN_NAME_PATTERNS.values())
+    likely = [
         name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or is_command_name(name)
     ]
-    return names_like_quantity_or_command[:max_columns]
+    return likely[:max_columns]
 
 
-def _snake_case_name(column_name: str) -> str:
+def _snake_case_name(name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    name_with_unit_suffix = re.sub(
-        r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower()
+    text = re.sub(
+        r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower()
     )
-    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", name_with_unit_suffix).strip("_")
+    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
 
 
 def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
-    matching_names = [
+    matches = [
         name
         for name in names
         if re.fullmatch(pattern, _snake_case_name(name))
         and not re.search(_NOT_MEASURED_NAME_PATTERN, _snake_case_name(name))
     ]
-    return min(matching_names, key=lambda name: (len(name), name), default=None)
+    return min(matches, key=lambda name: (len(name), name), default=None)
 
 
 def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
-    table_column_names = column_names(path)
-    names_like_time = [
+    names = column_names(path)
+    likely = [
         name
-        for name in table_column_names
+        for name in names
         if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
     ]
-    text_phrases: list[str] = []
-    for name in sorted(names_like_time, key=lambda name: name != TIME_COLUMN):
-        first_cells = first_cells_of_column(path, name)
-        first_stamps = first_cells.numbers[name][np.isfinite(first_cells.numbers[name])]
-        if text_phrase := text_of_column_phrase(first_cells, name):
-            text_phrases.append(f"{name} holds {text_phrase.removeprefix(', but ')}")
-        median_step = float(np.median(np.diff(first_stamps[:50]))) if len(first_stamps) > 1 else 0.0
-        plausible_units = [
+    phrases: list[str] = []
+    for name in sorted(likely, key=lambda name: name != TIME_COLUMN):
+        cells = first_cells_of_column(path, name)
+        stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
+        if phrase := text_of_column_phrase(cells, name):
+            phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
+        step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
+        units = [
             unit
-            for unit, seconds_per_unit in SECONDS_PER_TIME_UNIT.items()
-            if median_step > 0.0 and _is_log_rate_plausible(1.0 / (median_step * seconds_per_unit))
+            for unit, seconds in SECONDS_PER_TIME_UNIT.items()
+            if step > 0.0 and _is_log_rate_plausible(1.0 / (step * seconds))
         ]
-        if plausible_units:
+        if units:
             unit = next(
-                (unit for unit in plausible_units if _snake_case_name(name).endswith(unit)),
-                plausible_units[0],
+                (unit for unit in units if _snake_case_name(name).endswith(unit)),
+                units[0],
             )
             if (name, unit) != (TIME_COLUMN, "s"):
                 remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
-    allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
-    text_phrase = f" ({'; '.join(text_phrases)})" if text_phrases else ""
+    allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
+    phrase = f" ({'; '.join(phrases)})" if phrases else ""
     raise BadInput(
-        f"{path}: no column of time{text_phrase}, allowed: {allowed_text}; it has "
-        f"{nearest_names_text(TIME_COLUMN, table_column_names)}"
+        f"{path}: no column of time{phrase}, allowed: {allowed}; it has "
+        f"{nearest_names_text(TIME_COLUMN, names)}"
     )
 
 
@@ -407,29 +407,29 @@ def _is_log_rate_plausible(rate_hz: float) -> bool:
     return _PLAUSIBLE_LOG_RATE_RANGE_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATE_RANGE_HZ[1]
 
 
-def _guess_angle_unit(column_name: str, roll_column: Column, reader_name: str) -> str:
+def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
     if (
-        reader_name == "ardupilot"
-        or "deg" in column_name.lower()
-        or _largest_magnitude(roll_column.values) > 2.0 * np.pi
+        reader == "ardupilot"
+        or "deg" in name.lower()
+        or _largest_magnitude(roll.values) > 2.0 * np.pi
     ):
         return "deg"
     return "rad"
 
 
 def _guess_rate_unit(
-    recording: RecordedFlight,
-    rate_column_names: list[str],
-    roll_column: Column | None,
+    log: RecordedFlight,
+    rate_names: list[str],
+    roll: Column | None,
     rad_per_roll_unit: float,
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
-    logged_rate_columns = [recording.columns[name] for name in rate_column_names]
-    if roll_column is not None:
+    rates = [log.columns[name] for name in rate_names]
+    if roll is not None:
         roll_fit = physics.fit_roll_angle_to_rates(
-            logged_rate_columns, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
+            rates, replace(roll, values=roll.values * rad_per_roll_unit), None
         )
         if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
@@ -437,7 +437,7 @@ def _guess_rate_unit(
         (
             unit
             for name_part, unit in _RATE_UNIT_BY_NAME_PART.items()
-            if name_part in rate_column_names[0].lower()
+            if name_part in rate_names[0].lower()
         ),
         None,
     )
@@ -445,7 +445,7 @@ def _guess_rate_unit(
         return unit_in_name
     return (
         "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in logged_rate_columns)
+        if max(_largest_magnitude(rate.values) for rate in rates)
         > _MAX_RATE_NUMBER_READ_AS_RAD_S
         else "rad/s"
     )
@@ -455,16 +455,16 @@ def _largest_magnitude(values: Floats) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _vehicle_file_column_entry(column_name: str, unit: str, si_unit: str) -> Any:
-    return column_name if unit == si_unit else {"column": column_name, "unit": unit}
+def _vehicle_file_column_entry(name: str, unit: str, si_unit: str) -> Any:
+    return name if unit == si_unit else {"column": name, "unit": unit}
 
 
-def _vehicle_file_command_entry(column_name: str, values: Floats) -> Any:
+def _vehicle_file_command_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
-    median, max_magnitude = float(np.nanmedian(values)), _largest_magnitude(values)
+    median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
     if _PWM_MEDIAN_RANGE_US[0] < median < _PWM_MEDIAN_RANGE_US[1]:
-        return {"column": column_name, "scale": 0.0025, "offset": -3.75}
-    return {"column": column_name, "unit": "%"} if 10.0 < max_magnitude <= 105.0 else column_name
+        return {"column": name, "scale": 0.0025, "offset": -3.75}
+    return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
 
 
 def _as_vehicle_or_surface_name(name: str) -> str:
@@ -475,15 +475,15 @@ def vehicle_file_text(vehicle: Document) -> str:
     """A vehicle file's text."""
     import yaml
 
-    header = (
+    head = (
         "# Proposed by `identify --check`. Check each line. Choose commands that come before any part\n"
         "# that can fail. A surface may follow several commands: `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
     )
     yaml_text = str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
-    return header + yaml_text + unused_keys_as_comments(vehicle)
+    return head + yaml_text + unused_keys_as_comments(vehicle)
 
 
 def as_text(findings: Document) -> str:
     """Return the findings as lines of text."""
-    usability = "can be used" if findings["usable"] else "cannot be used so"
-    return "\n".join([f"{findings['log']}: {usability}", *(f"  {line}" for line in findings["lines"])])
+    usable = "can be used" if findings["usable"] else "cannot be used so"
+    return "\n".join([f"{findings['log']}: {usable}", *(f"  {line}" for line in findings["lines"])])

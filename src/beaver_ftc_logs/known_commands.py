@@ -102,11 +102,11 @@ _ARDUPILOT_PLANE_PARAMETER = "Q_ENABLE"
 _MIN_ROTORS = 3
 
 
-def multicopter_reason(parameters: Parameters, names: Collection[str]) -> str | None:
+def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
     """What in a log says that rotors alone move the vehicle; None where nothing does."""
 
     def last(name: str) -> float | None:
-        values = parameters.get(name)
+        values = params.get(name)
         return values[-1] if values else None
 
     mav_type = last("MAV_TYPE")
@@ -114,32 +114,32 @@ def multicopter_reason(parameters: Parameters, names: Collection[str]) -> str | 
         return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WING_TYPES[int(mav_type)]}"
     if last("CA_AIRFRAME") == 0:
         return "CA_AIRFRAME 0, multirotor"
-    autostart = last("SYS_AUTOSTART")
+    start = last("SYS_AUTOSTART")
     for low, high, title in _PX4_MULTICOPTER_AUTOSTART:
-        if mav_type is None and autostart is not None and low <= autostart <= high:
-            return f"SYS_AUTOSTART {autostart:g}, {title}"
-    copter_parameter = next((name for name in _ARDUPILOT_COPTER_PARAMETERS if name in parameters), None)
-    if copter_parameter is not None and _ARDUPILOT_PLANE_PARAMETER not in parameters:
-        return f"the parameter {copter_parameter} of ArduCopter"
+        if mav_type is None and start is not None and low <= start <= high:
+            return f"SYS_AUTOSTART {start:g}, {title}"
+    copter = next((name for name in _ARDUPILOT_COPTER_PARAMETERS if name in params), None)
+    if copter is not None and _ARDUPILOT_PLANE_PARAMETER not in params:
+        return f"the parameter {copter} of ArduCopter"
     stripped = [re.sub(r"\s*\(.*\)$", "", name.strip()).lower() for name in names]
     rotors = [name for name in stripped if re.fullmatch(r"e?motor\[?_?\d\]?", name)]
-    has_commands = any(map(is_command_name, names))
-    if len(set(rotors)) >= _MIN_ROTORS and not has_commands:
+    commanded = any(map(is_command_name, names))
+    if len(set(rotors)) >= _MIN_ROTORS and not commanded:
         return f"{rotors[0]} to {rotors[-1]}, and no output of a servo"
     return None
 
 
-def command_names(names: Sequence[str], parameters: Parameters) -> list[str]:
+def command_names(names: Sequence[str], params: Parameters) -> list[str]:
     """The columns that carry commands of surfaces, those of one message: what several messages say of the
     same surfaces is said once. Of a VTOL only the group of its wing."""
     commands = [name for name in names if is_command_name(name)]
-    if parameters.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES:
+    if params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES:
         hovering = r"(actuator_controls_0|vehicle_torque_setpoint)\."
         commands = [name for name in commands if not re.match(hovering, name)]
-    first_message = next((name.partition(".")[0] for name in commands if "." in name), None)
-    if first_message is None:
+    message = next((name.partition(".")[0] for name in commands if "." in name), None)
+    if message is None:
         return commands
-    return [name for name in commands if name.partition(".")[0] == first_message]
+    return [name for name in commands if name.partition(".")[0] == message]
 
 
 _OUTPUT_PATTERN = r"RCO[2-4U]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_RAW\."

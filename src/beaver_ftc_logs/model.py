@@ -320,15 +320,15 @@ class Model(Section):
 
     @model_validator(mode="after")
     def _check_shapes_groups_and_covariances(self) -> "Model":
-        n_past_rows = 3 * self.n_rate_lags + len(
+        n_past = 3 * self.n_rate_lags + len(
             self.vehicle.signal_regressor_names
         ) * self.vehicle.n_signal_lags(self.n_rate_lags)
         reason = (
             f"has {len(self.lagged_rate_and_signal_coefficients)} rows, "
-            f"allowed: {n_past_rows}, as `identify` writes them: identify it again"
+            f"allowed: {n_past}, as `identify` writes them: identify it again"
         )
         conflicts: list[Conflict] = [(("past",), reason)] * (
-            len(self.lagged_rate_and_signal_coefficients) != n_past_rows
+            len(self.lagged_rate_and_signal_coefficients) != n_past
         )
         conflicts += [
             *self._group_and_settings_mistakes(),
@@ -340,77 +340,77 @@ class Model(Section):
 
     def _group_and_settings_mistakes(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
-        seen_surfaces: set[str] = set()
+        seen: set[str] = set()
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):
-                if name not in self.vehicle.surfaces or name in seen_surfaces:
-                    reason = "is in two groups" if name in seen_surfaces else "is no surface of the vehicle"
+                if name not in self.vehicle.surfaces or name in seen:
+                    reason = "is in two groups" if name in seen else "is no surface of the vehicle"
                     yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
-                seen_surfaces.add(name)
-        group_names = ["+".join(group) for group in self.groups]
+                seen.add(name)
+        names = ["+".join(group) for group in self.groups]
         for name in self.settings.likely_effectiveness_levels_by_group:
-            if name not in group_names:
-                unknown_group_reason = f"{name!r:.60} is no group, allowed: {', '.join(group_names)}"
+            if name not in names:
+                unknown_group_reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
                 yield ("settings", "levels", name), unknown_group_reason
         for k, delay_s in enumerate(self.settings.command_delay_offset_candidates_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
-    def _shape_mistakes(self, n_past_rows: int) -> Iterator[Conflict]:
+    def _shape_mistakes(self, n_past: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
-        n_groups = len(self.groups)
-        key_paths_arrays_and_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.lagged_rate_and_signal_coefficients, (n_past_rows, 3)),
-            (("response",), self.command_response, (n_groups, self.n_command_lags, 3)),
-            (("response_sd",), self.command_response_standard_error, (n_groups, self.n_command_lags, 3)),
+        G = len(self.groups)
+        expected: list[tuple[Location, object, tuple[int, ...]]] = [
+            (("past",), self.lagged_rate_and_signal_coefficients, (n_past, 3)),
+            (("response",), self.command_response, (G, self.n_command_lags, 3)),
+            (("response_sd",), self.command_response_standard_error, (G, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
         ]
-        for i, noise_model in enumerate(self.noise_models):
-            noise_model_key_path = ("colours", i)
-            n_ar_rows = -(-len(noise_model.ar_coefficients) // 3) * 3
-            key_paths_arrays_and_shapes += [
-                ((*noise_model_key_path, "noise"), noise_model.residual_covariance, (3, 3)),
-                ((*noise_model_key_path, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
+        for i, noise in enumerate(self.noise_models):
+            at = ("colours", i)
+            n_ar = -(-len(noise.ar_coefficients) // 3) * 3
+            expected += [
+                ((*at, "noise"), noise.residual_covariance, (3, 3)),
+                ((*at, "before"), noise.ar_coefficients, (n_ar, 3)),
             ]
-            if misreads := noise_model.hidden_group_gain_error_sd:
-                key_paths_arrays_and_shapes += [((*noise_model_key_path, "misreads"), misreads, (n_groups,))]
-            if noise_model.ma_coefficients[0] != 1.0:
-                yield (*noise_model_key_path, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (fitted_ranges := self.fitted_ranges) is not None:
-            fitted_keys_arrays_and_shapes: list[tuple[str, object, tuple[int, ...]]] = [
-                ("commands", fitted_ranges.command_ranges, (len(fitted_ranges.command_ranges), 2)),
-                ("rates", fitted_ranges.rate_ranges_rad_s, (3, 2)),
-                ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
-                ("spread", fitted_ranges.rate_sd_rad_s, (3,)),
-                ("tied", fitted_ranges.effect_share_explained_by_other_regressors, (n_groups,)),
-                ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
+            if misreads := noise.hidden_group_gain_error_sd:
+                expected += [((*at, "misreads"), misreads, (G,))]
+            if noise.ma_coefficients[0] != 1.0:
+                yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
+        if (ranges := self.fitted_ranges) is not None:
+            fitted: list[tuple[str, object, tuple[int, ...]]] = [
+                ("commands", ranges.command_ranges, (len(ranges.command_ranges), 2)),
+                ("rates", ranges.rate_ranges_rad_s, (3, 2)),
+                ("airspeed", ranges.airspeed_range_mps, (2,)),
+                ("spread", ranges.rate_sd_rad_s, (3,)),
+                ("tied", ranges.effect_share_explained_by_other_regressors, (G,)),
+                ("gain_sd", ranges.group_gain_standard_error, (G,)),
             ]  # fmt: skip
-            key_paths_arrays_and_shapes += [
+            expected += [
                 (("fitted", key), array, shape)
-                for key, array, shape in fitted_keys_arrays_and_shapes
+                for key, array, shape in fitted
                 if array
             ]
-        for key_path, array, shape in key_paths_arrays_and_shapes:
+        for key_path, array, shape in expected:
             if not _has_shape(array, shape):
                 shape_text = " x ".join(map(str, shape))
                 yield key_path, f"has another shape, allowed: {shape_text} numbers"
 
     def _covariance_and_standard_error_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        key_paths_and_covariances: list[tuple[Location, CoefficientMatrix]] = [
+        covariances: list[tuple[Location, CoefficientMatrix]] = [
             (("noise",), self.residual_covariance)
         ]
-        key_paths_and_covariances += [
-            (("colours", i, "noise"), noise_model.residual_covariance)
-            for i, noise_model in enumerate(self.noise_models)
+        covariances += [
+            (("colours", i, "noise"), noise.residual_covariance)
+            for i, noise in enumerate(self.noise_models)
         ]
-        for key_path, covariance_rows in key_paths_and_covariances:
-            covariance = np.array(covariance_rows)
-            if abs(covariance - covariance.T).max() > 1e-6 * abs(covariance).max():
+        for key_path, rows in covariances:
+            R = np.array(rows)
+            if abs(R - R.T).max() > 1e-6 * abs(R).max():
                 yield key_path, "is not symmetric, allowed: a covariance"
                 continue
-            min_eigenvalue, *_, max_eigenvalue = np.linalg.eigvalsh(covariance)
-            if min_eigenvalue <= 0.0 or max_eigenvalue > _MAX_CONDITION_NUMBER * min_eigenvalue:
+            smallest, *_, largest = np.linalg.eigvalsh(R)
+            if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
                 yield (
                     key_path,
                     "is singular or nearly so, allowed: a covariance, conditioned to "
@@ -418,76 +418,76 @@ class Model(Section):
                 )
         if np.min(self.command_response_standard_error) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
-        fitted_ranges = self.fitted_ranges
-        if fitted_ranges is not None and any(
-            value < 0.0 for value in (*fitted_ranges.group_gain_standard_error, *fitted_ranges.rate_sd_rad_s)
+        ranges = self.fitted_ranges
+        if ranges is not None and any(
+            value < 0.0 for value in (*ranges.group_gain_standard_error, *ranges.rate_sd_rad_s)
         ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def with_single_noise_model(self, noise_model: NoiseModel) -> "Model":
+    def with_single_noise_model(self, noise: NoiseModel) -> "Model":
         """The model with one of its noise models only."""
-        return self.model_copy(update={"noise_models": [noise_model]})
+        return self.model_copy(update={"noise_models": [noise]})
 
-    def with_inflated_covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
+    def with_inflated_covariance_of_noise_model(self, average: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its
         `covariance_inflation_of_noise_model`; the model itself where none was fitted.
 
-        ma_coefficients: 1, c1, ..., the moving-average model of the residual's noise, newest first.
+        average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        if not self._noise_models_of(ma_coefficients):
+        if not self._noise_models_of(average):
             return self
-        inflated_covariance = self.covariance_inflation_of_noise_model(
-            ma_coefficients
-        ) * self.covariance_of_noise_model(ma_coefficients)
-        return self.model_copy(update={"residual_covariance": inflated_covariance.tolist()})
+        R = self.covariance_inflation_of_noise_model(
+            average
+        ) * self.covariance_of_noise_model(average)
+        return self.model_copy(update={"residual_covariance": R.tolist()})
 
-    def covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> Floats:
+    def covariance_of_noise_model(self, average: Sequence[float]) -> Floats:
         """Covariance (3, 3) of the noise fitted for flights of this moving average, (rad/s)2; that of all
         flights where none was fitted."""
-        noise_models = self._noise_models_of(ma_coefficients)
-        return np.array(noise_models[0].residual_covariance if noise_models else self.residual_covariance)
+        noises = self._noise_models_of(average)
+        return np.array(noises[0].residual_covariance if noises else self.residual_covariance)
 
-    def _noise_models_of(self, ma_coefficients: Sequence[float]) -> list[NoiseModel]:
+    def _noise_models_of(self, average: Sequence[float]) -> list[NoiseModel]:
         return [
-            noise_model
-            for noise_model in self.noise_models
-            if noise_model.ma_coefficients == list(ma_coefficients)
+            noise
+            for noise in self.noise_models
+            if noise.ma_coefficients == list(average)
         ]
 
-    def covariance_inflation_of_noise_model(self, ma_coefficients: Sequence[float]) -> float:
+    def covariance_inflation_of_noise_model(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        noise_models = self._noise_models_of(ma_coefficients)
-        return float(noise_models[0].covariance_inflation) if noise_models else 1.0
+        noises = self._noise_models_of(average)
+        return float(noises[0].covariance_inflation) if noises else 1.0
 
-    def hidden_gain_error_sd(self, ma_coefficients: Sequence[float]) -> Floats:
+    def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
-        fitted_errors = [
-            noise_model.hidden_group_gain_error_sd
-            for noise_model in self._noise_models_of(ma_coefficients)
-            if noise_model.hidden_group_gain_error_sd
+        errors = [
+            noise.hidden_group_gain_error_sd
+            for noise in self._noise_models_of(average)
+            if noise.hidden_group_gain_error_sd
         ]
-        return np.array(fitted_errors[0]) if fitted_errors else np.zeros(len(self.groups))
+        return np.array(errors[0]) if errors else np.zeros(len(self.groups))
 
-    def usual_quick_response_power(self, ma_coefficients: Sequence[float]) -> float:
+    def usual_quick_response_power(self, average: Sequence[float]) -> float:
         """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
         the noise; infinite where that is not known."""
-        known_powers = [
-            noise_model.usual_quick_response_power
-            for noise_model in self._noise_models_of(ma_coefficients)
-            if noise_model.usual_quick_response_power is not None
+        powers = [
+            noise.usual_quick_response_power
+            for noise in self._noise_models_of(average)
+            if noise.usual_quick_response_power is not None
         ]
-        return known_powers[0] if known_powers else float("inf")
+        return powers[0] if powers else float("inf")
 
-    def residual_ar_coefficients(self, ma_coefficients: Sequence[float]) -> Floats:
+    def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        noise_models = self._noise_models_of(ma_coefficients)
-        return np.reshape(np.array(noise_models[0].ar_coefficients if noise_models else []), (-1, 3, 3))
+        noises = self._noise_models_of(average)
+        return np.reshape(np.array(noises[0].ar_coefficients if noises else []), (-1, 3, 3))
 
-    def whitened_intercept(self, ma_coefficients: Sequence[float]) -> Floats:
+    def whitened_intercept(self, average: Sequence[float]) -> Floats:
         """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
         intercept = np.array(self.intercept)
-        return np.asarray(intercept - intercept @ self.residual_ar_coefficients(ma_coefficients).sum(axis=0))
+        return np.asarray(intercept - intercept @ self.residual_ar_coefficients(average).sum(axis=0))
 
     def intercept_past_response_noise(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
@@ -499,14 +499,14 @@ class Model(Section):
         )
 
 
-def _has_shape(nested_lists: object, shape: tuple[int, ...]) -> bool:
+def _has_shape(lists: object, shape: tuple[int, ...]) -> bool:
     """Whether nested lists have these lengths, each."""
     if not shape:
-        return not isinstance(nested_lists, list)
+        return not isinstance(lists, list)
     return (
-        isinstance(nested_lists, list)
-        and len(nested_lists) == shape[0]
-        and all(_has_shape(element, shape[1:]) for element in nested_lists)
+        isinstance(lists, list)
+        and len(lists) == shape[0]
+        and all(_has_shape(element, shape[1:]) for element in lists)
     )
 
 

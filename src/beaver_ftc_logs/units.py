@@ -34,11 +34,11 @@ def units_of_kind(kind: str) -> list[str]:
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratio_of_unit = {
+    ratios = {
         name: max(
             si_factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / si_factor
         )
         for name in units_of_kind(kind)
     }
-    nearest = min(ratio_of_unit, key=lambda name: ratio_of_unit[name])
-    return nearest if ratio_of_unit[nearest] <= max_ratio else None
+    nearest = min(ratios, key=lambda name: ratios[name])
+    return nearest if ratios[nearest] <= max_ratio else None

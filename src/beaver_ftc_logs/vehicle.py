@@ -92,8 +92,8 @@ class QuantityColumn(Section):
         return values * self.si_factor + self.offset * self.si_factor / self.scale
 
 
-def _expand_column_name(name_or_section: Any) -> Any:
-    return {"column": name_or_section} if isinstance(name_or_section, str) else name_or_section
+def _expand_column_name(value: Any) -> Any:
+    return {"column": value} if isinstance(value, str) else value
 
 
 QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
@@ -284,20 +284,20 @@ class Vehicle(Section):
         reason = (
             "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
         )
-        bad_names = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
-        mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
-        for surface, weight_by_command in self.surfaces.items():
+        bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
+        mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
+        for surface, weights in self.surfaces.items():
             mistakes += _unknown_name_conflicts(
-                ("surfaces", surface), weight_by_command, "command", self.command_column_names
+                ("surfaces", surface), weights, "command", self.command_column_names
             )
-        surface_tables_by_key: dict[str, Collection[str]] = {
+        tables: dict[str, Collection[str]] = {
             "labels": self.labels,
             "outputs": self.outputs,
             "full_deflection_rad": self.full_deflection_rad,
             "airspeed_powers": self.airspeed_powers,
         }
-        for key, value_by_surface in surface_tables_by_key.items():
-            mistakes += _unknown_name_conflicts((key,), value_by_surface, "surface", self.surfaces)
+        for key, values in tables.items():
+            mistakes += _unknown_name_conflicts((key,), values, "surface", self.surfaces)
         for location, kind, quantity in self.quantities_of_known_kind():
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
@@ -308,34 +308,34 @@ class Vehicle(Section):
 
     def quantities_of_known_kind(self) -> list[tuple[Location, str, QuantityColumn]]:
         """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        locations_kinds_and_quantities: list[tuple[Location, str, QuantityColumn]] = [
+        found: list[tuple[Location, str, QuantityColumn]] = [
             (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
         ]
         if self.attitude is not None:
-            locations_kinds_and_quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
+            found.append((("attitude", "roll"), ANGLE, self.attitude.roll))
             for angle_name in ("pitch", "yaw"):
-                if (angle_column := getattr(self.attitude, angle_name)) is not None:
-                    locations_kinds_and_quantities.append((("attitude", angle_name), ANGLE, angle_column))
+                if (angle := getattr(self.attitude, angle_name)) is not None:
+                    found.append((("attitude", angle_name), ANGLE, angle))
         if self.acceleration is not None:
-            locations_kinds_and_quantities.append((("acceleration",), ACCELERATION, self.acceleration))
+            found.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:
-            locations_kinds_and_quantities.append((("airspeed",), SPEED, self.airspeed))
+            found.append((("airspeed",), SPEED, self.airspeed))
         if self.energy is not None:
-            locations_kinds_and_quantities.append((("energy", "altitude"), LENGTH, self.energy.altitude))
-            locations_kinds_and_quantities.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
+            found.append((("energy", "altitude"), LENGTH, self.energy.altitude))
+            found.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
         for name in ("alpha_rad", "beta_rad"):
             if name in self.flow:
-                locations_kinds_and_quantities.append((("flow", name), ANGLE, self.flow[name]))
-        return locations_kinds_and_quantities
+                found.append((("flow", name), ANGLE, self.flow[name]))
+        return found
 
     def _column_reading_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
-        first_quantity_of_column: dict[str, QuantityColumn] = {}
+        first: dict[str, QuantityColumn] = {}
         for location, quantity in [
             *self.located_model_quantities(),
             *((location, quantity) for location, _, quantity in self.quantities_of_known_kind()),
         ]:
-            if first_quantity_of_column.setdefault(quantity.column, quantity) != quantity:
+            if first.setdefault(quantity.column, quantity) != quantity:
                 return [
                     (
                         location,
@@ -346,11 +346,11 @@ class Vehicle(Section):
 
     def located_model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
-        locations_and_quantities: list[tuple[Location, QuantityColumn]] = [
+        found: list[tuple[Location, QuantityColumn]] = [
             (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
         ]
-        locations_and_quantities += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
-        return locations_and_quantities + [
+        found += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
+        return found + [
             (("signals", i), quantity) for i, quantity in enumerate(self.signals)
         ]
 
@@ -368,8 +368,8 @@ class Vehicle(Section):
     def max_sample_rate_hz(self) -> float:
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
-        is_air_still = self.moving_air is False or (self.moving_air is None and self.labels)
-        default_hz = STILL_AIR_MAX_RATE_HZ if is_air_still else _MOVING_AIR_MAX_RATE_HZ
+        still = self.moving_air is False or (self.moving_air is None and self.labels)
+        default_hz = STILL_AIR_MAX_RATE_HZ if still else _MOVING_AIR_MAX_RATE_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:
@@ -386,12 +386,12 @@ class Vehicle(Section):
     def signal_regressor_names(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.with_airspeed_scaling_and_products`)."""
-        rate_column_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        column_names_multiplied_by_airspeed = (
-            rate_column_names + self.signal_column_names if self.reference_airspeed_mps is not None else []
+        rate_names = [getattr(self.rates, axis).column for axis in "pqr"]
+        scaled = (
+            rate_names + self.signal_column_names if self.reference_airspeed_mps is not None else []
         )
         return self.signal_column_names + [
-            f"{name} by airspeed" for name in column_names_multiplied_by_airspeed
+            f"{name} by airspeed" for name in scaled
         ]
 
     def column_names(self) -> list[str]:
@@ -404,13 +404,13 @@ class Vehicle(Section):
 
 
 def _unknown_name_conflicts(
-    location: Location, names: Iterable[str], name_kind: str, known_names: Collection[str]
+    location: Location, names: Iterable[str], name_kind: str, known: Collection[str]
 ) -> list[Conflict]:
     """One mistake for each name below a location that is not known."""
-    unknown_names = [name for name in names if name not in known_names]
+    unknown = [name for name in names if name not in known]
     return [
-        ((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known_names)}")
-        for name in unknown_names
+        ((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known)}")
+        for name in unknown
     ]
 
 
@@ -419,36 +419,36 @@ def unused_keys_as_comments(used_keys: Collection[str]) -> str:
     lines = ["# Further keys:"]
     for name, field in Vehicle.model_fields.items():
         if name not in used_keys:
-            example_text = f"   for example {field.examples[0]}" if field.examples else ""
-            lines.append(f"# {name}: {field.description}{example_text}")
+            example = f"   for example {field.examples[0]}" if field.examples else ""
+            lines.append(f"# {name}: {field.description}{example}")
     return "\n".join(lines) + "\n"
 
 
-def load_vehicle(path_or_name: str | Path) -> Vehicle:
+def load_vehicle(vehicle: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
-    document, path = read_vehicle_document(path_or_name)
+    document, path = read_vehicle_document(vehicle)
     return validate(Vehicle, document, path)
 
 
-def read_vehicle_document(path_or_name: str | Path) -> tuple[Document, str]:
+def read_vehicle_document(vehicle: str | Path) -> tuple[Document, str]:
     """The text of a vehicle file as data that is not checked yet, and its path. Raises ScenarioError."""
-    file_or_name = str(path_or_name)
-    built_in_names = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
-    if looks_like_a_path(file_or_name):
-        text = text_of(file_or_name, _MAX_FILE_BYTES)
+    given = str(vehicle)
+    built_in = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
+    if looks_like_a_path(given):
+        text = text_of(given, _MAX_FILE_BYTES)
     else:
-        file_or_name = (
-            str(_BUILT_IN_FOLDER / f"{file_or_name}.yaml") if file_or_name in built_in_names else file_or_name
+        given = (
+            str(_BUILT_IN_FOLDER / f"{given}.yaml") if given in built_in else given
         )
-        unknown_name_text = f"no such file or built-in vehicle{suggestion(file_or_name, built_in_names)}"
-        text = text_of(file_or_name, _MAX_FILE_BYTES, lambda: unknown_name_text)
-    path = str(Path(file_or_name))
+        unknown = f"no such file or built-in vehicle{suggestion(given, built_in)}"
+        text = text_of(given, _MAX_FILE_BYTES, lambda: unknown)
+    path = str(Path(given))
     return parse_document(text, path), path
 
 
 def with_false_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
     """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
     if not 0.0 < false_alarms_per_hour <= MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:
-        allowed_text = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
-        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed_text}")
+        allowed = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
+        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed}")
     return vehicle.model_copy(update={"false_alarms_per_hour": false_alarms_per_hour})

@@ -54,93 +54,93 @@ _TIME_COLUMN_AND_UNIT_BY_READER = {
 
 def read_flight(
     path: Path,
-    reader_name: str | None = None,
-    time_column_and_unit: tuple[str, str] | None = None,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
-    reader_name: one of READER_NAMES; by the path's own form where None. time_column_and_unit: of a table.
+    reader: one of READER_NAMES; by the path's own form where None. time: of a table.
     columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
     why the log cannot be used.
     """
     return next(
         _read_with_reader(
-            path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": None}
+            path, reader, time, {"columns": columns, "rows_per_part": None}
         )
     )
 
 
 def read_parts(
     path: Path,
-    reader_name: str | None = None,
-    time_column_and_unit: tuple[str, str] | None = None,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
     return _read_with_reader(
-        path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": ROWS_PER_PART}
+        path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART}
     )
 
 
 def _read_with_reader(
     path: Path,
-    reader_name: str | None,
-    time_column_and_unit: tuple[str, str] | None,
-    columns_and_rows_per_part: dict[str, Any],
+    reader: str | None,
+    time: tuple[str, str] | None,
+    options: dict[str, Any],
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
-    reader_name = reader_name or reader_name_for_path(path)
-    if reader_name not in READER_NAMES:
-        raise BadInput(f"--reader {reader_name}: is not known, allowed: {', '.join(READER_NAMES)}")
-    module = import_module(f"beaver_ftc_logs.readers.{reader_name}")
-    if reader_name == "table":
-        yield from module.read_parts(path, *(time_column_and_unit or ()), **columns_and_rows_per_part)
+    reader = reader or reader_name_for_path(path)
+    if reader not in READER_NAMES:
+        raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READER_NAMES)}")
+    module = import_module(f"beaver_ftc_logs.readers.{reader}")
+    if reader == "table":
+        yield from module.read_parts(path, *(time or ()), **options)
         return
     if (
-        time_column_and_unit is not None
-        and time_column_and_unit != _TIME_COLUMN_AND_UNIT_BY_READER[reader_name]
+        time is not None
+        and time != _TIME_COLUMN_AND_UNIT_BY_READER[reader]
     ):
-        format_time_column, format_time_unit = _TIME_COLUMN_AND_UNIT_BY_READER[reader_name]
+        column, unit = _TIME_COLUMN_AND_UNIT_BY_READER[reader]
         raise BadInput(
-            f"{path}: time: {' in '.join(time_column_and_unit)} is not its time, "
-            f"allowed: {format_time_column} in {format_time_unit}"
+            f"{path}: time: {' in '.join(time)} is not its time, "
+            f"allowed: {column} in {unit}"
         )
     yield (
-        module.read(path, columns_and_rows_per_part["columns"])
-        if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS
+        module.read(path, options["columns"])
+        if reader in NAMES_OF_READERS_OF_WANTED_COLUMNS
         else module.read(path)
     )
 
 
 def split_long_recording(
-    recording: RecordedFlight, row_stamps_s: Floats, rows_per_sample: float
+    log: RecordedFlight, stamps: Floats, ratio: float
 ) -> Iterator[RecordedFlight]:
-    """A recording in parts as those of a long table: numbered, each begins with the end of the one before.
+    """A log in parts as those of a long table: numbered, each begins with the end of the one before.
 
-    row_stamps_s: of the rows that are counted, increasing, of which so many are one sample later. A column of
+    stamps: of the rows that are counted, increasing, of which so many are one sample later. A column of
     a part begins with its last value before, if it has no value at the first of these rows.
     """
-    rows_per_part = round(SAMPLES_PER_PART * rows_per_sample)
-    if len(row_stamps_s) <= MAX_LAST_PART_FACTOR * rows_per_part:
-        yield recording
+    part_rows = round(SAMPLES_PER_PART * ratio)
+    if len(stamps) <= MAX_LAST_PART_FACTOR * part_rows:
+        yield log
         return
-    begin, part_number, is_last = 0, 1, False
+    begin, part, is_last = 0, 1, False
     while not is_last:
-        is_last = len(row_stamps_s) - begin <= MAX_LAST_PART_FACTOR * rows_per_part
-        end = len(row_stamps_s) if is_last else begin + rows_per_part
+        is_last = len(stamps) - begin <= MAX_LAST_PART_FACTOR * part_rows
+        end = len(stamps) if is_last else begin + part_rows
         columns = {
-            name: _select_period(column, row_stamps_s[begin], row_stamps_s[end - 1])
-            for name, column in recording.columns.items()
+            name: _select_period(column, stamps[begin], stamps[end - 1])
+            for name, column in log.columns.items()
         }
-        yield replace(recording, name=f"{recording.name}-part-{part_number}", columns=columns)
-        begin, part_number = end - round(PART_OVERLAP_SHARE * rows_per_part), part_number + 1
+        yield replace(log, name=f"{log.name}-part-{part}", columns=columns)
+        begin, part = end - round(PART_OVERLAP_SHARE * part_rows), part + 1
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
-    first_row = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
+    first = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
     end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
-    return Column(column.t_s[first_row:end_row], column.values[first_row:end_row], column.note)
+    return Column(column.t_s[first:end_row], column.values[first:end_row], column.note)
 
 
 def check_exists(path: Path) -> None:
@@ -155,9 +155,9 @@ def check_is_log_itself(path: Path) -> None:
     if not path.is_file():
         return
     with path.open("rb") as file:
-        first_bytes = file.read(_POINTER_BYTES)
+        head = file.read(_POINTER_BYTES)
     for pattern, (store, command) in _LARGE_FILE_STORES.items():
-        if re.match(pattern, first_bytes):
+        if re.match(pattern, head):
             raise BadInput(
                 f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: the log "
                 f"itself, which `{command}` fetches"
@@ -170,10 +170,10 @@ def reader_name_for_path(path: Path) -> str:
         return "alfa"
     if path.suffix.lower() in _WAY_TO_TABLE_BY_SUFFIX:
         raise BadInput(f"{path}: is {_WAY_TO_TABLE_BY_SUFFIX[path.suffix.lower()]}")
-    reader_name = _READER_NAME_BY_SUFFIX.get(path.suffix.lower())
-    if reader_name is None:
+    reader = _READER_NAME_BY_SUFFIX.get(path.suffix.lower())
+    if reader is None:
         raise BadInput(
             f"{path}: what kind of log this is cannot be seen, allowed: "
             f"{', '.join(sorted(_READER_NAME_BY_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
         )
-    return reader_name
+    return reader

@@ -57,64 +57,64 @@ class DayChanges:
     trim_drift_sd_commands: float = 0.0
 
 
-def unchanged_day(n_surfaces: int) -> DayChanges:
+def unchanged_day(n: int) -> DayChanges:
     """The day as it was."""
-    return DayChanges("as it was", np.zeros(n_surfaces), np.zeros(n_surfaces), np.ones(n_surfaces))
+    return DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
 
 
 def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
     """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
     unchanged = unchanged_day(len(mixer_shares))
-    days_in_order = [unchanged]
-    for command_name, surface_shares in zip(command_names, mixer_shares.T, strict=True):
+    days = [unchanged]
+    for command, shares in zip(command_names, mixer_shares.T, strict=True):
         for shift in (-0.04, 0.04):
-            days_in_order.append(
+            days.append(
                 replace(
                     unchanged,
-                    name=f"trim of {command_name} {shift:+.2f}",
-                    trim_shift_commands=shift * surface_shares,
+                    name=f"trim of {command} {shift:+.2f}",
+                    trim_shift_commands=shift * shares,
                 )
             )
-            days_in_order.append(
+            days.append(
                 replace(
                     unchanged,
-                    name=f"neutral of {command_name} {shift:+.2f}",
-                    neutral_shift_commands=shift * surface_shares,
+                    name=f"neutral of {command} {shift:+.2f}",
+                    neutral_shift_commands=shift * shares,
                 )
             )
-    days_in_order += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days_in_order += [
+    days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
+    days += [
         replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
         for delay_s in (-0.04, 0.04)
     ]
-    days_in_order += [
+    days += [
         replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)
     ]
-    days_in_order += [
+    days += [
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
-    for i, surface_unit_vector in enumerate(np.eye(len(mixer_shares))):
+    for i, unit in enumerate(np.eye(len(mixer_shares))):
         for gain in (0.94, 1.06):
-            surface_gains = np.where(surface_unit_vector, gain, 1.0)
-            days_in_order.append(
-                replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
+            gains = np.where(unit, gain, 1.0)
+            days.append(
+                replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains)
             )
-    return days_in_order
+    return days
 
 
-def random_days(n_surfaces: int, seeds: range) -> list[DayChanges]:
+def random_days(n: int, seeds: range) -> list[DayChanges]:
     """Days on which everything differs a little."""
-    return [_random_day(n_surfaces, seed) for seed in seeds]
+    return [_random_day(n, seed) for seed in seeds]
 
 
-def _random_day(n_surfaces: int, seed: int) -> DayChanges:
+def _random_day(n: int, seed: int) -> DayChanges:
     rng = np.random.default_rng([20, seed])
     return DayChanges(
         name=f"drawn {seed}",
-        trim_shift_commands=0.015 * rng.standard_normal(n_surfaces),
-        neutral_shift_commands=0.01 * rng.standard_normal(n_surfaces),
-        surface_gains=np.exp(0.03 * rng.standard_normal(n_surfaces)),
+        trim_shift_commands=0.015 * rng.standard_normal(n),
+        neutral_shift_commands=0.01 * rng.standard_normal(n),
+        surface_gains=np.exp(0.03 * rng.standard_normal(n)),
         common_gain=float(np.exp(0.1 * rng.standard_normal())),
         command_delay_s=float(0.02 * rng.standard_normal()),
         motion_scale=float(np.exp(0.25 * rng.standard_normal())),
@@ -124,160 +124,160 @@ def _random_day(n_surfaces: int, seed: int) -> DayChanges:
 
 
 def apply_day_changes(
-    day: DayChanges, samples: Samples, lagged_rate_coefficients: Floats, noise_covariance: Floats
+    day: DayChanges, samples: Samples, A: Floats, Q: Floats
 ) -> Samples:
-    """The flight as it might have been on that day. lagged_rate_coefficients (3 h, 3) and noise_covariance
+    """The flight as it might have been on that day. A (3 h, 3) and Q
     (3, 3) of its model."""
     rng = np.random.default_rng(20)
-    effectiveness_or_one = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
-    trim_commands = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
-    commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
+    trim = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
+    commands = trim + day.motion_scale * (commands - trim) / (
         day.common_gain * day.surface_gains
     )
-    trim_drift_as_commands = day.trim_drift_sd_commands * _coloured_noise(
+    drift = day.trim_drift_sd_commands * _coloured_noise(
         rng, commands.shape, 300.0 / samples.dt_s
     )
     commands = (
         commands
         + day.neutral_shift_commands
-        + (day.trim_shift_commands + trim_drift_as_commands) / effectiveness_or_one
+        + (day.trim_shift_commands + drift) / e
     )
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
-    extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
-    rates = rates + extra_noise_sd_ratio * _rate_response_to_noise(
-        rng, lagged_rate_coefficients, noise_covariance, len(rates)
+    extra = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
+    rates = rates + extra * _rate_response_to_noise(
+        rng, A, Q, len(rates)
     )
     return replace(samples, commands=commands, rates=rates)
 
 
-def _shift_values_earlier(values: Floats, n_samples: float) -> Floats:
-    """Values that act `n_samples` samples later than these: logged earlier by as much, (n, S)."""
-    fractional_source_rows = np.arange(len(values)) + n_samples
+def _shift_values_earlier(values: Floats, n: float) -> Floats:
+    """Values that act `n` samples later than these: logged earlier by as much, (n, S)."""
+    rows = np.arange(len(values)) + n
     return np.column_stack(
-        [np.interp(fractional_source_rows, np.arange(len(values)), column) for column in values.T]
+        [np.interp(rows, np.arange(len(values)), column) for column in values.T]
     )
 
 
-def _running_mean(values: Floats, window_samples: int) -> Floats:
+def _running_mean(values: Floats, n: int) -> Floats:
     """Centred running mean, (n, S)."""
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(values, window_samples, axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))
 
 
-def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlation_samples: float) -> Floats:
-    """Coloured noise of standard deviation 1 and correlation time `correlation_samples`."""
+def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) -> Floats:
+    """Coloured noise of standard deviation 1 and correlation time `n`."""
     from scipy.signal import lfilter
 
-    retention = np.exp(-1.0 / correlation_samples)
+    retention = np.exp(-1.0 / n)
     white_noise = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
     return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
 
 
 def _rate_response_to_noise(
-    rng: np.random.Generator, lagged_rate_coefficients: Floats, noise_covariance: Floats, n_samples: int
+    rng: np.random.Generator, A: Floats, Q: Floats, n: int
 ) -> Floats:
     """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
-    process_noise = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
-    n_lags = len(lagged_rate_coefficients) // 3
-    rates = np.zeros((n_samples + n_lags, 3))
-    for k in range(n_samples):
+    noise = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
+    n_lags = len(A) // 3
+    rates = np.zeros((n + n_lags, 3))
+    for k in range(n):
         rates[k + n_lags] = (
-            rates[k : k + n_lags][::-1].ravel() @ lagged_rate_coefficients[: 3 * n_lags] + process_noise[k]
+            rates[k : k + n_lags][::-1].ravel() @ A[: 3 * n_lags] + noise[k]
         )
     return rates[n_lags:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled_data_sets = [
-        data_set
-        for data_set in benchmark.load_data_sets(folder)
-        if np.isfinite(data_set.flights[0].labels).any()
+    labelled = [
+        data
+        for data in benchmark.load_data_sets(folder)
+        if np.isfinite(data.flights[0].labels).any()
     ]
-    if not labelled_data_sets:
+    if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
-    return {"sets": [_test_data_set_on_days(data_set) for data_set in labelled_data_sets]}
+    return {"sets": [_test_data_set_on_days(data) for data in labelled]}
 
 
-def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
-    flights_with_usable_mask = flights_with_usable_rows(data_set.flights)
-    settings = benchmark.settings_of_whole_flight(flights_with_usable_mask, data_set)
-    models_and_held_out = [
-        (fit_model(fitted_flights, data_set.vehicle, settings), held_out)
-        for fitted_flights, held_out, _ in validation_folds(flights_with_usable_mask)
+def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
+    usable = flights_with_usable_rows(data.flights)
+    settings = benchmark.settings_of_whole_flight(usable, data)
+    folds = [
+        (fit_model(fitted, data.vehicle, settings), held_out)
+        for fitted, held_out, _ in validation_folds(usable)
     ]
-    all_flights_model = fit_model(flights_with_usable_mask, data_set.vehicle, settings)
-    n_surfaces = len(data_set.vehicle.surfaces)
+    model = fit_model(usable, data.vehicle, settings)
+    n = len(data.vehicle.surfaces)
     days_by_kind = {
         "one change": unchanged_and_one_change_days(
-            mixer_matrix(data_set.vehicle), data_set.vehicle.command_column_names
+            mixer_matrix(data.vehicle), data.vehicle.command_column_names
         ),
-        "drawn, settings chosen on these": random_days(n_surfaces, TUNING_SEEDS),
-        "drawn, not looked at": random_days(n_surfaces, TEST_SEEDS),
+        "drawn, settings chosen on these": random_days(n, TUNING_SEEDS),
+        "drawn, not looked at": random_days(n, TEST_SEEDS),
     }
-    scores_of_all_days = [
-        one_day_scores
+    scores = [
+        day
         for kind, days in days_by_kind.items()
-        for one_day_scores in _score_days(kind, days, models_and_held_out, all_flights_model)
+        for day in _score_days(kind, days, folds, model)
     ]
-    summary_by_kind = [
+    summary = [
         _summarize_days(
-            kind, [one_day_scores for one_day_scores in scores_of_all_days if one_day_scores["kind"] == kind]
+            kind, [day for day in scores if day["kind"] == kind]
         )
         for kind in days_by_kind
     ]
-    return {"set": data_set.name, "rows": scores_of_all_days, "summary": summary_by_kind}
+    return {"set": data.name, "rows": scores, "summary": summary}
 
 
 def _score_days(
     kind: str,
     days: Sequence[DayChanges],
-    models_and_held_out: Sequence[tuple[Model, FlightWithUsableRows]],
+    folds: Sequence[tuple[Model, FlightWithUsableRows]],
     all_flights_model: Model,
 ) -> Iterator[Document]:
-    _, lagged_rate_coefficients, _, noise_covariance = all_flights_model.intercept_past_response_noise()
+    _, A, _, Q = all_flights_model.intercept_past_response_noise()
     for day in days:
-        part_scores_by_detector: dict[str, list[Document]] = {
+        scores: dict[str, list[Document]] = {
             BANK_OF_FILTERS_DETECTOR: [],
             _RIVAL_DETECTOR: [],
         }
-        for model, held_out in models_and_held_out:
-            altered_samples = apply_day_changes(
-                day, held_out.samples, lagged_rate_coefficients, noise_covariance
+        for model, held_out in folds:
+            altered = apply_day_changes(
+                day, held_out.samples, A, Q
             )
             labels = benchmark.labels_nan_outside_usable_span(held_out)
-            for detector_name, part_scores in part_scores_by_detector.items():
-                part_scores.append(
+            for detector, parts in scores.items():
+                parts.append(
                     scoring.score_against_labels(
-                        diagnose_with_detector(detector_name, altered_samples, model), labels
+                        diagnose_with_detector(detector, altered, model), labels
                     )
                 )
-        rival_class_score = benchmark.summarize_label_scores(part_scores_by_detector[_RIVAL_DETECTOR])[
+        rival = benchmark.summarize_label_scores(scores[_RIVAL_DETECTOR])[
             "classes"
         ]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_label_scores(part_scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
-            "beside": rival_class_score,
+            **benchmark.summarize_label_scores(scores[BANK_OF_FILTERS_DETECTOR]),
+            "beside": rival,
         }
 
 
 def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values_of_score = {
-        key: [one_day_scores[key] for one_day_scores in scores_of_days]
+    values = {
+        key: [day[key] for day in scores_of_days]
         for key in (*benchmark.LABEL_SCORE_TITLES, "beside")
     }
-    mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
+    mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values.items()}
     return {
         "kind": kind,
         "mean": mean_by_score,
         "worst": {
             k: _WORST_FUNCTION_BY_SCORE.get(k, min)(score_values)
-            for k, score_values in values_of_score.items()
+            for k, score_values in values.items()
         },
     }

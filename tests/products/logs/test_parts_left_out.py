@@ -48,7 +48,7 @@ def flown(gains=(0.8, 1.25), loud=1.0, n=150, seed=5, **changes):
 def in_white(of, model=MODEL):
     """Places, residual and answers of a flight, less what those of the two samples before foretell, in sd of
     the noise: by its symmetric root."""
-    ok, left, answers = unexplained_rates_and_responses(of.samples, model, scales_by_labels=True)
+    ok, left, answers = unexplained_rates_and_responses(of.samples, model, labelled=True)
     rest = left - np.array(model.intercept) - answers.sum(axis=1)
     places = [k for k in np.flatnonzero(of.is_usable) if k > 1 and ok[k - 2 : k + 1].all()]
     size, turn = np.linalg.eigh(WIDER * HEARD)

@@ -293,7 +293,7 @@ def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_fil
     ):
         t_s = np.arange(float(rows))
         path = synthetic.write_parquet(tmp_path / f"log{rows}.parquet", {"t_s": t_s, "p": 3.0 * t_s})
-        parts = [*table.read_parts(path, rows_per_part=20)]
+        parts = [*table.read_parts(path, part_rows=20)]
         names = (
             [f"log{rows}-part-{k}" for k in range(1, len(begins) + 1)] if len(begins) > 1 else [f"log{rows}"]
         )
@@ -304,7 +304,7 @@ def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_fil
     t_s[40] = t_s[45] = 1.0
     path = synthetic.write_parquet(tmp_path / "back.parquet", {"t_s": t_s, "p": t_s})
     with pytest.raises(BadInput, match=r"back\.parquet: t_s: row 41: time does not increase"):
-        [*table.read_parts(path, rows_per_part=20)]
+        [*table.read_parts(path, part_rows=20)]
 
 
 def test_two_columns_of_a_name_are_refused_if_used_and_have_their_places_as_names(tmp_path):

@@ -32,7 +32,7 @@ def test_what_a_sample_is_predicted_from(history, lags):
     samples = small.flight(TAIL, 30, gap=12)
     samples.rates[20, 1] = samples.commands[25, 1] = samples.signals[5, 0] = np.nan
     past, commands, known = regression.build_regressors(
-        samples, [[0, 2], [1]], history, lags, scales_by_labels=False
+        samples, [[0, 2], [1]], history, lags, labelled=False
     )
     reach = max(history, lags)
     for k in range(30):
@@ -52,13 +52,13 @@ def test_what_a_sample_is_predicted_from(history, lags):
 def test_commands_as_effective_as_the_labels_say():
     samples = small.flight(WING, 12)
     samples.labels[:] = [0.5, np.nan]
-    by_label = regression.build_regressors(samples, [[0], [1]], 1, 2, scales_by_labels=True)[1]
-    plain = regression.build_regressors(samples, [[0], [1]], 1, 2, scales_by_labels=False)[1]
+    by_label = regression.build_regressors(samples, [[0], [1]], 1, 2, labelled=True)[1]
+    plain = regression.build_regressors(samples, [[0], [1]], 1, 2, labelled=False)[1]
     np.testing.assert_array_equal(by_label[2:], plain[2:] * np.array([[0.5], [1.0]]))
 
 
 def test_a_flight_shorter_than_the_past():
-    known = regression.build_regressors(small.flight(WING, 2), [[0], [1]], 4, 3, scales_by_labels=False)[2]
+    known = regression.build_regressors(small.flight(WING, 2), [[0], [1]], 4, 3, labelled=False)[2]
     assert known.tolist() == [False, False]
     assert regression._delay_rows(np.arange(3.0), 2, -1.0).tolist() == [-1.0, -1.0, 0.0]
     assert regression._delay_rows(np.arange(3), 5, -1).tolist() == [-1, -1, -1]

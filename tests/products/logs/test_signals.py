@@ -24,7 +24,7 @@ def test_for_how_long_a_signal_stands_still():
     assert still[212] == pytest.approx(0.6)
     assert still[260] == pytest.approx(3.0)
     assert not still[261:].any()
-    assert signals.column_defect_texts("p", Column(T_S, values), is_measured_rate=True) == [
+    assert signals.column_defect_texts("p", Column(T_S, values), is_rate=True) == [
         "p: frozen, the same to the last bit for 3.0 s"
     ]
 
@@ -36,7 +36,7 @@ def test_a_clipped_rate_and_one_that_is_not():
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
         said = signals.column_defect_texts(
-            "p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_measured_rate=True
+            "p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_rate=True
         )
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
     assert not signals.find_clipped_rows(free).any()
@@ -66,16 +66,16 @@ def test_jumps_are_single_rows_that_come_back():
     held = np.repeat(noise(), 3)
     held[[400, 2200]] -= 50.0
     assert signals.find_spike_rows(held).tolist() == [400, 2200]  # a log of more rows than readings
-    said = signals.column_defect_texts("p", Column(T_S, values), is_measured_rate=True)
+    said = signals.column_defect_texts("p", Column(T_S, values), is_rate=True)
     assert said == ["p: 2 jumps, the first at 5.00 s"]
 
 
 def test_rows_without_a_number_are_counted():
     values = noise()
     values[3:10] = np.nan
-    (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), is_measured_rate=True)
+    (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), is_rate=True)
     assert said == "p: rows without a number: 7 of 1200"
-    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_measured_rate=False)[
+    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_rate=False)[
         -1
     ].startswith("u: does not move")
 

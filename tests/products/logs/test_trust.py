@@ -273,7 +273,7 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
 def test_commands_that_nothing_follows_are_not_credible(model):
     flown = small.flight(model, n=600, seed=4)
     still = np.arange(600) >= 400
-    rows = finalize_rows_at_log_stamps(flown, model, diagnose(flown, model), has_no_response=still)
+    rows = finalize_rows_at_log_stamps(flown, model, diagnose(flown, model), silent=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
     assert [reason.split(":")[0] for reason in rows.not_credible_rows_by_reason] == [

@@ -40,7 +40,7 @@ from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
-from beaver_ftc_logs.identification import identify, scale_by_dynamic_pressure_if_better
+from beaver_ftc_logs.identification import identify, scale_if_better
 from beaver_ftc_logs.model import Model, model_file_text
 from beaver_ftc_logs.samples import load_flights_for_fit, read_columns_of_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
@@ -179,7 +179,7 @@ def identified(of: Campaign, logs: list[Log]) -> Model:
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(update={"faults": faults})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    found = identify(*scale_by_dynamic_pressure_if_better(load_flights_for_fit(named, vehicle), vehicle))
+    found = identify(*scale_if_better(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(model_file_text(found))
 
 

@@ -468,14 +468,14 @@ def _undiagnosable_rows_by_reason(
     outside = np.ones(len(signals), dtype=bool)
     for begin, end in stretches:
         outside[begin:end] = False
-    V, alpha = signals[:, 2], signals[:, 0]
+    airspeed, alpha = signals[:, 2], signals[:, 0]
     return {
         "a number is missing": missing,
         "samples are not evenly spaced": outside & ~missing,
         f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (
-            low_mps > V
+            airspeed < low_mps
         )
-        | (high_mps < V),
+        | (airspeed > high_mps),
         f"angle of attack is outside {alpha_min:.3g} to {alpha_max:.3g} rad": (
             alpha < alpha_min
         )

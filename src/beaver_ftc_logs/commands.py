@@ -64,7 +64,7 @@ def identify(
     from beaver_ftc_logs.identification import (
         identification_text,
         identify,
-        scale_by_dynamic_pressure_if_better,
+        scale_if_better,
     )
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
@@ -77,7 +77,7 @@ def identify(
     loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader)
     if false_alarms_per_hour is not None:
         loaded = with_false_alarm_rate(loaded, false_alarms_per_hour)
-    logs, loaded = scale_by_dynamic_pressure_if_better(
+    logs, loaded = scale_if_better(
         load_flights_for_fit(flights, loaded, reader), loaded
     )
     model = identify(logs, loaded)

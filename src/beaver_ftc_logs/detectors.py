@@ -26,7 +26,7 @@ from beaver_ftc.design import N_Y, Context, Declared
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
-from beaver_ftc_logs.bank import build_hypothesis_bank
+from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import (
     UNKNOWN_SURFACE,
     DiagnosisRows,
@@ -39,12 +39,12 @@ from beaver_ftc_logs.diagnose import (
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.regression import (
-    expand_group_values_to_surfaces,
-    surface_indices_of_each_group,
-    unexplained_rates_and_responses,
+    expand_groups,
+    group_indices,
+    unexplained_rates,
 )
 from beaver_ftc_logs.samples import Samples
-from beaver_ftc_logs.trust import with_rates_unknown_where_frozen_or_clipped
+from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
@@ -80,7 +80,7 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, fades: bool) -> D
 
 def _whitened_effectiveness_change_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    known, y, F = unexplained_rates_and_responses(
+    known, y, F = unexplained_rates(
         samples, model
     )
     R = model.intercept_past_response_noise()[3]
@@ -116,7 +116,7 @@ def _diagnosis_rows_from_least_squares(
     """Rows of a least-squares estimate. With labelled levels, the e is the nearest of them, and
     below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
     standard deviations."""
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     low, high = (
         np.clip(
             e + sign * _STANDARD_ERRORS_OF_90_PERCENT * sd, 0.0, 1.0
@@ -125,9 +125,9 @@ def _diagnosis_rows_from_least_squares(
     )
     nearest = np.clip(e, 0.0, 1.0)
     lost = e + _MIN_LOSS_STANDARD_ERRORS * sd < 1.0
-    if model.settings.likely_effectiveness_levels_by_group:
+    if model.settings.likely_levels:
         for g, group in enumerate(model.groups):
-            labelled = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
+            labelled = model.settings.likely_levels.get("+".join(group))
             levels = (
                 np.array([*labelled, 1.0])
                 if labelled
@@ -142,14 +142,14 @@ def _diagnosis_rows_from_least_squares(
         "high": np.maximum(high, nearest),
     }
     bounds = {
-        end: expand_group_values_to_surfaces(bound, model)
+        end: expand_groups(bound, model)
         for end, bound in group_bounds.items()
     }
     names = join_flagged_names_by_row(lost, ["+".join(group) for group in model.groups])
     return _rows_with_default_bounds(
         samples,
         names,
-        expand_group_values_to_surfaces(nearest, model),
+        expand_groups(nearest, model),
         **bounds,
     )
 
@@ -226,13 +226,13 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
-    members = surface_indices_of_each_group(model)
+    members = group_indices(model)
     if len(members) > len(LOOP_SURFACE_BY_GROUP_INDEX):
         raise BadInput(
             f"{model.vehicle.name}: {len(members)} groups of surfaces, allowed for a "
             f"detector of the loop: at most {len(LOOP_SURFACE_BY_GROUP_INDEX)}"
         )
-    known, y, F = unexplained_rates_and_responses(
+    known, y, F = unexplained_rates(
         samples, model
     )
     c, dt_s = model.intercept_past_response_noise()[0], 1.0 / model.rate_hz
@@ -298,7 +298,7 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Dia
 
 def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n, members = len(verdicts), surface_indices_of_each_group(model)
+    n, members = len(verdicts), group_indices(model)
     faulty = np.array([_is_statistic_high_or_detected(verdict) for verdict in verdicts], dtype=np.int64)
     e, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
@@ -362,7 +362,7 @@ def diagnose_with_detector(name: str, samples: Samples, model: Model) -> Diagnos
     check_log_fits_model(samples, model)
     if name == BANK_OF_FILTERS_DETECTOR:
         return diagnose(samples, model)
-    known = with_rates_unknown_where_frozen_or_clipped(samples, model)
+    known = without_dead_rows(samples, model)
     if name in _FLIGHT_DETECTORS:
         return finalize_rows_at_log_stamps(
             samples, model, _FLIGHT_DETECTORS[name](known, model)

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
-from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_hypothesis_bank
+from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import (
-    any_fault_log_odds_gains,
-    hypothesis_state_and_noise_posterior,
+    fault_evidence,
+    bank_posterior,
     page_cusum,
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import expand_group_values_to_surfaces, unexplained_rates_and_responses
+from beaver_ftc_logs.regression import expand_groups, unexplained_rates
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -108,7 +108,7 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     check_log_fits_model(samples, model)
     rows = _diagnose_checked_log(samples, model)
     if rows.has_credible_alarm():
-        for group in trust.groups_with_reversed_gain(samples, model):
+        for group in trust.find_reversed(samples, model):
             signs = [-1.0 if surface in group else 1.0 for surface in model.vehicle.surfaces]
             corrected = _diagnose_checked_log(replace(samples, commands=samples.commands * signs), model)
             if corrected.are_healthy_where_credible_in(rows):
@@ -126,9 +126,9 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> DiagnosisRows:
-    bank = build_hypothesis_bank(model)
-    known = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
-    P, _, _ = hypothesis_state_and_noise_posterior(known, model, bank)
+    bank = build_bank(model)
+    known = trust.without_dead_rows(samples, model)
+    P, _, _ = bank_posterior(known, model, bank)
     silent = P[:, bank.no_response_hypothesis_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = diagnosis_rows_from_posterior(samples, model, bank, P)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
@@ -146,21 +146,21 @@ def finalize_rows_at_log_stamps(
 ) -> DiagnosisRows:
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
-    reasons = trust.rows_not_credible_by_reason(samples, model)
+    reasons = trust.untrusted_rows(samples, model)
     if silent is not None and silent.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
             silent
         )
-    if not any(trust.is_group_effect_known(model)):
+    if not any(trust.known_effects(model)):
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
     rows = _add_unknown_effect_surfaces_widening_bounds(
         samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
-    gain_known = np.array(trust.is_group_gain_known(model), dtype=float)[None]
+    gain_known = np.array(trust.known_gains(model), dtype=float)[None]
     unknown = np.broadcast_to(
-        expand_group_values_to_surfaces(gain_known, model) == 0.0, rows.effectiveness_low.shape
+        expand_groups(gain_known, model) == 0.0, rows.effectiveness_low.shape
     )
     return _rows_at_log_stamps(
         samples, rows.with_uninformative_estimate(unknown).without_verdict(reasons)
@@ -182,7 +182,7 @@ def _add_unknown_effect_surfaces_widening_bounds(
         > _MIN_COMMAND_MOTION_TRAVEL_SHARE
     )
     moved |= "stuck" in model.vehicle.faults
-    unknown = trust.surfaces_of_unknown_effect(model)
+    unknown = trust.unknown_surfaces(model)
     addable = moved & np.array(
         [surface in unknown for surface in surfaces]
     )
@@ -212,12 +212,12 @@ def _withdraw_isolation_after_engine_failure(
 ) -> DiagnosisRows:
     """Rows in which no surface is named where an engine may have failed."""
     unpowered_mps = (
-        model.fitted_ranges.unpowered_energy_height_rate_mps if model.fitted_ranges is not None else None
+        model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges is not None else None
     )
     if unpowered_mps is None or samples.energy_height_rate_mps is None:
         return rows
     rate_mps = samples.energy_height_rate_mps
-    named = energy.withdraw_surfaces_where_engine_may_have_failed(
+    named = energy.withdraw_surfaces(
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces,
@@ -241,7 +241,7 @@ def _withdraw_contradicted_isolation(
     residual better by least, whatever the course of time along it. Not used in moving air,
     since gusts have directions too.
     """
-    r = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
+    r = standardized_healthy_residual(model, *unexplained_rates(samples, model))
     _, _, F, R = model.intercept_past_response_noise()
     m = np.linalg.solve(
         np.linalg.cholesky(R), F.sum(axis=1).T
@@ -275,7 +275,7 @@ def standardized_healthy_residual(
     y: Floats,
     F: Floats,
 ) -> Floats:
-    """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
+    """Residual of a healthy vehicle by `unexplained_rates`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
     c, _, _, R = model.intercept_past_response_noise()
     r = np.where(
@@ -297,8 +297,8 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    trust.refuse_rates_in_other_unit(samples, model.fitted_ranges)
-    trust.refuse_columns_not_as_identified(samples, model)
+    trust.refuse_rate_unit(samples, model.fitted_ranges)
+    trust.refuse_columns(samples, model)
 
 
 def diagnosis_rows_from_posterior(
@@ -313,7 +313,7 @@ def diagnosis_rows_from_posterior(
     )
     calm = P[:, 0] + p_silent > 0.5
     mu = model.settings.alarm_threshold
-    steps = any_fault_log_odds_gains(P, bank)
+    steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
     alarmed = nameable = _has_held_long_enough(
         p_fault >= model.settings.fault_probability_for_alarm, model
@@ -356,9 +356,9 @@ def diagnosis_rows_from_posterior(
             faulty,
             _latch_until_healthy(nameable, calm),
         ),
-        effectiveness=expand_group_values_to_surfaces(e, model),
-        effectiveness_low=expand_group_values_to_surfaces(low, model),
-        effectiveness_high=expand_group_values_to_surfaces(high, model),
+        effectiveness=expand_groups(e, model),
+        effectiveness_low=expand_groups(low, model),
+        effectiveness_high=expand_groups(high, model),
         fault_probability=p_fault,
         evidence_start_time_s=samples.t_s[start],
     )

@@ -13,12 +13,12 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import trust
-from beaver_ftc_logs.bank import HypothesisBank, build_hypothesis_bank
+from beaver_ftc_logs.bank import HypothesisBank, build_bank
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import unexplained_rates_and_responses
+from beaver_ftc_logs.regression import unexplained_rates
 from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
@@ -46,7 +46,7 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "faulty": bool(rows.faulty.any()),
         "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
-        "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(isolable)],
+        "can_separate": [*trust.unknown_sentences(model), *isolability_sentences(isolable)],
         "isolability": isolable,
         "settings": model.settings.model_dump(by_alias=True),
         "notes": list(samples.notes),
@@ -208,7 +208,7 @@ def _event_text(event: Document) -> str:
 
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     F = _standardized_group_responses(samples, model)
     return {
         "together": [
@@ -234,7 +234,7 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
 
 def _standardized_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    known, _, F = unexplained_rates_and_responses(samples, model)
+    known, _, F = unexplained_rates(samples, model)
     F = F[known]
     R = np.array(model.residual_covariance)
     white = np.linalg.solve(

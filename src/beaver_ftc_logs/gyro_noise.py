@@ -45,7 +45,7 @@ def _residual_autocovariance(
     model: Model, Q: Floats, s: float, L: int
 ) -> NDArray[np.float64]:
     """E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3)."""
-    A = np.array(model.lagged_rate_and_signal_coefficients)[
+    A = np.array(model.past_coefficients)[
         : 3 * model.n_rate_lags
     ].reshape(model.n_rate_lags, 3, 3)
     M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])

@@ -44,7 +44,7 @@ class FilterSettings(Section):
         alias="changes_per_hour",
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    likely_effectiveness_levels_by_group: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = (
+    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = (
         Field(
             default={},
             description="likelier levels of effectiveness, by group",
@@ -82,14 +82,14 @@ class FilterSettings(Section):
     group_gain_offset_sd: Number = Field(
         0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
     )
-    group_gain_offset_return_time_s: Number = Field(
+    own_gain_return_s: Number = Field(
         2000.0,
         gt=0,
         le=_MAX_COEFFICIENT,
         description="in which that returns to the common gain, s",
         alias="own_gain_time_s",
     )
-    quick_response_error_share: Number = Field(
+    quick_error_share: Number = Field(
         1.0,
         ge=0,
         le=1,
@@ -110,7 +110,7 @@ class FilterSettings(Section):
         description="farthest the gain is adapted, in its spread",
         alias="gain_bound",
     )
-    command_delay_offset_candidates_s: CoefficientRow = Field(
+    command_delays_s: CoefficientRow = Field(
         [0.0],
         min_length=1,
         max_length=9,
@@ -204,18 +204,18 @@ class FittedRanges(Section):
     rate_sd_rad_s: CoefficientRow = Field(
         default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    effect_share_explained_by_other_regressors: CoefficientRow = Field(
+    tied_shares: CoefficientRow = Field(
         default=[],
         description="share of each group's effect that past, signals and other groups make up",
         alias="tied",
     )
-    group_gain_standard_error: CoefficientRow = Field(
+    group_gain_sd: CoefficientRow = Field(
         default=[], description="standard error of each group's gain", alias="gain_sd"
     )
-    longest_unchanged_time_s_by_column: dict[str, Number] = Field(
+    longest_still_s: dict[str, Number] = Field(
         default={}, description="longest time each column stood still, s", alias="still_s"
     )
-    max_column_mistake_log_likelihood_gain: Number = Field(
+    misread_gain: Number = Field(
         0.0,
         ge=0,
         le=_MAX_COEFFICIENT,
@@ -223,7 +223,7 @@ class FittedRanges(Section):
         "wrongly, in natural logarithms",
         alias="misread",
     )
-    unpowered_energy_height_rate_mps: Number | None = Field(
+    unpowered_climb_mps: Number | None = Field(
         default=None,
         description="rate of the energy height as without power, m/s",
         alias="energy_climb",
@@ -265,12 +265,12 @@ class NoiseModel(Section):
         description="how many times as far, in squares, gains left out and other laws' differ",
         alias="wider",
     )
-    hidden_group_gain_error_sd: list[Annotated[Number, Field(ge=0, lt=1)]] = Field(
+    misread_shares: list[Annotated[Number, Field(ge=0, lt=1)]] = Field(
         default=[],
         description="share of its effect by which the fit may misread each group in this noise",
         alias="misreads",
     )
-    usual_quick_response_power: Number | None = Field(
+    usual_quick_power: Number | None = Field(
         default=None,
         ge=0,
         le=_MAX_COEFFICIENT,
@@ -291,7 +291,7 @@ class Model(Section):
     n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
     n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
     intercept: CoefficientRow = Field(min_length=3, max_length=3)
-    lagged_rate_and_signal_coefficients: CoefficientMatrix = Field(
+    past_coefficients: CoefficientMatrix = Field(
         description="(3 history + signal_regressor_names x signal lags, 3)", alias="past"
     )
     command_response: list[CoefficientMatrix] = Field(
@@ -324,15 +324,15 @@ class Model(Section):
             self.vehicle.signal_regressor_names
         ) * self.vehicle.n_signal_lags(self.n_rate_lags)
         reason = (
-            f"has {len(self.lagged_rate_and_signal_coefficients)} rows, "
+            f"has {len(self.past_coefficients)} rows, "
             f"allowed: {n_past}, as `identify` writes them: identify it again"
         )
         conflicts: list[Conflict] = [(("past",), reason)] * (
-            len(self.lagged_rate_and_signal_coefficients) != n_past
+            len(self.past_coefficients) != n_past
         )
         conflicts += [
             *self._group_and_settings_mistakes(),
-            *self._shape_mistakes(len(self.lagged_rate_and_signal_coefficients)),
+            *self._shape_mistakes(len(self.past_coefficients)),
         ]
         refuse(conflicts)  # before any of it is computed with
         refuse(self._covariance_and_standard_error_mistakes())
@@ -348,11 +348,11 @@ class Model(Section):
                     yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
                 seen.add(name)
         names = ["+".join(group) for group in self.groups]
-        for name in self.settings.likely_effectiveness_levels_by_group:
+        for name in self.settings.likely_levels:
             if name not in names:
                 unknown_group_reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
                 yield ("settings", "levels", name), unknown_group_reason
-        for k, delay_s in enumerate(self.settings.command_delay_offset_candidates_s):
+        for k, delay_s in enumerate(self.settings.command_delays_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
@@ -360,7 +360,7 @@ class Model(Section):
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         G = len(self.groups)
         expected: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.lagged_rate_and_signal_coefficients, (n_past, 3)),
+            (("past",), self.past_coefficients, (n_past, 3)),
             (("response",), self.command_response, (G, self.n_command_lags, 3)),
             (("response_sd",), self.command_response_standard_error, (G, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
@@ -372,7 +372,7 @@ class Model(Section):
                 ((*at, "noise"), noise.residual_covariance, (3, 3)),
                 ((*at, "before"), noise.ar_coefficients, (n_ar, 3)),
             ]
-            if misreads := noise.hidden_group_gain_error_sd:
+            if misreads := noise.misread_shares:
                 expected += [((*at, "misreads"), misreads, (G,))]
             if noise.ma_coefficients[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
@@ -382,8 +382,8 @@ class Model(Section):
                 ("rates", ranges.rate_ranges_rad_s, (3, 2)),
                 ("airspeed", ranges.airspeed_range_mps, (2,)),
                 ("spread", ranges.rate_sd_rad_s, (3,)),
-                ("tied", ranges.effect_share_explained_by_other_regressors, (G,)),
-                ("gain_sd", ranges.group_gain_standard_error, (G,)),
+                ("tied", ranges.tied_shares, (G,)),
+                ("gain_sd", ranges.group_gain_sd, (G,)),
             ]  # fmt: skip
             expected += [
                 (("fitted", key), array, shape)
@@ -420,7 +420,7 @@ class Model(Section):
             yield ("response_sd",), "has a negative number, allowed: at least 0"
         ranges = self.fitted_ranges
         if ranges is not None and any(
-            value < 0.0 for value in (*ranges.group_gain_standard_error, *ranges.rate_sd_rad_s)
+            value < 0.0 for value in (*ranges.group_gain_sd, *ranges.rate_sd_rad_s)
         ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
@@ -428,15 +428,15 @@ class Model(Section):
         """The model with one of its noise models only."""
         return self.model_copy(update={"noise_models": [noise]})
 
-    def with_inflated_covariance_of_noise_model(self, average: Sequence[float]) -> "Model":
+    def with_noise_of(self, average: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its
-        `covariance_inflation_of_noise_model`; the model itself where none was fitted.
+        `inflation_of`; the model itself where none was fitted.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
         if not self._noise_models_of(average):
             return self
-        R = self.covariance_inflation_of_noise_model(
+        R = self.inflation_of(
             average
         ) * self.covariance_of_noise_model(average)
         return self.model_copy(update={"residual_covariance": R.tolist()})
@@ -454,7 +454,7 @@ class Model(Section):
             if noise.ma_coefficients == list(average)
         ]
 
-    def covariance_inflation_of_noise_model(self, average: Sequence[float]) -> float:
+    def inflation_of(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
         noises = self._noise_models_of(average)
         return float(noises[0].covariance_inflation) if noises else 1.0
@@ -463,19 +463,19 @@ class Model(Section):
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
         errors = [
-            noise.hidden_group_gain_error_sd
+            noise.misread_shares
             for noise in self._noise_models_of(average)
-            if noise.hidden_group_gain_error_sd
+            if noise.misread_shares
         ]
         return np.array(errors[0]) if errors else np.zeros(len(self.groups))
 
-    def usual_quick_response_power(self, average: Sequence[float]) -> float:
+    def usual_quick_power(self, average: Sequence[float]) -> float:
         """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
         the noise; infinite where that is not known."""
         powers = [
-            noise.usual_quick_response_power
+            noise.usual_quick_power
             for noise in self._noise_models_of(average)
-            if noise.usual_quick_response_power is not None
+            if noise.usual_quick_power is not None
         ]
         return powers[0] if powers else float("inf")
 
@@ -493,7 +493,7 @@ class Model(Section):
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return (
             np.array(self.intercept),
-            np.array(self.lagged_rate_and_signal_coefficients),
+            np.array(self.past_coefficients),
             np.array(self.command_response),
             np.array(self.residual_covariance),
         )

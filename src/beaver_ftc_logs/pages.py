@@ -19,7 +19,7 @@ from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, diagnosed_duration_text,
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import RateRegression, power_spectral_density
+from beaver_ftc_logs.regression import Regression, spectral_density
 from beaver_ftc_logs.replay import diagnosis_columns
 from beaver_ftc_logs.samples import Samples
 
@@ -253,8 +253,8 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    usable = fitting.flights_with_usable_rows(flights)
-    fit = fitting.fit_least_squares_of_order(
+    usable = fitting.fit_parts(flights)
+    fit = fitting.fit_order(
         usable, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     names = ["constant", *regressor_names(model)]
@@ -292,10 +292,10 @@ def _encode_png(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _prediction_figure(usable: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
+def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     folds = [
-        (fitting.fit_with_same_order(fitted, model), held_out, name)
+        (fitting.refit(fitted, model), held_out, name)
         for fitted, held_out, name in fitting.validation_folds(usable)
     ]
     folds = [
@@ -324,10 +324,10 @@ def _prediction_figure(usable: Sequence[fitting.FlightWithUsableRows], model: Mo
 
 
 def _times_rates_residual_in_liveliest_window(
-    model: Model, held_out: fitting.FlightWithUsableRows, n: int
+    model: Model, held_out: fitting.FitPart, n: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
-    rows, residual = fitting.rows_and_one_step_residuals(model, held_out)
+    rows, residual = fitting.one_step_residual(model, held_out)
     rates = np.full_like(held_out.samples.rates, np.nan)
     r = np.full_like(held_out.samples.rates, np.nan)
     rates[rows], r[rows] = held_out.samples.rates[rows], residual
@@ -350,15 +350,15 @@ def _first_row_of_liveliest_window(
     )
 
 
-def _spectrum_figure(usable: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
+def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = np.vstack(
         [
-            fitting.rows_and_one_step_residuals(model, flight)[1]
+            fitting.one_step_residual(model, flight)[1]
             for flight in usable
         ]
     )
-    f_hz, power = power_spectral_density(residual, 1.0 / model.rate_hz)
+    f_hz, power = spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
@@ -374,7 +374,7 @@ def _spectrum_figure(usable: Sequence[fitting.FlightWithUsableRows], model: Mode
     return figure
 
 
-def _coefficient_correlation_figure(fit: RateRegression, names: list[str]) -> Any:
+def _coefficient_correlation_figure(fit: Regression, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
     side = 2.5 + 0.19 * len(names)
     figure = _new_figure(side + 0.8, side)

@@ -52,7 +52,7 @@ class Samples:
     makes it, in shares of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown.
     stretch_number (n,): number of the gap-free stretch. mean_age_s_by_held_column: mean age of the values of
     each column that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading.
-    airspeed (n,) m/s, nan where unknown. time_since_change_s_by_column: for how long each column of rates,
+    airspeed (n,) m/s, nan where unknown. unchanged_s: for how long each column of rates,
     commands and signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of
     the energy height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving
     average of the noise by which rates, commands and signals are whitened, empty if they are not. fit_weight
@@ -73,7 +73,7 @@ class Samples:
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
-    time_since_change_s_by_column: Mapping[str, Floats] = field(default_factory=dict)
+    unchanged_s: Mapping[str, Floats] = field(default_factory=dict)
     is_rate_clipped: NDArray[np.bool_] | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
@@ -139,7 +139,7 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
             *dict.fromkeys(_used_column_defect_texts(log, used, rate_names)),
         ),
         airspeed=_sampled_airspeed(log, vehicle, t_s, step_s),
-        time_since_change_s_by_column={
+        unchanged_s={
             name: _time_since_column_change_s(log.columns[name], t_s) for name in used
         },
         is_rate_clipped=_is_rate_clipped([log.columns[name] for name in rate_names], t_s),
@@ -281,7 +281,7 @@ def _sampled_energy_height_rate_mps(
         return None
     t_s, stretch, step_s = grid
     altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in columns)
-    return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch)
+    return energy.energy_climb_mps(t_s, altitude, airspeed, stretch)
 
 
 def _check_gravity_and_confirm_rates_by_attitude(
@@ -608,12 +608,12 @@ def _select_rows(samples: Samples, row_slice: slice) -> Samples:
         if (values := getattr(samples, name)) is not None
     }
     unchanged = {
-        name: values[row_slice].copy() for name, values in samples.time_since_change_s_by_column.items()
+        name: values[row_slice].copy() for name, values in samples.unchanged_s.items()
     }
     return replace(
         samples,
         log_stamps_s=chosen["t_s"],
-        time_since_change_s_by_column=unchanged,
+        unchanged_s=unchanged,
         **chosen,
     )
 
@@ -630,8 +630,8 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
     is_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
     joined["stretch_number"] = np.cumsum(is_begin)
     unchanged = {
-        name: np.concatenate([stretch.time_since_change_s_by_column[name] for stretch in stretches])
-        for name in stretches[0].time_since_change_s_by_column
+        name: np.concatenate([stretch.unchanged_s[name] for stretch in stretches])
+        for name in stretches[0].unchanged_s
     }
     long_log_note = (
         f"a long log, read in {n_parts} parts: {len(is_begin)} samples of it, spread evenly, are "
@@ -644,7 +644,7 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
         notes=notes,
         n_log_parts=n_parts,
         log_stamps_s=joined["t_s"],
-        time_since_change_s_by_column=unchanged,
+        unchanged_s=unchanged,
         rates_confirmed_by_attitude=frozenset.intersection(
             *(stretch.rates_confirmed_by_attitude for stretch in stretches)
         ),

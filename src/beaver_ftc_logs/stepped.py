@@ -17,8 +17,8 @@ from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import (
-    coefficient_upper_bounds_and_squared_residuals,
-    split_into_parts_for_bounds,
+    bound_above,
+    split_parts,
 )
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
@@ -96,7 +96,7 @@ def _relative_command_gains_and_upper_bounds(
     and the expected effect of each surface (n, 3, S)."""
     S = Z.shape[2]
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
-    if (parts := split_into_parts_for_bounds(rows)) is None:
+    if (parts := split_parts(rows)) is None:
         return np.ones(S), np.ones(S)
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
     X = np.concatenate(
@@ -114,7 +114,7 @@ def _relative_command_gains_and_upper_bounds(
     )
     upper = np.full(S, -np.inf)
     for part in parts:
-        bounds, _ = coefficient_upper_bounds_and_squared_residuals(
+        bounds, _ = bound_above(
             X[part].reshape(3 * len(part), -1),
             y[part].ravel(),
             _EFFECTIVE_SAMPLE_SHARE,

@@ -23,11 +23,11 @@ from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, d
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.fitting import (
-    FlightWithUsableRows,
-    add_fitted_ranges_and_alarm_threshold,
+    FitPart,
+    add_ranges_and_threshold,
     fit_model,
-    flights_with_usable_rows,
-    score_folds_and_choose_credible_mass,
+    fit_parts,
+    score_folds,
     validation_folds,
 )
 from beaver_ftc_logs.model import FilterSettings, Model
@@ -121,7 +121,7 @@ def result_files(document: Document) -> Files:
 
 
 def _compare_methods(data: FlightDataSet) -> Document:
-    usable = flights_with_usable_rows(data.flights)
+    usable = fit_parts(data.flights)
     is_single = len(data.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
@@ -130,7 +130,7 @@ def _compare_methods(data: FlightDataSet) -> Document:
     )
     entries: list[Document] = []
     for fitted, held_out, name in validation_folds(usable):
-        model = add_fitted_ranges_and_alarm_threshold(
+        model = add_ranges_and_threshold(
             fitted, fit_model(fitted, data.vehicle, settings)
         )
         log = next(
@@ -162,7 +162,7 @@ def _compare_methods(data: FlightDataSet) -> Document:
 
 
 def _diagnose_with_each_method(
-    log: RecordedFlight, held_out: FlightWithUsableRows, model: Model
+    log: RecordedFlight, held_out: FitPart, model: Model
 ) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
@@ -176,24 +176,24 @@ def _diagnose_with_each_method(
 
 
 def settings_of_whole_flight(
-    usable: list[FlightWithUsableRows], data: FlightDataSet
+    usable: list[FitPart], data: FlightDataSet
 ) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
     model = fit_model(usable, data.vehicle)
     if len(usable) > 1:
         return model.settings
     return model.settings.model_copy(
-        update={"credible_mass": score_folds_and_choose_credible_mass(usable, model)[1]}
+        update={"credible_mass": score_folds(usable, model)[1]}
     )
 
 
-def _score_against_log(held_out: FlightWithUsableRows, rows: DiagnosisRows, model: Model) -> Document:
+def _score_against_log(held_out: FitPart, rows: DiagnosisRows, model: Model) -> Document:
     if np.isfinite(held_out.samples.labels).any():
         return scoring.score_against_labels(rows, labels_nan_outside_usable_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_nan_outside_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
+def labels_nan_outside_usable_span(held_out: FitPart) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
     usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)

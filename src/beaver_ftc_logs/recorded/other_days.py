@@ -17,9 +17,9 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import BANK_OF_FILTERS_DETECTOR, diagnose_with_detector
 from beaver_ftc_logs.fitting import (
-    FlightWithUsableRows,
+    FitPart,
     fit_model,
-    flights_with_usable_rows,
+    fit_parts,
     validation_folds,
 )
 from beaver_ftc_logs.model import Model
@@ -203,7 +203,7 @@ def run_other_days(folder: Path) -> Document:
 
 
 def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
-    usable = flights_with_usable_rows(data.flights)
+    usable = fit_parts(data.flights)
     settings = benchmark.settings_of_whole_flight(usable, data)
     folds = [
         (fit_model(fitted, data.vehicle, settings), held_out)
@@ -235,7 +235,7 @@ def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
 def _score_days(
     kind: str,
     days: Sequence[DayChanges],
-    folds: Sequence[tuple[Model, FlightWithUsableRows]],
+    folds: Sequence[tuple[Model, FitPart]],
     all_flights_model: Model,
 ) -> Iterator[Document]:
     _, A, _, Q = all_flights_model.intercept_past_response_noise()

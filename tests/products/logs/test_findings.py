@@ -16,7 +16,7 @@ from beaver_ftc_logs.findings import (
     lasting_or_else_all_events,
     verdict_document,
 )
-from beaver_ftc_logs.regression import unexplained_rates_and_responses
+from beaver_ftc_logs.regression import unexplained_rates
 from products.logs import small
 
 NAMES = ["right", "left"]
@@ -156,7 +156,7 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
 
 
 def _standardized_group_responses(samples, model):
-    ok, _, answers = unexplained_rates_and_responses(samples, model)
+    ok, _, answers = unexplained_rates(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
         model.settings.effective_sample_share
     )

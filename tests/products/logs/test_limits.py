@@ -45,7 +45,7 @@ def test_a_model_comes_back_from_its_file(tmp_path):
     assert lines[1] == ' "vehicle": {'
     assert path.read_text().endswith("}\n")
     intercept, past, response, noise = model.intercept_past_response_noise()
-    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.lagged_rate_and_signal_coefficients)
+    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.past_coefficients)
     assert (response.tolist(), noise.tolist()) == (model.command_response, model.residual_covariance)
 
 

@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.mixing import load_vehicle_for_logs, mixing_of_log
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.regression import group_surfaces_by_commands
+from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle
 from products.logs import synthetic
@@ -207,7 +207,7 @@ def test_surfaces_that_move_together_follow_one_command():
         "right_aileron": {"actuator_servos.control[0]": -0.5},
     }
     vehicle = Vehicle.model_validate(RATES | {"commands": found.commands, "surfaces": found.surfaces})
-    assert group_surfaces_by_commands(vehicle) == [[0, 1]]
+    assert group_surfaces(vehicle) == [[0, 1]]
 
 
 def test_flaperons_follow_what_is_left_without_flaps():

@@ -9,7 +9,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
-from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_hypothesis_bank
+from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_bank
 from kept import in_short
 from products.logs import small
 
@@ -80,7 +80,7 @@ def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
 
 
 def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
-    bank = build_hypothesis_bank(WING)
+    bank = build_bank(WING)
     posterior = np.arange(1.0, len(bank.hypothesis_kind) + 1)[None, :] / 1000.0
     for group in (0, 1):
         levels, mass = diagnose._group_level_distribution(
@@ -136,7 +136,7 @@ def held(rows):
 
 @pytest.mark.parametrize("name", SHARES)
 def test_rows_of_probabilities(changed, name):
-    bank = build_hypothesis_bank(WING)
+    bank = build_bank(WING)
     shares = posterior(bank, *SHARES[name])
     samples = small.flight(WING, len(shares))
     found = diagnose.diagnosis_rows_from_posterior(samples, WING, bank, shares)
@@ -145,7 +145,7 @@ def test_rows_of_probabilities(changed, name):
 
 
 def test_rows_of_surfaces_together_that_may_be_stuck(changed):
-    bank = build_hypothesis_bank(TAIL)
+    bank = build_bank(TAIL)
     shares = posterior(bank, *STUCK)
     assert not changed(
         held(diagnose.diagnosis_rows_from_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares))
@@ -154,7 +154,7 @@ def test_rows_of_surfaces_together_that_may_be_stuck(changed):
 
 def test_names_by_hand():
     """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
-    bank = build_hypothesis_bank(TAIL)
+    bank = build_bank(TAIL)
     found = diagnose.diagnosis_rows_from_posterior(
         small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK)
     )
@@ -187,9 +187,9 @@ def test_names_under_other_laws(monkeypatch):
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "any_fault_log_odds_gains", lambda posterior, bank: gained)
+    monkeypatch.setattr(diagnose, "fault_evidence", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
 
     def named_by(of):
         found = diagnose.diagnosis_rows_from_posterior(
@@ -211,8 +211,8 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         given.append(of[3:])
         return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
-    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_where_engine_may_have_failed", renamed)
-    model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_energy_height_rate_mps=-1.5))
+    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces", renamed)
+    model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_climb_mps=-1.5))
     found = diagnose._withdraw_isolation_after_engine_failure(
         SimpleNamespace(energy_height_rate_mps="climb"), model, rows
     )
@@ -224,7 +224,7 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         np.testing.assert_array_equal(getattr(found, name), values)
     for fitted, climb in (
         (None, "climb"),
-        (SimpleNamespace(unpowered_energy_height_rate_mps=None), "climb"),
+        (SimpleNamespace(unpowered_climb_mps=None), "climb"),
         (model.fitted_ranges, None),
     ):
         alike = diagnose._withdraw_isolation_after_engine_failure(
@@ -344,7 +344,7 @@ def test_a_name_is_taken_back_where_another_group_explains_the_last_second_bette
     flown = small.flight(model, 60, seed=4)
     offset = np.repeat([[0.0, 0.0, 0.0], [0.12, 0.01, 0.0], [0.0, 0.1, 0.0]], 20, axis=0)
     flown = replace(flown, rates=flown.rates + offset)
-    ok, left, answers = diagnose.unexplained_rates_and_responses(flown, model)
+    ok, left, answers = diagnose.unexplained_rates(flown, model)
     rest = left - np.array(model.intercept) - answers.sum(axis=1)
     inverse = np.linalg.inv(noise)
     gains = np.zeros((60, 3))
@@ -375,7 +375,7 @@ def test_a_name_is_taken_back_where_another_group_explains_the_last_second_bette
 def test_under_other_laws_each_level_is_as_likely_before_the_flight():
     """The probability of a level over that before; health is not excluded before an alarm excludes it."""
     model = small.model(small.WING | {"other_laws": True}, settings=SETTINGS)
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     shares = np.random.default_rng(4).uniform(size=(5, len(bank.hypothesis_kind))) * bank.prior_probability
     shares[:, (bank.effectiveness == LEFT).all(axis=1)] += [[2.0], [0.001], [0.05], [0.2], [0.0]]
     shares[:, 0] *= [0.0, 1.0, 0.3, 0.0, 1.0]
@@ -403,8 +403,8 @@ def test_evidence_began_where_its_sum_was_last_at_zero(monkeypatch, threshold):
     """However high it may rise; in the first row where it never was."""
     model = small.model(settings=SETTINGS | {"threshold": threshold})
     gained = np.array([1.0, 2.0, -9.0, 2.0, 5.0, -6.0, 1.0, -3.0, -1.0, 2.0])
-    monkeypatch.setattr(diagnose, "any_fault_log_odds_gains", lambda of, by: gained)
-    bank = build_hypothesis_bank(model)
+    monkeypatch.setattr(diagnose, "fault_evidence", lambda of, by: gained)
+    bank = build_bank(model)
     samples = small.flight(model, 10, t_s=7.0 + 0.25 * np.arange(10))
     found = diagnose.diagnosis_rows_from_posterior(
         samples, model, bank, posterior(bank, *[{SOUND: 1.0}] * 10)
@@ -426,8 +426,8 @@ def test_a_diagnosis_is_of_rates_that_live_and_doubts_names_under_other_laws(
     bank, samples, rows = SimpleNamespace(no_response_hypothesis_index=1), small.flight(model, 3), "rows"
     posterior, told = np.array([[0.5, 0.5], [0.49, 0.51], [0.9, 0.1]]), {}
     stubs = {
-        "build_hypothesis_bank": lambda by: bank,
-        "hypothesis_state_and_noise_posterior": lambda *of: (
+        "build_bank": lambda by: bank,
+        "bank_posterior": lambda *of: (
             told.update(filtered=of) or (posterior, None, None)
         ),
         "diagnosis_rows_from_posterior": lambda *of: told.update(read=of) or rows,
@@ -436,7 +436,7 @@ def test_a_diagnosis_is_of_rates_that_live_and_doubts_names_under_other_laws(
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(diagnose, name, stub)
-    monkeypatch.setattr(diagnose.trust, "with_rates_unknown_where_frozen_or_clipped", lambda of, by: "alive")
+    monkeypatch.setattr(diagnose.trust, "without_dead_rows", lambda of, by: "alive")
     found = diagnose._diagnose_checked_log(samples, model)
     assert found == ((samples, model, "doubted rows" if doubts else rows), [False, True, False])
     assert told["filtered"] == ("alive", model, bank)
@@ -452,7 +452,7 @@ def test_where_one_group_is_at_fault_all_are_named_that_are_not_excluded(losses,
     """A thousandth of the likeliest is excluded, other kinds of faults count for nothing; where no group is
     excluded none is named."""
     model = small.model(THREE, settings=SETTINGS | {"one_group": True})
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     single = [{tuple(0.5 if i == g else 1.0 for i in range(3)): share} for g, share in enumerate(losses)]
     pair = {(1.0, 0.5, 0.25): 0.09}
     shares = posterior(bank, {key: value for one in (*single, pair) for key, value in one.items()})

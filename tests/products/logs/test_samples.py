@@ -183,10 +183,8 @@ def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
     assert np.isnan(found.rates[late, 0]).all()
     assert np.isfinite(found.rates[early, 0]).mean() > 0.6
     assert np.isfinite(found.rates[:, 1:]).all()
-    np.testing.assert_allclose(
-        found.time_since_change_s_by_column["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9
-    )
-    assert found.time_since_change_s_by_column["p_rad_s"][early].max() < 0.5
+    np.testing.assert_allclose(found.unchanged_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
+    assert found.unchanged_s["p_rad_s"][early].max() < 0.5
 
 
 def test_the_mixer_has_a_row_a_surface():
@@ -488,7 +486,7 @@ def filled(n=12, first=0.0, **changes):
         "name": "all", "dt_s": 0.1, "mean_age_s_by_held_column": {"roll": 0.02},
         "logged_failures": (LoggedFailure(3.0, "fin"),), "log_stamps_s": 0.01 * np.arange(99.0),
         "notes": ("one",),
-        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+        "unchanged_s": {"roll": 4.0 * at, "pitch": 5.0 * at},
         "noise_ma_coefficients": (1.0, 0.5), "fit_weight": 1.5, "n_log_parts": 1,
         "rates_confirmed_by_attitude": frozenset({"roll", "yaw"}),
     }  # fmt: skip
@@ -503,7 +501,7 @@ def assert_same(found, expected):
         one = getattr(found, name)
         if isinstance(value, np.ndarray):
             np.testing.assert_array_equal(one, value, err_msg=name)
-        elif name == "time_since_change_s_by_column":
+        elif name == "unchanged_s":
             assert one.keys() == value.keys()
             for key in value:
                 np.testing.assert_array_equal(one[key], value[key], err_msg=key)
@@ -514,9 +512,9 @@ def assert_same(found, expected):
 def test_some_rows_of_samples_are_those_rows_of_every_field():
     whole, per_row, given = filled()
     rows = slice(3, 8)
-    still = {name: one[rows] for name, one in given["time_since_change_s_by_column"].items()}
+    still = {name: one[rows] for name, one in given["unchanged_s"].items()}
     cut = {name: one[rows] for name, one in per_row.items()}
-    expected = {**given, **cut, "time_since_change_s_by_column": still, "log_stamps_s": per_row["t_s"][rows]}
+    expected = {**given, **cut, "unchanged_s": still, "log_stamps_s": per_row["t_s"][rows]}
     assert_same(of._select_rows(whole, rows), expected)
     bare = replace(whole, airspeed=None, is_rate_clipped=None, energy_height_rate_mps=None)
     without = {"airspeed": None, "is_rate_clipped": None, "energy_height_rate_mps": None}
@@ -540,7 +538,7 @@ def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
     assert_same(found, given | per_row | {
         "name": "long", "n_log_parts": 5, "notes": (note, "one", "two"), "log_stamps_s": per_row["t_s"],
         "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]), "rates_confirmed_by_attitude": frozenset({"yaw"}),
-        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+        "unchanged_s": {"roll": 4.0 * at, "pitch": 5.0 * at},
     })  # fmt: skip
 
 

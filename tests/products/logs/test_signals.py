@@ -35,9 +35,7 @@ def test_a_clipped_rate_and_one_that_is_not():
         rows = signals.find_clipped_rows(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
-        said = signals.column_defect_texts(
-            "p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_rate=True
-        )
+        said = signals.column_defect_texts("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_rate=True)
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
     assert not signals.find_clipped_rows(free).any()
     assert not signals.find_clipped_rows(np.zeros(500)).any()
@@ -75,9 +73,9 @@ def test_rows_without_a_number_are_counted():
     values[3:10] = np.nan
     (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), is_rate=True)
     assert said == "p: rows without a number: 7 of 1200"
-    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_rate=False)[
-        -1
-    ].startswith("u: does not move")
+    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_rate=False)[-1].startswith(
+        "u: does not move"
+    )
 
 
 def turning(seed=1):

@@ -26,7 +26,7 @@ def by_hand(samples, model, k):
     """Residual of sample k and the groups' answers, summed term by term from the model file."""
     predicted = np.array(model.intercept)
     past = [samples.rates[k - lag] for lag in range(1, model.n_rate_lags + 1)]
-    predicted = predicted + np.concatenate(past) @ np.array(model.lagged_rate_and_signal_coefficients)
+    predicted = predicted + np.concatenate(past) @ np.array(model.past_coefficients)
     answers = [
         sum(
             samples.commands[k - lag, g] * np.array(model.command_response[g][lag - 1])
@@ -58,9 +58,7 @@ def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     context = loop_detector_context(wing_model)
     step = np.array([0.0, 0.3, 0.0])
     changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
-    np.testing.assert_allclose(
-        changed, 0.3 * np.array(wing_model.lagged_rate_and_signal_coefficients)[1], atol=1e-12
-    )
+    np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past_coefficients)[1], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["multiple-models", "sliding-least-squares"])

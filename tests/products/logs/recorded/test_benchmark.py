@@ -109,10 +109,10 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
     recordings = [SimpleNamespace(name=name) for name in reversed(names)]
     folds = [([one for one in flights if one is not kept], kept, kept.samples.name) for kept in flights]
     stubs = {
-        "flights_with_usable_rows": list,
+        "fit_parts": list,
         "validation_folds": lambda stretches: folds,
         "fit_model": lambda fitted, *of: ([one.samples.name for one in fitted], *of),
-        "add_fitted_ranges_and_alarm_threshold": lambda fitted, model: (len(fitted), *model),
+        "add_ranges_and_threshold": lambda fitted, model: (len(fitted), *model),
         "_diagnose_with_each_method": lambda recording, kept, model: [
             (method, (recording.name, kept.samples.name)) for method in ("ours", "other")
         ],

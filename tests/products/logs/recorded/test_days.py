@@ -21,7 +21,7 @@ from products.logs import small
 MODEL = small.model()
 LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
 MIXER = np.array([[0.5, 0.5], [0.5, -0.5]])
-PAST = np.array(MODEL.lagged_rate_and_signal_coefficients)
+PAST = np.array(MODEL.past_coefficients)
 NOISE = np.array(MODEL.residual_covariance)
 
 

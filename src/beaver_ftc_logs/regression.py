@@ -1,10 +1,20 @@
 """The regressors of the next sample's rates, and least squares on them.
 
-    rates[k] = c + A [rates[k-1..k-h], signals[k-1]] + sum over groups g of e_g sum_j b_gj u_g[k-j] + noise
+    rates[k] = b + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
+
+    n, G, h, L, f   samples; groups; past samples of the rates, of the commands, of the X signals
+    b               intercept (3,), rad/s
+    x, A            the past: rates[k-1..k-h], signals[k-1..k-f], (3 h + X f,); its coefficients (.., 3)
+    u, U            command of a group, a share of its travel; of all groups at lags 1 to L (n, G, L)
+    a               effectiveness of each group (G,)
+    B, F            response (G, L, 3), rad/s; what the groups do while they are healthy (n, G, 3), rad/s
+    y               rates that the past leaves unexplained (n, 3), rad/s
+    e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
+    ma, ar          moving average of the noise, 1 first; its predictor from those before, (.., 3, 3)
 
 Surfaces whose commands are proportional to one another move together while they are healthy: their effects
-cannot be distinguished by any fit, so they form one group with one response. Of a fit: what a coloured
-residual does to its covariance, and which regressors are collinear.
+cannot be distinguished by any fit, so they form one group with one response. Least squares of y on Z (n, m):
+coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divided by its scale s (m,).
 """
 
 from dataclasses import dataclass
@@ -43,11 +53,10 @@ def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
 def build_regressors(
     samples: Samples, groups: list[list[int]], h: int, L: int, labelled: bool, f: int = 1
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of
-    groups at lags 1 to L, and whether all of it is known and no gap lies within, (n,).
+    """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
+    whether all of it is known and no gap lies within, (n,).
 
-    labelled: multiply each surface's command by its labelled effectiveness (1 where there is no
-    label). f: past samples f of the signals.
+    labelled: multiply each surface's command by its labelled effectiveness (1 where there is no label).
     """
     u = samples.commands
     if labelled:
@@ -85,38 +94,34 @@ def expand_groups(values: Floats, model: Model) -> Floats:
 def unexplained_rates(
     samples: Samples, model: Model, labelled: bool = False
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """By a model: which samples it can predict, (n,), what the past leaves unexplained of the rates, (n, 3),
-    and each group's healthy answer, (n, G, 3). labelled: as `build_regressors`.
+    """By a model: which samples it can predict, (n,), y (n, 3) and F (n, G, 3). labelled: as in
+    `build_regressors`.
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    counts = (
-        model.n_rate_lags,
-        model.n_command_lags,
-        labelled,
-        model.vehicle.n_signal_lags(model.n_rate_lags),
-    )
-    X, U, ok = build_regressors(samples, group_indices(model), *counts)
+    h, L = model.n_rate_lags, model.n_command_lags
+    f = model.vehicle.n_signal_lags(h)
+    X, U, ok = build_regressors(samples, group_indices(model), h, L, labelled, f)
     _, A, B, _ = model.intercept_past_response_noise()
     y = samples.rates - np.einsum("nm,mr->nr", X, A)
-    return (ok, y, np.einsum("ngl,glr->ngr", U, B))
+    return ok, y, np.einsum("ngl,glr->ngr", U, B)
 
 
 def whitened_rates(
     samples: Samples, model: Model, labelled: bool = False
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """As `unexplained_rates`, less the prediction of each residual from those before it by the
-    flight's noise model: a healthy flight leaves a white residual."""
+    """As `unexplained_rates`, less the prediction of each residual from those before it by the flight's noise
+    model: a healthy flight leaves a white residual."""
     ok, y, F = unexplained_rates(samples, model, labelled)
     ar = model.residual_ar_coefficients(samples.noise_ma_coefficients)
     whole = ok.copy()
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(ok, lag, False)
-    return (whole, subtract_noise(y, ar), subtract_noise(F, ar))
+    return whole, subtract_noise(y, ar), subtract_noise(F, ar)
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
-    """Values (n, ..., 3) less their prediction from the L before each; ar (L, 3, 3)."""
+    """Values v (n, ..., 3) less their prediction: v[k] - sum_j ar[j-1]' v[k-j], with ar (p, 3, 3)."""
     rest = values.copy()
     if not len(ar) or not values.size:
         return rest
@@ -141,12 +146,13 @@ class Regression:
 
 
 def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regression:
-    """Ordinary least squares of rates (n, 3) on Z (n, m), with Newey-West standard errors over
-    `lag` lags.
+    """Ordinary least squares of the rates y (n, 3) on Z (n, m), with Newey-West standard errors:
 
-    stretch (n,): products of e are formed within one gap-free stretch only. Directions that
-    the Z do not excite get the least coefficients that fit, and a column of nothing but rounding
-    gets 0.
+        X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
+
+    stretch (n,): products of e over up to `lag` samples are formed within one gap-free stretch only.
+    Directions that Z does not excite get the least coefficients that fit, and a column of nothing but
+    rounding gets 0.
     """
     rms = np.sqrt((Z**2).mean(axis=0))
     s = np.where(rms > _RANK_TOLERANCE * rms.max(), rms, np.inf)
@@ -160,15 +166,12 @@ def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regre
     coloured = np.column_stack([_newey_west(X, e[:, i], P, stretch, lag) for i in range(y.shape[1])])
     inflation = np.divide(coloured, white, out=np.ones_like(coloured), where=white > 0)
     d = np.sqrt(np.maximum(np.diag(P), MIN_DIVISOR))
-    return Regression(
-        b / s[:, None], R,
-        coloured / s[:, None], inflation,
-        P / np.outer(d, d),
-    )  # fmt: skip
+    return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
 
 
 def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag: int) -> Floats:
-    """Standard errors that hold for autocorrelated residuals: Bartlett weights over `lag` lags."""
+    """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
+    products of the scores X e with Bartlett's weights over `lag` lags."""
     scores, w = X * e[:, None], lag + 1
     edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist(), len(stretch)]
     S = np.zeros((X.shape[1], X.shape[1]))
@@ -180,9 +183,8 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
 
 
 def bound_above(Z: Floats, y: Floats, share: float) -> tuple[Floats, Floats]:
-    """Least squares of y (n,) on Z (n, m): what each coefficient surely does not exceed,
-    (m,), which is much where columns make one another up; and squares of what is left (n,).
-    share: as in `FilterSettings`."""
+    """Least squares of y (n,) on Z (n, m): what each coefficient surely does not exceed, (m,), which is much
+    where columns make one another up; and squares of what is left (n,). share: effective_sample_share."""
     s = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
     X = Z / s
     P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
@@ -199,7 +201,8 @@ def split_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
 
 
 def variance_inflation(Z: Floats) -> Floats:
-    """How much each column's coefficient's variance is inflated by the others: 1 alone, inf dependent."""
+    """How much the variance of each column's coefficient is inflated by the other columns of Z (n, m): 1
+    alone, inf dependent. That is the diagonal of the inverse of the correlation C = V lam V'."""
     X = Z - Z.mean(axis=0)
     norms = np.sqrt((X**2).sum(axis=0))
     factors = np.full(Z.shape[1], np.inf)
@@ -214,9 +217,9 @@ def variance_inflation(Z: Floats) -> Floats:
 
 
 def spectral_density(e: Floats, dt_s: float, longest: int = 256) -> tuple[Floats, Floats]:
-    """One-sided spectral density of each residual, (f,) Hz and (f, 3), by averaged periodograms."""
+    """Frequencies, Hz, and one-sided spectral density of a residual e (n, 3) at each, by averaged
+    periodograms of at most `longest` samples."""
     from scipy import signal
 
-    n = min(longest, len(e))
-    f, density = signal.welch(e, fs=1.0 / dt_s, nperseg=n, axis=0, detrend="constant")
+    f, density = signal.welch(e, fs=1.0 / dt_s, nperseg=min(longest, len(e)), axis=0, detrend="constant")
     return f, density

@@ -1,17 +1,30 @@
 """The bank of filters: one causal pass through a flight, with all hypotheses in parallel.
 
-Under hypothesis h, with effectiveness e_h of the groups, the part of the rates unexplained by the past is
+Under hypothesis h, with effectiveness a_h of the groups, the part of the rates unexplained by the past is
 
-    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, q r R)
+    y = c + s (b + sum_g a_hg F_g) + sum_g d_g k_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
 
-with the intercept b of the model. The trim c (3,), the common gain s and the additional gain d (G,) of each
-group belong to the flight: each hypothesis estimates them with a Kalman filter. r is the running scale of the
-noise, and q the variance of a sample over that of the noise, larger after quick commands
-(`quick_scale`). The common gain multiplies the intercept and all responses, whose sum
-vanishes in trimmed flight: it shows in the motion about trim, as the dynamic pressure does, and not in the
-trim. One hypothesis changes to another at random times (interacting multiple models [Blom1988]); the new one
-inherits trim and gains, plus an offset of the rates if a surface may be stuck. The last hypothesis is that
-nothing answers the commands, as on the ground: it estimates no trim and no gain.
+    n, H, G         samples, hypotheses, groups; N = 4 + G states
+    y, F, b         unexplained rates (n, 3), healthy responses (n, G, 3), intercept (3,), rad/s, as in
+                    `regression`
+    a, k            effectiveness (H, G), and share of a response that the group's own gain multiplies (H, G)
+    x, P            state: trim c (3,) rad/s, common gain s, gain d (G,) of each group; its covariance
+    C               what the states do to y, (N, 3)
+    p               probability of each hypothesis (H,)
+    R               covariance of the noise (3, 3), (rad/s)2; W whitens it
+    nu              degrees of freedom of the t distribution of the noise
+    r               running scale of the variance of the noise
+    q               variance of a sample over that of the noise, larger after quick commands (`quick_scale`)
+    e, S, K         residual y - C' x (3,), its covariance (3, 3), gain (N, 3)
+    d2              e' S^-1 e
+    ll              log likelihood of a sample
+
+The states belong to the flight: each hypothesis estimates them with a Kalman filter. The common gain
+multiplies the intercept and all responses, whose sum vanishes in trimmed flight: it shows in the motion about
+trim, as the dynamic pressure does, and not in the trim. One hypothesis changes to another at random times
+(interacting multiple models [Blom1988]); the new one inherits trim and gains, plus an offset of the rates if
+a surface may be stuck. The last hypothesis is that nothing answers the commands, as on the ground: it
+estimates no trim and no gain.
 
 The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
 the probabilities of the delays.
@@ -94,41 +107,37 @@ def _average_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[F
 
 def _noise_likelihood(flight: Samples, model: Model, noise: NoiseModel) -> Floats:
     """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
-    the R of the fit, without its inflation. The filter multiplied the samples by C(1)."""
+    the covariance of the fit, without its inflation. The filter multiplied the samples by the sum of `ma`."""
+    ma = noise.ma_coefficients
     ok, y, F = whitened_rates(flight, model)
-    e = np.nan_to_num(y - F.sum(axis=1) - model.whitened_intercept(noise.ma_coefficients))
+    e = np.nan_to_num(y - F.sum(axis=1) - model.whitened_intercept(ma))
     R = np.array(noise.residual_covariance)
-    q = quick_scale(np.nan_to_num(F), model, noise.ma_coefficients)
-    d2 = np.einsum("na,ab,nb->n", e, np.linalg.inv(R), e)
-    d2 /= q
+    q = quick_scale(np.nan_to_num(F), model, ma)
+    d2 = np.einsum("na,ab,nb->n", e, np.linalg.inv(R), e) / q
     nu = model.settings.t_degrees_of_freedom
     log_det = np.linalg.slogdet(R)[1] + 3.0 * np.log(q)
-    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + log_det) + 3.0 * np.log(sum(noise.ma_coefficients))
+    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + log_det) + 3.0 * np.log(sum(ma))
     return np.where(ok, model.settings.effective_sample_share * ll, 0.0)
 
 
 def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
     """Return the increase of the log odds of any fault by each sample, beyond that by the prior of a change,
-    (n,). Its sum is the logarithm of a likelihood ratio."""
-    fault = np.clip(p[:, bank.is_fault_hypothesis].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
-    entry = (
-        bank.change_probability_per_sample
-        * bank.transition_share[bank.is_fault_hypothesis].sum()
-        / bank.transition_share.sum()
-    )
-    prior = np.concatenate(
-        [
-            [bank.prior_probability[bank.is_fault_hypothesis].sum()],
-            (1.0 - bank.change_probability_per_sample) * fault[:-1] + entry,
-        ]
-    )
+    (n,), from the probabilities p (n, H). Its sum is the logarithm of a likelihood ratio."""
+    is_fault = bank.is_fault_hypothesis
+    share = bank.transition_share
+    change = bank.change_probability_per_sample
+    fault = np.clip(p[:, is_fault].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
+    entry = change * share[is_fault].sum() / share.sum()
+    prior = np.append(bank.prior_probability[is_fault].sum(), (1.0 - change) * fault[:-1] + entry)
     return np.asarray(np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior)))
 
 
 @kernel
 def page_cusum(z, top):
-    """Page's sum of z (n,): never below zero, where it starts again, and never above
-    top, (n,)."""
+    """Page's sum of the evidence z (n,), never below zero, where it starts again, and never above top:
+
+    S[k] = min(max(S[k-1] + z[k], 0), top)
+    """
     s, S = 0.0, np.zeros(len(z))
     for k in range(len(z)):
         s = min(max(s + z[k], 0.0), top)
@@ -150,7 +159,7 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
 
 
 def _model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
-    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods
+    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods ll
     (n,), forgotten exponentially within minutes."""
     from scipy.signal import lfilter
 
@@ -162,22 +171,21 @@ def _model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
 
 def _run_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRun:
     """The result of `run_bank` for one flight."""
+    ma = samples.noise_ma_coefficients
     ok, *rest = whitened_rates(samples, model)
     y, F = (np.ascontiguousarray(np.nan_to_num(v)) for v in rest)
-    noise = build_noise(model, samples.noise_ma_coefficients)
-    q = quick_scale(F, model, samples.noise_ma_coefficients)
+    noise = build_noise(model, ma)
+    q = quick_scale(F, model, ma)
     r_min = np.zeros(len(ok))
     if model.vehicle.other_laws:
         e = np.where(ok[:, None], y - noise.intercept_rad_s - F.sum(axis=1), 0.0) / np.sqrt(q[:, None])
         r_min = recent_scale(e, ok, noise.covariance, model.rate_hz)
-    run: BankRun = run_bank(
-        y, F, ok, bank, build_states(model, samples.noise_ma_coefficients), noise, r_min, q
-    )
+    run: BankRun = run_bank(y, F, ok, bank, build_states(model, ma), noise, r_min, q)
     return run
 
 
 def quick_scale(F: Floats, model: Model, ma: Sequence[float]) -> Floats:
-    """Return the variance of the residual over that of the noise, (n,): above 1 where responses (n, G, 3) are
+    """Return the variance q of the residual over that of the noise, (n,): above 1 where the responses F are
     quicker than usual in the fit, since a share of the quick part may be missing, or be too much.
 
     Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
@@ -189,7 +197,7 @@ def quick_scale(F: Floats, model: Model, ma: Sequence[float]) -> Floats:
 
 
 def quick_power(F: Floats, R: Floats, rate_hz: float) -> Floats:
-    """Return the power of the quick part of the responses (n, G, 3) an axis, in variances of the noise, (n,).
+    """Return the power of the quick part of the responses F an axis, in variances of the noise, (n,).
 
     The quick part is the difference from the mean over the last half second.
     """
@@ -202,8 +210,9 @@ def quick_power(F: Floats, R: Floats, rate_hz: float) -> Floats:
 
 
 def recent_scale(e: Floats, ok: np.ndarray, R: Floats, rate_hz: float) -> Floats:
-    """Return the ratio of the variance of a flight's residual (n, 3) in the last seconds to that of the
-    fitted noise, (n,): of single samples, or of sums of several if that is larger.
+    """Return the ratio of the variance of a flight's residual e (n, 3) in the last seconds to that of the
+    fitted noise, (n,): of single samples, or of sums of several if that is larger. ok (n,): which samples
+    count.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
@@ -215,9 +224,8 @@ def recent_scale(e: Floats, ok: np.ndarray, R: Floats, rate_hz: float) -> Floats
     ratio = np.zeros(len(g))
     for span_s in _SUM_SPANS_S:
         begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
-        squares = ((sums[end] - sums[begin]) ** 2).sum(axis=1) / (
-            3.0 * np.maximum(counts[end] - counts[begin], 1)
-        )
+        n = np.maximum(counts[end] - counts[begin], 1)
+        squares = ((sums[end] - sums[begin]) ** 2).sum(axis=1) / (3.0 * n)
         total = np.concatenate([[0.0], np.cumsum(squares)])
         start = np.maximum(end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
         ratio = np.maximum(ratio, (total[end] - total[start]) / (end - start))
@@ -226,13 +234,11 @@ def recent_scale(e: Floats, ok: np.ndarray, R: Floats, rate_hz: float) -> Floats
 
 @kernel
 def run_bank(y, F, ok, bank, states, noise, r_min, q):
-    """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and ll
-    (n,): the log likelihood of a sample given all before it, times effective_sample_share.
+    """Posterior probabilities (n, H), mean states (n, N), noise scale r (n,) and ll (n,): the log likelihood
+    of a sample given all before it, times effective_sample_share.
 
-    Shapes: y (n, 3); F (n, G, 3) while healthy; ok (n,) the
-    sample may be used. bank: HypothesisBank, states: StateModel, noise:
-    ResidualNoise (bank.py); r_min (n,): lower bound of the scale of the noise;
-    q (n,): by `quick_scale`.
+    ok (n,): the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise, as in
+    `bank`; r_min (n,): lower bound of the scale of the noise; q (n,).
     """
     n = len(y)
     H = len(bank.transition_share)
@@ -243,6 +249,8 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     P = np.zeros((H, N, N))
     x[:] = states.initial_mean
     P[:] = states.initial_covariance
+    lo = states.initial_mean - states.max_deviation
+    hi = states.initial_mean + states.max_deviation
     post = np.zeros((n, H))
     means = np.zeros((n, N))
     scales = np.zeros(n)
@@ -251,15 +259,12 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     for k in range(n):
         prior = _mix(p, x, P, bank, states.random_walk_variance)
         _relax(x, P, states)
-        x[last], P[last] = (
-            states.initial_mean,
-            states.initial_covariance,
-        )  # while nothing answers, nothing is learnt
+        x[last] = states.initial_mean  # while nothing answers, nothing is learnt
+        P[last] = states.initial_covariance
         if ok[k]:
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
-            _limit_states(
-                x, states.initial_mean - states.max_deviation, states.initial_mean + states.max_deviation
-            )
+            for h in range(H):  # bounded, so that no hypothesis adapts to a fault
+                x[h] = np.minimum(np.maximum(x[h], lo), hi)
             r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
             r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
         else:
@@ -273,10 +278,15 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
 
 @kernel
 def _mix(p, x, P, bank, walk):
-    """Interaction of the hypotheses: each may change to any other. x (H, N) and P
-    (H, N, N) are replaced. Returns the prior probabilities (H,)."""
+    """Interaction of the hypotheses: each may change to any other. x (H, N) and P (H, N, N) are replaced.
+    Returns the prior probabilities (H,):
+
+        prior_h = (1 - change) p_h + change share_h,    m, M: mean and covariance of the mixture of all
+    """
     H, N = x.shape
-    stay = 1.0 - bank.change_probability_per_sample
+    change = bank.change_probability_per_sample
+    share = bank.transition_share
+    stay = 1.0 - change
     m = np.zeros(N)
     M = np.zeros((N, N))
     for h in range(H):
@@ -288,7 +298,7 @@ def _mix(p, x, P, bank, walk):
     prior = np.empty(H)
     total = 0.0
     for h in range(H):
-        prior[h] = stay * p[h] + bank.change_probability_per_sample * bank.transition_share[h]
+        prior[h] = stay * p[h] + change * share[h]
         total += prior[h]
         _merge(stay * p[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
     return prior / total
@@ -296,17 +306,18 @@ def _mix(p, x, P, bank, walk):
 
 @kernel
 def _merge(w, x, P, m, M, offset, walk):
-    """Replace two Gaussians by one with the same moments: that of the hypothesis, with weight `w`,
-    and the mixture of all hypotheses, with the rest of the weight.
+    """Replace two Gaussians by one with the same moments: (x, P) of the hypothesis, with weight w, and (m, M)
+    of the mixture of all hypotheses, with weight v = 1 - w:
 
-    x (N,) and P (N, N) are replaced. The mixture gets the variance of the offset of
-    the rates, offset (3,), that comes with a change to this hypothesis.
+        x <- w x + v m,    P <- w P + v (M + offset) + w v (x - m)(x - m)' + walk
+
+    x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
+    change to this hypothesis; walk (N,): variance added a sample.
     """
     v, N = 1.0 - w, len(x)
     for i in range(N):
         for j in range(N):
-            d = (x[i] - m[i]) * (x[j] - m[j])
-            P[i, j] = w * P[i, j] + v * M[i, j] + w * v * d
+            P[i, j] = w * P[i, j] + v * M[i, j] + w * v * ((x[i] - m[i]) * (x[j] - m[j]))
         P[i, i] += walk[i]
     for i in range(N):
         x[i] = w * x[i] + v * m[i]
@@ -316,40 +327,40 @@ def _merge(w, x, P, m, M, offset, walk):
 
 @kernel
 def _relax(x, P, states):
-    """Move all trims and gains towards those of the model, by one sample. x (H, N) and
-    P (H, N, N) are replaced."""
+    """Move all trims and gains towards those m of the model, by one sample, with the retention a (N,):
+
+    x <- m + a (x - m),    P_ij <- a_i a_j P_ij,    x (H, N) and P (H, N, N) are replaced
+    """
+    m = states.initial_mean
+    a = states.deviation_retention
     for h in range(len(x)):
-        for i in range(len(states.deviation_retention)):
-            x[h, i] = states.initial_mean[i] + states.deviation_retention[i] * (
-                x[h, i] - states.initial_mean[i]
-            )
-            for j in range(len(states.deviation_retention)):
-                P[h, i, j] *= states.deviation_retention[i] * states.deviation_retention[j]
+        for i in range(len(a)):
+            x[h, i] = m[i] + a[i] * (x[h, i] - m[i])
+            for j in range(len(a)):
+                P[h, i, j] *= a[i] * a[j]
 
 
 @kernel
 def _correct(prior, x, P, y, F, bank, noise, r):
-    """Kalman correction of every hypothesis by one sample; x and P are replaced.
+    """Kalman correction of every hypothesis by one sample y (3,), F (G, 3); x and P are replaced. The last
+    hypothesis has no states: nothing answers.
 
-    Returns the posterior probabilities (H,), the clipped squared residual averaged over them (in the
+        ll_h = -((nu + 3) / 2) log(1 + d2_h / nu) - log(det S_h) / 2,      p_h ~ prior_h exp(ll_h)
+
+    r: scale of the noise. Returns the posterior probabilities (H,), the clipped d2 averaged over them (in the
     covariance without its inflation), and the log likelihood of the sample.
     """
     H, N = x.shape
     ll = np.empty(H)
     d2 = np.empty(H)
-    x0, P0 = np.zeros(N), np.zeros((N, N))
+    none = np.zeros((N, 3))
     R = noise.covariance * r
     nu = noise.t_degrees_of_freedom
     for h in range(H):
         C = _sensitivities(bank.effectiveness[h], bank.own_gain_share[h], F, noise.intercept_rad_s, N)
-        if h == H - 1:
-            d2[h], log_det = _update(x0, P0, y, C, R, noise)
-        else:
-            d2[h], log_det = _update(x[h], P[h], y, C, R, noise)
-        clipped = min(d2[h], noise.max_squared_residual)
-        ll[h] = noise.effective_sample_share * (
-            -0.5 * (nu + 3.0) * np.log(1.0 + clipped / nu) - 0.5 * log_det
-        )
+        d2[h], log_det = _update(x[h], P[h], y, none if h == H - 1 else C, R, noise)
+        log_t = -0.5 * (nu + 3.0) * np.log(1.0 + min(d2[h], noise.max_squared_residual) / nu)
+        ll[h] = noise.effective_sample_share * (log_t - 0.5 * log_det)
     top = ll.max()
     p = np.maximum(prior * np.exp(ll - top), _MIN_PROBABILITY)
     total = p.sum()
@@ -357,14 +368,13 @@ def _correct(prior, x, P, y, F, bank, noise, r):
     mean = 0.0
     for h in range(H):
         mean += p[h] * min(noise.covariance_inflation * d2[h], 3.0 * _SQUARE_CLIP)
-    return (p, mean, top + np.log(total))
+    return p, mean, top + np.log(total)
 
 
 @kernel
 def _sensitivities(a, k, F, b, N):
-    """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
-    multiplies the intercept and all F (G, 3) times a (G,); and to each group's own
-    gain, which multiplies the share k (G,) of its response."""
+    """What the states do to the unexplained rates, C (N, 3): the trim; the common gain, which multiplies
+    b + sum_g a_g F_g; each group's own gain, which multiplies k_g F_g. a, k (G,); F (G, 3); b (3,)."""
     C = np.zeros((N, 3))
     C[:3] = np.eye(3)
     C[3] = b
@@ -375,20 +385,13 @@ def _sensitivities(a, k, F, b, N):
 
 
 @kernel
-def _limit_states(x, lo, hi):
-    """Limit trim and gains of every hypothesis, so that they do not adapt to a fault."""
-    for h in range(len(x)):
-        x[h] = np.minimum(np.maximum(x[h], lo), hi)
-
-
-@kernel
 def _update(x, P, y, C, R, noise):
-    """Correct one Gaussian (x (N,), P (N, N), replaced) by
-    y (3,) = C' x + noise, with
-    C (N, 3).
+    """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance R; both are replaced:
 
-    Returns the squared residual, normalised by its covariance, and the log det of that covariance.
-    The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
+        e = y - C' x,   D = P C,   S = R + C' D,   K = D S^-1,   x <- x + K e,   P <- P - K D'
+
+    Returns d2 and log(det S). K is reduced for a residual in the tail of the t distribution, and 0 above
+    max_squared_residual.
     """
     N, nu = len(x), noise.t_degrees_of_freedom
     D = np.zeros((N, 3))
@@ -424,7 +427,7 @@ def _update(x, P, y, C, R, noise):
 
 @kernel
 def _invert(S):
-    """Inverse and det of a symmetric (3, 3) matrix, by its cofactors."""
+    """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
     A = np.empty((3, 3))
     for i in range(3):
         for j in range(3):

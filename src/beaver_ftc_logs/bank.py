@@ -9,6 +9,9 @@ that the filter does not adapt to a fault that is there from the start. The trim
 rigging would change it (a shift of each group's command), and it drifts. Gains return to those of the model
 in time, since the airspeed varies about that of the fitted flights. If the standard error of a group's gain
 is larger than a step between levels, the excess is added to the variance of its own gain.
+
+Letters as in `filtering`: g a group of n, B (n, L, 3) its response and R (3, 3) the covariance of the noise,
+rad/s and (rad/s)2 a sample; ma the moving average by which a flight is whitened, empty if it is not.
 """
 
 from collections.abc import Sequence
@@ -32,9 +35,8 @@ _MAX_SQUARE = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
 
-HypothesisRow = tuple[
-    Floats, int, float, Floats
-]  # effectiveness of each group, kind, transition share, variance of the rate offset
+HypothesisRow = tuple[Floats, int, float, Floats]
+"""Effectiveness of each group, kind, transition share, variance of the rate offset."""
 
 
 class HypothesisBank(NamedTuple):
@@ -43,9 +45,9 @@ class HypothesisBank(NamedTuple):
     effectiveness (H, G). hypothesis_kind (H,). transition_share (H,): share of all changes of hypothesis that
     lead to this one. rate_offset_variance (H, 3): variance of the offset of the rates that comes with it,
     (rad/s)2. prior_probability (H,): probability before the flight. change_probability_per_sample:
-    probability that the hypothesis changes within a sample. own_gain_share (H, G): share
-    of a group's healthy response that the group's own gain multiplies: the effectiveness, or 1 where the
-    response of a control law to noise adds to the effect of a surface.
+    probability that the hypothesis changes within a sample. own_gain_share (H, G): share of a group's healthy
+    response that the group's own gain multiplies: the effectiveness, or 1 where the response of a control law
+    to noise adds to the effect of a surface.
     """
 
     effectiveness: Floats
@@ -73,7 +75,8 @@ class HypothesisBank(NamedTuple):
 
 def build_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model. A group whose effect is unknown has none, unless all effects are unknown."""
-    n, settings = len(model.groups), model.settings
+    settings = model.settings
+    n = len(model.groups)
     known = known_effects(model)
     groups = [g for g in range(n) if known[g] or not any(known)]
     rows: list[HypothesisRow] = [(np.ones(n), HEALTHY, settings.repair_share, np.zeros(3))]
@@ -132,19 +135,13 @@ def _offset_variances(model: Model, g: int) -> list[Floats]:
 def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
     pairs = list(product(combinations(groups, 2), product(_PAIR_LEVELS, repeat=2)))
-    return [
-        (
-            _effect_row(n, dict(zip(pair, levels, strict=True))),
-            PAIR_LOSS,
-            _PAIR_SHARE / len(pairs),
-            np.zeros(3),
-        )
-        for pair, levels in pairs
-    ]
+    rows = [_effect_row(n, dict(zip(pair, levels, strict=True))) for pair, levels in pairs]
+    return [(row, PAIR_LOSS, _PAIR_SHARE / len(pairs), np.zeros(3)) for row in rows]
 
 
 def _prior_probabilities(kind: np.ndarray, share: Floats) -> Floats:
-    """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
+    """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed. share (H,):
+    of all changes of hypothesis."""
     fault = (kind != HEALTHY) & (kind != NO_RESPONSE)
     p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[fault].sum()
     p[0] = _PRIOR_HEALTHY
@@ -169,9 +166,10 @@ class StateModel(NamedTuple):
 
 
 def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
-    """The prior and the limits of trim and gains, from a model's settings. ma: as in
-    `build_noise`."""
-    settings, n = model.settings, len(model.groups)
+    """The prior and the limits of trim and gains, from a model's settings: mean x (N,), covariance P (N, N),
+    retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
+    settings = model.settings
+    n = len(model.groups)
     _, _, B, R = model.intercept_past_response_noise()
     r = np.diag(R)
     shift = B.sum(axis=1) * settings.trim_command_shift_sd
@@ -222,14 +220,16 @@ class ResidualNoise(NamedTuple):
 
 
 def build_noise(model: Model, ma: Sequence[float] = ()) -> ResidualNoise:
-    """The noise of a flight, from a model's settings. ma: the moving average by which the
-    flight is whitened, empty if it is not."""
+    """The noise of a flight, from a model's settings."""
     settings = model.settings
-    most = _MAX_SQUARE if len(model.residual_ar_coefficients(ma)) else np.inf
-    memory = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(
-        model.whitened_intercept(ma), model.intercept_past_response_noise()[3],
-        settings.effective_sample_share, settings.t_degrees_of_freedom, memory,
-        _MIN_NOISE_SCALE, _MAX_NOISE_SCALE, most,
-        model.inflation_of(ma),
-    )  # fmt: skip
+        intercept_rad_s=model.whitened_intercept(ma),
+        covariance=model.intercept_past_response_noise()[3],
+        effective_sample_share=settings.effective_sample_share,
+        t_degrees_of_freedom=settings.t_degrees_of_freedom,
+        scale_memory_samples=settings.noise_scale_memory_s * model.rate_hz,
+        min_variance_scale=_MIN_NOISE_SCALE,
+        max_variance_scale=_MAX_NOISE_SCALE,
+        max_squared_residual=_MAX_SQUARE if len(model.residual_ar_coefficients(ma)) else np.inf,
+        covariance_inflation=model.inflation_of(ma),
+    )

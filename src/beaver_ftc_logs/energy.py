@@ -18,7 +18,8 @@ _WINDOW_S, _NAMING_DELAY_S = 5.0, 3.0
 
 
 def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Floats:
-    """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
+    """Rate of the energy height E = h + V^2 / 2g over the last seconds, m/s, (n,); nan before they have
+    passed. Time t, s, altitude h, m, airspeed V, m/s, and number of the gap-free stretch, (n,) each."""
     E = h + V**2 / (2.0 * GRAVITY_MPS2)
     i = np.searchsorted(t, t - _WINDOW_S, side="right") - 1
     whole = (i >= 0) & (stretch[np.maximum(i, 0)] == stretch)
@@ -31,7 +32,8 @@ def withdraw_surfaces(
     t: Floats, faulty: np.ndarray, names: np.ndarray, climb: Floats, unpowered: float, start: Floats
 ) -> np.ndarray:
     """The isolated names (n,), with `unknown` or `engine` in the rows in which an engine may have failed.
-    start (n,): time at which the evidence for the alarm of each row began to increase.
+    t (n,): time, s. climb (n,): rate of the energy height, m/s; unpowered: that without power. start (n,):
+    time at which the evidence for the alarm of each row began to increase, s.
 
     An engine may have failed while the window of the energy height begins before that time, and from the
     row in which the energy height falls as without power until it rises. A row uses nothing later than its

@@ -4,7 +4,13 @@ The statistic is Page's sum of evidence for a fault [Page1954]. It restarts when
 highest values between two restarts (the peaks) are independent of one another. The peaks over a level u are a
 Poisson process, and their excess over u has the generalised Pareto distribution [Coles2001, section 4.2]:
 
-    rate of x and more, an hour = rate(u) (1 + xi (x - u) / sigma)^(-1 / xi)
+    rate of x and more, an hour = rate(u) (1 + xi z / sigma)^(-1 / xi),      z = x - u
+
+    u, z            level of the tail, and excess of a peak over it, natural logarithms of odds
+    xi, sigma, p    shape and scale of the Pareto distribution, and their posterior probability, of each point
+                    of a grid (g,)
+    rate            false alarms an hour
+    flights         peaks and healthy hours of each held-out flight
 
 The posterior of shape, scale and rate is computed on a grid. The threshold for a requested rate is the x at
 which the posterior mean of the rate is that rate. If the model is right, a log likelihood ratio has an
@@ -33,9 +39,8 @@ _MORE_ALARMS_CHANCE = 0.05
 RULED_OUT_COUNT = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
 _MAX_EXCESS = 1e4
-_PROBABILITY_ROUNDING = (
-    1e-9  # of a sum of probabilities: a quantile between two rates must not hang on its last digits
-)
+_PROBABILITY_ROUNDING = 1e-9
+"""Of a sum of probabilities: a quantile between two rates must not hang on its last digits."""
 
 PeaksAndHours = tuple[Floats, float]
 """Peaks (k,) of the alarm statistic in one held-out flight, and its healthy hours."""
@@ -64,7 +69,7 @@ class FalseAlarmRate:
 
 
 def peaks_between_zeros(s: Floats) -> Floats:
-    """The highest value of each stretch above zero, (k,)."""
+    """The highest value of each stretch of a statistic s (n,) above zero, (k,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], s > 0.0, [0]]).astype(np.int8)))
     return np.array([s[begin:end].max() for begin, end in zip(edges[::2], edges[1::2], strict=True)])
 
@@ -89,12 +94,10 @@ def _overdispersion(flights: Sequence[PeaksAndHours]) -> float:
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
     sums = np.array([z.sum() for z, _ in flights])
     hours = np.array([h for _, h in flights])
-    n = sum(len(z) for z, _ in flights)
-    share = hours / hours.sum()
     if len(flights) < 2 or sums.sum() <= 0.0:
         return 1.0
-    expected = share * sums.sum()
-    mean = sums.sum() / n
+    expected = hours / hours.sum() * sums.sum()
+    mean = sums.sum() / sum(len(z) for z, _ in flights)
     squares = (sums - expected) ** 2 / np.maximum(2.0 * expected * mean, MIN_DIVISOR)
     return max(float(squares.sum()) / (len(flights) - 1), 1.0)
 
@@ -102,9 +105,7 @@ def _overdispersion(flights: Sequence[PeaksAndHours]) -> float:
 def false_alarm_rate(tail: PeakTail, threshold: float) -> FalseAlarmRate:
     """False alarms an hour at a threshold not below the tail's level."""
     xi, sigma, p = _pareto_posterior(tail)
-    rates = (
-        _exceedance(threshold - tail.tail_start_level, xi, sigma)[:, None] * _rate_quantiles(tail)[None, :]
-    ).ravel()
+    rates = np.outer(_exceedance(threshold - tail.tail_start_level, xi, sigma), _rate_quantiles(tail)).ravel()
     order = np.argsort(rates)
     weights = np.repeat(p, len(_RATE_QUANTILES)) / len(_RATE_QUANTILES)
     index = np.searchsorted(np.cumsum(weights[order]), np.array(_INTERVAL) - _PROBABILITY_ROUNDING)
@@ -151,7 +152,7 @@ def _excess_for_rate(tail: PeakTail, rate: float) -> float:
 def lorden_threshold(rate_hz: float, rate: float) -> float:
     """The threshold at which the rate of false alarms is at most this, if the model is right, whatever the
     tail: Page's sum of a log likelihood ratio passes h on average at most once in exp(h) samples
-    [Lorden1971]."""
+    [Lorden1971]. rate_hz: samples a second."""
     return float(np.log(max(3600.0 * rate_hz / rate, 1.0)))
 
 
@@ -169,7 +170,7 @@ def _rate_quantiles(tail: PeakTail) -> Floats:
 
 
 def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
-    """Shape, scale and posterior weight of each point of the grid."""
+    """xi, sigma and p of each point of the grid."""
     from scipy.stats import genpareto
 
     z = np.array(tail.excess_over_level)
@@ -182,7 +183,7 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
 
 
 def _exceedance(z: float, xi: Floats, sigma: Floats) -> Floats:
-    """Probability that a peak over the level exceeds it by more than `excess`."""
+    """Probability that a peak over the level exceeds it by more than z, (g,)."""
     from scipy.stats import genpareto
 
     return np.asarray(genpareto.sf(z, xi, scale=sigma))

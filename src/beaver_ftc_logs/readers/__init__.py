@@ -64,11 +64,7 @@ def read_flight(
     columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
     why the log cannot be used.
     """
-    return next(
-        _read_with_reader(
-            path, reader, time, {"columns": columns, "rows_per_part": None}
-        )
-    )
+    return next(_read_with_reader(path, reader, time, {"columns": columns, "part_rows": None}))
 
 
 def read_parts(
@@ -78,9 +74,7 @@ def read_parts(
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read_with_reader(
-        path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART}
-    )
+    return _read_with_reader(path, reader, time, {"columns": columns, "part_rows": ROWS_PER_PART})
 
 
 def _read_with_reader(
@@ -97,15 +91,9 @@ def _read_with_reader(
     if reader == "table":
         yield from module.read_parts(path, *(time or ()), **options)
         return
-    if (
-        time is not None
-        and time != _TIME_COLUMN_AND_UNIT_BY_READER[reader]
-    ):
+    if time is not None and time != _TIME_COLUMN_AND_UNIT_BY_READER[reader]:
         column, unit = _TIME_COLUMN_AND_UNIT_BY_READER[reader]
-        raise BadInput(
-            f"{path}: time: {' in '.join(time)} is not its time, "
-            f"allowed: {column} in {unit}"
-        )
+        raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
     yield (
         module.read(path, options["columns"])
         if reader in NAMES_OF_READERS_OF_WANTED_COLUMNS
@@ -113,9 +101,7 @@ def _read_with_reader(
     )
 
 
-def split_long_recording(
-    log: RecordedFlight, stamps: Floats, ratio: float
-) -> Iterator[RecordedFlight]:
+def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> Iterator[RecordedFlight]:
     """A log in parts as those of a long table: numbered, each begins with the end of the one before.
 
     stamps: of the rows that are counted, increasing, of which so many are one sample later. A column of

@@ -6,6 +6,15 @@ is said: no name, and bounds of 0 and 1. The size of the residual does not count
 too: where it is larger than in the flights of the model, the filter takes the noise to be as much larger, and
 a sample counts for less. A log is refused only where a mistake in its columns explains it.
 A row uses nothing later than its time.
+
+    flights, used   each flight, and its samples that were used
+    y, F            unexplained rates (n, 3), rad/s, and responses (n, G, 3), as in `regression`
+    Z, v            regressors (3 n, 3 + G) of trim and responses, and what they explain, whitened (3 n,)
+    W, share        whitening matrix (3, 3), and as how many white samples one counts
+    lo, hi          least and largest gain of a group, 1 in the model
+    ll              log likelihood of a sample
+    known           which groups have an effect that is known (G,)
+    reasons         rows that are not credible, by reason
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +27,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
-from beaver_ftc_logs.column_mistakes import log_without_signal, logs_with_one_mistake_corrected
+from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
@@ -53,8 +62,7 @@ _REVERSED_GAIN_LIMIT = -0.5
 def compute_fitted_ranges(
     flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats
 ) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. flights: each flight, and its samples
-    used; gain_sd (G,): of parts not fitted."""
+    """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
     rates = np.vstack([samples.rates[used] for samples, used in flights])
     commands = np.vstack([samples.commands[used] for samples, used in flights])
     airspeeds = [samples.airspeed[used] for samples, used in flights if samples.airspeed is not None]
@@ -72,12 +80,8 @@ def compute_fitted_ranges(
 
 def _unpowered_climb(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
-    known = [
-        flight.energy_height_rate_mps[used]
-        for flight, used in flights
-        if flight.energy_height_rate_mps is not None
-    ]
-    climb = np.concatenate(known) if known else np.empty(0)
+    pairs = [(flight.energy_height_rate_mps, used) for flight, used in flights]
+    climb = np.concatenate([np.empty(0), *(rate[used] for rate, used in pairs if rate is not None)])
     climb = climb[np.isfinite(climb)]
     return float(np.quantile(climb, energy.UNPOWERED_SHARE)) if climb.size else None
 
@@ -91,17 +95,11 @@ def central_ranges(values: Floats) -> list[list[float]]:
 
 
 def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
-    names = dict.fromkeys(name for samples, _ in flights for name in samples.unchanged_s)
-    return {
-        name: max(
-            (
-                float(flight.unchanged_s[name].max(initial=0.0))
-                for flight, _ in flights
-                if name in flight.unchanged_s
-            )
-        )
-        for name in names
-    }
+    longest: dict[str, float] = {}
+    for flight, _ in flights:
+        for name, still_s in flight.unchanged_s.items():
+            longest[name] = max(longest.get(name, 0.0), float(still_s.max(initial=0.0)))
+    return longest
 
 
 def tied_shares(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
@@ -121,17 +119,18 @@ def untied_power(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Float
 
 
 def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tuple[Floats, Floats]:
-    """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
-    signals and the other groups do not make up of it, (G,)."""
+    """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
+    of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
     groups = regression.group_indices(model)
-    counts = (model.n_rate_lags, model.n_command_lags, True, model.vehicle.n_signal_lags(model.n_rate_lags))
-    built = [regression.build_regressors(flight, groups, *counts) for flight, _ in flights]
-    rows = [used & ok for (_, used), (_, _, ok) in zip(flights, built, strict=True)]
-    X = np.vstack([one[0][row] for one, row in zip(built, rows, strict=True)])
-    U = np.vstack([one[1][row] for one, row in zip(built, rows, strict=True)])
+    h, L = model.n_rate_lags, model.n_command_lags
+    past, commands = [], []
+    for flight, used in flights:
+        X, U, ok = regression.build_regressors(flight, groups, h, L, True, model.vehicle.n_signal_lags(h))
+        past.append(X[used & ok])
+        commands.append(U[used & ok])
+    X, U = np.vstack(past), np.vstack(commands)
     B = np.array(model.command_response)
-    R = np.array(model.residual_covariance)
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
+    W = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))).T
     power = np.zeros(len(groups))
     rest = np.zeros(len(groups))
     for g in range(len(groups)):
@@ -158,10 +157,8 @@ def known_gains(model: Model) -> list[bool]:
     known = known_effects(model)
     if model.fitted_ranges is None or not model.fitted_ranges.group_gain_sd or not model.vehicle.other_laws:
         return known
-    return [
-        effect and regression.BOUND_MARGIN * sd < 1.0
-        for effect, sd in zip(known, model.fitted_ranges.group_gain_sd, strict=True)
-    ]
+    pairs = zip(known, model.fitted_ranges.group_gain_sd, strict=True)
+    return [effect and regression.BOUND_MARGIN * sd < 1.0 for effect, sd in pairs]
 
 
 def unknown_surfaces(model: Model) -> set[str]:
@@ -175,11 +172,10 @@ def unknown_sentences(model: Model) -> list[str]:
     if model.fitted_ranges is None:
         return []
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
+    rows = zip(model.groups, model.fitted_ranges.tied_shares, known_effects(model), strict=False)
     return [
         f"{start.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
-        for group, share, known in zip(
-            model.groups, model.fitted_ranges.tied_shares, known_effects(model), strict=False
-        )
+        for group, share, known in rows
         if not known
     ]
 
@@ -193,21 +189,18 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         return
     ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.rate_sd_rad_s, MIN_DIVISOR)
     ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
+    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
+        return
+    most = _UNIT_FACTOR_ROOT**2
     for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        alike = ratios.max() < _MAX_AXIS_RATIO * ratios.min()
-        if alike and 1.0 / _UNIT_FACTOR_ROOT**2 < ratio / per_rad < _UNIT_FACTOR_ROOT**2:
-            raise BadInput(
-                f"{samples.name}: rates spread {ratio:.3g} times as widely as in the "
-                "flights of the model, "
-                f"allowed: rates in rad/s; a factor of {1.0 / per_rad:.4g} (`unit: {unit}`) fits"
-            )
-        if alike and 1.0 / _UNIT_FACTOR_ROOT**2 < ratio * per_rad < _UNIT_FACTOR_ROOT**2:
-            raise BadInput(
-                f"{samples.name}: rates spread {ratio:.3g} times as widely as in the "
-                "flights of the model, "
-                f"allowed: rates in rad/s; a factor of {per_rad:.4g} fits: the model's "
-                f"own were in {unit}?"
-            )
+        fits = None
+        if 1.0 / most < ratio / per_rad < most:
+            fits = f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"
+        elif 1.0 / most < ratio * per_rad < most:
+            fits = f"{per_rad:.4g} fits: the model's own were in {unit}?"
+        if fits:
+            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {fits}")
 
 
 def refuse_command_unit(
@@ -225,11 +218,8 @@ def refuse_command_unit(
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
-                f"{name}: the command of {surface} moves {ratio:.3g} times as much as "
-                "in the other flights, "
-                f"the rates {rate_ratios.max():.2g} times at most, allowed: one unit "
-                "(57.3 is deg for rad, 100 "
-                "percent: `unit`, `scale`)"
+                f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
+                f"the rates {rate_ratios.max():.2g} times at most, allowed{_COMMAND_UNIT_HINT}"
             )
 
 
@@ -275,13 +265,11 @@ def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model] |
     """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
     noise alone; None where a part of the flight is too short."""
     pairs = [
-        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise_model(noise))
+        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
         for noise in model.noise_models
     ]
     known = [(pair, found) for pair in pairs or [(samples, model)] if (found := _likelihoods_and_size(*pair))]
-    if not known:
-        return None
-    return max(known, key=lambda one: one[1][0].mean())[0]
+    return max(known, key=lambda one: one[1][0].mean())[0] if known else None
 
 
 def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
@@ -292,31 +280,27 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     ok, y, F = regression.whitened_rates(*pair)
     Z, v = _gain_data(np.flatnonzero(ok), y, F, _whitening(*pair)[0])
     gains = np.linalg.lstsq(Z, v, rcond=None)[0][3:]
-    return [
-        group
-        for group, gain, known in zip(model.groups, gains, known_effects(model), strict=True)
-        if known and gain < _REVERSED_GAIN_LIMIT
-    ]
+    rows = zip(model.groups, gains, known_effects(model), strict=True)
+    return [group for group, gain, known in rows if known and gain < _REVERSED_GAIN_LIMIT]
 
 
 def _mistake_texts(samples: Samples, model: Model, bounds: _GainBounds) -> dict[str, str]:
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
-    mistakes, known = {}, known_gains(model)
+    mistakes = {}
+    known = known_gains(model)
     for group, sure, hi, lo in zip(model.groups, known, bounds.upper_gains, bounds.lower_gains, strict=True):
         name = "+".join(group)
         motion = _relative_motion(samples, model, group)
         command = f"the command of {name}"
-        moves = f"moves {motion:.3g} times as much as in the flights of the"
+        moves = f"{command} moves {motion:.3g} times as much as in the flights of the model, and does"
         if hi < MAX_REVERSED_GAIN:
             text = f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
             mistakes[f"sign {name}"] = text
         elif sure and hi < _MIN_COMMAND_GAIN and motion > _MAX_ALIKE_FACTOR:
-            effect = f"does at most {hi:.2g} of what it did"
-            mistakes[f"unit {name}"] = f"{command} {moves} model, and {effect}{_COMMAND_UNIT_HINT}"
+            mistakes[f"unit {name}"] = f"{moves} at most {hi:.2g} of what it did{_COMMAND_UNIT_HINT}"
         elif sure and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / _MAX_ALIKE_FACTOR:
-            effect = f"does at least {lo:.3g} times what it did"
-            mistakes[f"unit {name}"] = f"{command} {moves} model, and {effect}{_COMMAND_UNIT_HINT}"
+            mistakes[f"unit {name}"] = f"{moves} at least {lo:.3g} times what it did{_COMMAND_UNIT_HINT}"
     return mistakes
 
 
@@ -324,10 +308,9 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
     """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
-    inequality for a likelihood ratio); all readings together have the chance
-    `_FALSE_MISTAKE_CHANCE`. That holds for a correct model. The flight must be likelier by as much
-    more as flights were that the model was not fitted on, whose columns are right, and by as much again for
-    another law (`FittedRanges.misread`).
+    inequality for a likelihood ratio); all readings together have the chance `_FALSE_MISTAKE_CHANCE`. That
+    holds for a correct model. The flight must be likelier by as much more as flights were that the model was
+    not fitted on, whose columns are right, and by as much again for another law (`misread_gain`).
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
@@ -354,15 +337,14 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     logged, n = found
     without = {
         signal: _likelihoods(log_without_signal(samples, model.vehicle, signal), model)
-        for signal in model.vehicle.signal_column_names
+        for signal in model.vehicle.signal_columns
     }
     gains = {}
-    for log in logs_with_one_mistake_corrected(samples, model.vehicle, unknown_surfaces(model)):
+    for log in corrected_logs(samples, model.vehicle, unknown_surfaces(model)):
         ll = _likelihoods(log.samples, model) + log.log_jacobian
         gain = float((ll - logged).min())
         if signal := log.scaled_signal:
-            over = ll - without[signal]
-            gain = min(gain, float(over.sum()))
+            gain = min(gain, float((ll - without[signal]).sum()))
         gains[log.correction_text] = gain
     return gains, n
 
@@ -374,9 +356,8 @@ def _likelihoods(samples: Samples, model: Model) -> Floats:
 
 
 def _likelihoods_and_size(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """Log likelihood of a sample of each part of the flight, as in `_GainBounds`, and the effective
-    number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
-    short."""
+    """Log likelihood of a sample of each part of the flight, as in `_GainBounds`, and the effective number of
+    white samples of a part; of a long flight every k-th sample is taken. None where a part is too short."""
     W, share, log_sd = _whitening(samples, model)
     ok, y, F = regression.whitened_rates(samples, model)
     rows = np.flatnonzero(ok)
@@ -390,16 +371,15 @@ def _likelihoods_and_size(samples: Samples, model: Model) -> tuple[Floats, float
 def _whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
     """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    inflation = model.inflation_of(samples.noise_ma_coefficients)
-    root = np.linalg.cholesky(
-        model.with_noise_of(samples.noise_ma_coefficients).intercept_past_response_noise()[3] / inflation
-    )
-    log_sd = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(samples.noise_ma_coefficients or (1.0,))))
-    return (np.linalg.inv(root).T, model.settings.effective_sample_share / inflation, log_sd)
+    ma = samples.noise_ma_coefficients
+    inflation = model.inflation_of(ma)
+    root = np.linalg.cholesky(model.with_noise_of(ma).as_arrays()[3] / inflation)
+    log_sd = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(ma or (1.0,))))
+    return np.linalg.inv(root).T, model.settings.effective_sample_share / inflation, log_sd
 
 
 def _gain_data(rows: NDArray[np.int64], y: Floats, F: Floats, W: Floats) -> tuple[Floats, Floats]:
-    """Regressors (3 n, 3 + K) of trim and F (n, K, 3), and what they are to explain, (3 n,)."""
+    """Z (3 n, 3 + G) of trim and responses F, and v (3 n,) of y, at these rows."""
     trim = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
     Z = np.concatenate([trim, F[rows]], axis=1) @ W
     return Z.transpose(0, 2, 1).reshape(3 * len(rows), -1), (y[rows] @ W).ravel()
@@ -411,13 +391,13 @@ def residual_scale(e2: Floats) -> float:
 
 
 def _bound_gains(samples: Samples, model: Model) -> _GainBounds | None:
-    """None where a part is too short."""
+    """The answers to each group's command in all parts of a flight; None where a part is too short."""
     ok, y, F = regression.whitened_rates(samples, model)
     if (parts := regression.split_parts(np.flatnonzero(ok))) is None:
         return None
-    (W, share, log_sd), n = (_whitening(samples, model), len(model.groups))
-    hi = np.full(n, -np.inf)
-    lo = np.full(n, np.inf)
+    W, share, log_sd = _whitening(samples, model)
+    hi = np.full(len(model.groups), -np.inf)
+    lo = np.full(len(model.groups), np.inf)
     scales = []
     for rows in parts:
         Z, v = _gain_data(rows, y, F, W)
@@ -434,9 +414,8 @@ def _relative_motion(samples: Samples, model: Model, group: list[str]) -> float:
     not known."""
     if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
         return 0.0
-    ratios = _spans(central_ranges(samples.commands)) / np.maximum(
-        _spans(model.fitted_ranges.command_ranges), MIN_DIVISOR
-    )
+    fitted = np.maximum(_spans(model.fitted_ranges.command_ranges), MIN_DIVISOR)
+    ratios = _spans(central_ranges(samples.commands)) / fitted
     return max(float(ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
 
@@ -450,12 +429,11 @@ def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     for name, limit_s in _max_still_s(samples, model).items():
         reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = samples.unchanged_s[name] > limit_s
     if samples.is_rate_clipped is not None:
-        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = _clipped_recently(
-            samples.is_rate_clipped, samples.dt_s
-        )
-    if model.fitted_ranges is None:
-        return _drop_empty_reasons(reasons)
-    return _drop_empty_reasons(reasons | _rows_out_of_range(samples, model, model.fitted_ranges))
+        clipped = _clipped_recently(samples.is_rate_clipped, samples.dt_s)
+        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = clipped
+    if model.fitted_ranges is not None:
+        reasons |= _rows_out_of_range(samples, model, model.fitted_ranges)
+    return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
 def _clipped_recently(clipped: Mask, dt_s: float) -> Mask:
@@ -463,10 +441,6 @@ def _clipped_recently(clipped: Mask, dt_s: float) -> Mask:
     k = np.arange(len(clipped))
     since = k - np.maximum.accumulate(np.where(clipped, k, -len(clipped) - round(_CLIPPING_MEMORY_S / dt_s)))
     return np.asarray(since * dt_s <= _CLIPPING_MEMORY_S)
-
-
-def _drop_empty_reasons(reasons: dict[str, Mask]) -> dict[str, Mask]:
-    return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
 def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
@@ -478,9 +452,8 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        reasons[_outside_text(name, lo, hi)] = _mostly_recently(
-            ~_in_range(values, lo - margin, hi + margin), samples
-        )
+        outside = ~_in_range(values, lo - margin, hi + margin)
+        reasons[_outside_text(name, lo, hi)] = _mostly_recently(outside, samples)
     if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
         lo, hi = ranges.airspeed_range_mps
         outside = ~_in_range(samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * lo, (1.0 + _AIRSPEED_MARGIN) * hi)
@@ -513,12 +486,13 @@ def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
     fitted = model.fitted_ranges.longest_still_s if model.fitted_ranges else {}
-    still = {name: 0.0 if name in _rate_columns(model) else np.inf for name in samples.unchanged_s} | fitted
-    least = {
-        name: MIN_STILL_S / 3.0 if name in fitted and name in _rate_columns(model) else MIN_STILL_S
-        for name in still
-    }
-    return {name: max(least[name], _MAX_STILL_FACTOR * still[name]) for name in samples.unchanged_s}
+    rates = _rate_columns(model)
+    limits_s = {}
+    for name in samples.unchanged_s:
+        still_s = fitted.get(name, 0.0 if name in rates else np.inf)
+        least_s = MIN_STILL_S / 3.0 if name in fitted and name in rates else MIN_STILL_S
+        limits_s[name] = max(least_s, _MAX_STILL_FACTOR * still_s)
+    return limits_s
 
 
 def dead_rows(samples: Samples, model: Model) -> Mask:
@@ -542,7 +516,5 @@ def credibility_entry(reasons: Mapping[str, Mask], credible: NDArray[np.int64]) 
     their shares."""
     shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}
     ordered = sorted(shares, key=lambda reason: -shares[reason])
-    return {
-        "share": float(credible.mean()) if len(credible) else 0.0,
-        "reasons": [{"says": reason, "share": shares[reason]} for reason in ordered],
-    }
+    entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
+    return {"share": float(credible.mean()) if len(credible) else 0.0, "reasons": entries}

@@ -4,6 +4,17 @@ The fit uses the rows that are known to be healthy. Where labels state the remai
 the faulty rows too, with the commands multiplied by the effectiveness. The Bayesian information criterion
 chooses the number of past samples. Every figure of merit comes from held-out data, which the fit did not use:
 the two halves of a single flight in turn, or each of several flights in turn.
+
+    parts, rest     flights, or halves of one, with the samples that the fit may use; those that are left out
+    fold            model that was fitted without `rest`
+    h, L            past samples of the rates, and of the commands
+    Z, y            regressors (n, m) and rates (n, 3), rad/s
+    e, F, R, W      residual (n, 3), responses (n, G, 3), covariance of the noise (3, 3), whitening matrix, as
+                    in `regression`; after `_standardized`, e and F (n, 3, G, 3) are in standard deviations
+    ma, ar          moving average of the noise; predictor of a residual from those before
+    r               variance of the noise
+    g, S            error of the groups' gains (G,), and their covariance that the filter leaves free (G, G)
+    known           which groups have an effect that is known (G,)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +29,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_bank, build_states
-from beaver_ftc_logs.diagnose import DiagnosisRows, diagnosis_rows_from_posterior
+from beaver_ftc_logs.diagnose import LogRows, rows_of_posterior
 from beaver_ftc_logs.filtering import (
     bank_posterior,
     fault_evidence,
@@ -126,7 +137,8 @@ class FitPart:
 
 def _once(parts: Sequence[FitPart], key: tuple[object, ...], compute: Callable[[], Cached]) -> Cached:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
-    cache, whole = parts[0].result_cache, (*key, *map(id, parts))
+    cache = parts[0].result_cache
+    whole = (*key, *map(id, parts))
     if whole not in cache:
         cache[whole] = (tuple(parts), compute())  # held: an id is of one object while this lives
     return cache[whole][1]  # type: ignore[return-value]
@@ -200,7 +212,8 @@ def choose_order(parts: Sequence[FitPart], vehicle: Vehicle) -> tuple[int, int]:
 def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
-    Every order's Z are among those of the largest: one matrix of products serves all.
+    Every order's regressors are among those of the largest: one matrix of products serves all. With the
+    coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
     rms = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
@@ -220,7 +233,7 @@ def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, 
 def _order_columns(vehicle: Vehicle, h: int, L: int) -> list[int]:
     """Columns of the largest design that an order has."""
     signal = 1 + 3 * max(RATE_LAGS)
-    n = len(vehicle.signal_regressor_names)
+    n = len(vehicle.regressor_columns)
     command = signal + n * vehicle.n_signal_lags(max(RATE_LAGS))
     firsts = [command + g * max(COMMAND_LAGS) for g in range(len(regression.group_surfaces(vehicle)))]
     commands = [first + lag for first in firsts for lag in range(L)]
@@ -236,11 +249,8 @@ def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> reg
 def _fit_order_now(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
-        raise BadInput(
-            f"identify: {len(y)} samples known to be healthy, allowed: at least "
-            f"{10 * Z.shape[1]} to fit "
-            f"{Z.shape[1]} coefficients an axis"
-        )
+        allowed = f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis"
+        raise BadInput(f"identify: {len(y)} samples known to be healthy, allowed: {allowed}")
     still = [axis for axis, sd in zip("pqr", y.std(axis=0), strict=True) if sd < _MIN_RATE_SD]
     if still:
         raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
@@ -259,15 +269,15 @@ def stack_data(
     most = max(RATE_LAGS + COMMAND_LAGS)
     Z, y, stretches = [], [], []
     for i, part in enumerate(parts):
-        samples, f = part.samples, vehicle.n_signal_lags(h)
-        X, U, ok = regression.build_regressors(samples, groups, h, L, True, f)
+        samples = part.samples
+        X, U, ok = regression.build_regressors(samples, groups, h, L, True, vehicle.n_signal_lags(h))
         used = part.is_usable & ok
         used[:most] = False
         n = len(X)
         Z.append(samples.fit_weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
         y.append(samples.fit_weight * samples.rates[used])
         stretches.append(np.cumsum(np.diff(np.flatnonzero(used), prepend=0) > 1) + 1_000_000 * i)
-    return (np.vstack(Z), np.vstack(y), np.concatenate(stretches))
+    return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
 
 def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
@@ -277,7 +287,8 @@ def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) 
 
 def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
     fit = fit_order(parts, vehicle, h, L)
-    names, groups = list(vehicle.surfaces), regression.group_surfaces(vehicle)
+    names = list(vehicle.surfaces)
+    groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
     shape = (len(groups), L, 3)
     model = Model(
@@ -293,7 +304,10 @@ def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> 
         noise=fit.residual_covariance.tolist(),
     )
     model = model.model_copy(update={"noise_models": _fit_noise_models(parts, model)})
-    return _with_hidden_errors(parts, model) if vehicle.other_laws else model
+    if not vehicle.other_laws:
+        return model
+    models = [_with_errors(parts, model, noise) for noise in model.noise_models]
+    return model.model_copy(update={"noise_models": models})
 
 
 def _fit_noise_models(parts: Sequence[FitPart], model: Model) -> list[NoiseModel]:
@@ -305,48 +319,31 @@ def _fit_noise_models(parts: Sequence[FitPart], model: Model) -> list[NoiseModel
     return models
 
 
-def _with_hidden_errors(parts: Sequence[FitPart], model: Model) -> Model:
-    """The model with how far it may misread the groups' effects, by the noise of the flights.
+def _with_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise with how far a model may misread the groups' effects in it, and their usual quickness."""
+    shares, power = hidden_errors(parts, model, noise), usual_quick_power(parts, model, noise)
+    return noise.model_copy(update={"misread_shares": shares, "usual_quick_power": power})
 
-    What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
-    surfaces makes it look like their effect. On an axis with the power q of what is lacking and P of the
-    effect, both in variances of the noise, the effect is then misread by sqrt(q / P) of itself at most; over
-    axes, that least squares weighs by P, by sqrt(sum q P) / sum P. A law that feeds back otherwise shows it.
-    """
-    return model.model_copy(
-        update={
-            "noise_models": [
-                noise.model_copy(
-                    update={
-                        "misread_shares": hidden_errors(parts, model, noise),
-                        "usual_quick_power": usual_quick_power(parts, model, noise),
-                    }
-                )
-                for noise in model.noise_models
-            ]
-        }
-    )
+
+def _parts_in(parts: Sequence[FitPart], noise: NoiseModel) -> list[FitPart]:
+    """The parts that are whitened by this noise."""
+    return [part for part in parts if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients]
 
 
 def usual_quick_power(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> float:
     """The power of the quick part of the responses that the flights of one noise exceed in a tenth of their
     samples, in variances of this noise."""
-    powers = [
-        quick_power(whitened_residual(model, part)[2], np.array(noise.residual_covariance), model.rate_hz)
-        for part in parts
-        if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients
-    ]
+    R = np.array(noise.residual_covariance)
+    responses = [whitened_residual(model, part)[2] for part in _parts_in(parts, noise)]
+    powers = [quick_power(F, R, model.rate_hz) for F in responses]
     return float(np.quantile(np.concatenate(powers), _USUAL_SHARE))
 
 
 def quick_error_share(parts: Sequence[FitPart], model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    squares = [
-        _squared_quick_error(refit(fitted, model), held_out)
-        for fitted, rest in _splits(parts)
-        for held_out in rest
-    ]
+    pairs = [(fitted, held_out) for fitted, rest in _splits(parts) for held_out in rest]
+    squares = [_squared_quick_error(refit(fitted, model), held_out) for fitted, held_out in pairs]
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
@@ -355,12 +352,12 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     """The square of the error of unusually quick responses in a flight left out, as a share of them; None if
     it has too few.
 
-    In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 s), with
-    the variance r of the noise of this flight and the power s of the quick responses.
+    In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
+    with the variance r of the noise of this flight and the power of the quick responses.
     """
     ma = held_out.samples.noise_ma_coefficients
     _, e, F = whitened_residual(fold, held_out)
-    R = fold.covariance_of_noise_model(ma)
+    R = fold.covariance_of_noise(ma)
     power = quick_power(F, R, fold.rate_hz)
     unusual = power > fold.usual_quick_power(ma)
     if unusual.sum() < _MIN_QUICK_SAMPLES:
@@ -374,14 +371,20 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
 
 def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
     """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
-    standard deviation of an error that is anywhere below the largest."""
-    own = [part for part in parts if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients]
+    standard deviation of an error that is anywhere below the largest.
+
+    What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
+    surfaces makes it look like their effect. On an axis with the power q of what is lacking and p of the
+    effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
+    axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
+    """
+    own = _parts_in(parts, noise)
     e = np.vstack([one_step_residual(model, flight)[1] for flight in own])
     powers = [_centred(whitened_residual(model, flight)[2]) ** 2 for flight in own]
     r = np.diag(np.array(noise.residual_covariance))
-    power = np.vstack(powers).mean(axis=0) / r
-    lacking = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
-    most = np.minimum(np.sqrt(power @ lacking) / np.maximum(power.sum(axis=1), MIN_DIVISOR), _GAIN_SD_CAP)
+    p = np.vstack(powers).mean(axis=0) / r
+    q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
+    most = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), _GAIN_SD_CAP)
     return (most / np.sqrt(3.0)).tolist()
 
 
@@ -392,11 +395,9 @@ def _fit_noise_model(ma: list[float], pairs: Sequence[tuple[NDArray[np.int64], F
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
-    Z = np.vstack([
-        np.hstack([run[AR_ORDER - lag : len(run) - lag]
-                   for lag in range(1, AR_ORDER + 1)])
-        for run in runs if len(run) > AR_ORDER
-    ])  # fmt: skip
+    lags = range(1, AR_ORDER + 1)
+    long = [run for run in runs if len(run) > AR_ORDER]
+    Z = np.vstack([np.hstack([run[AR_ORDER - lag : len(run) - lag] for lag in lags]) for run in long])
     y = np.vstack(targets)
     ar = np.linalg.lstsq(Z, y, rcond=None)[0]
     return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((y - Z @ ar).T).tolist())
@@ -410,17 +411,16 @@ def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSe
     if model.vehicle.other_laws and model.noise_models:
         extra |= {"quick_error": quick_error_share(parts, model)}
     labelled = _count_labelled_faults(parts, model)
-    if not labelled.fault_levels_by_group:
+    if not labelled.levels:
         return _unlabelled_settings(parts, model, extra, delays_s)
     # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-    changes = (labelled.n_effectiveness_changes + 1) / labelled.usable_hours
+    changes = (labelled.changes + 1) / labelled.hours
     return FilterSettings(
-        levels=labelled.fault_levels_by_group,
+        levels=labelled.levels,
         changes_per_hour=float(np.sqrt(changes * FilterSettings().effectiveness_changes_per_hour)),
         **(_OTHER_DAYS | extra),
         delays_s=delays_s,
-        repair_share=(labelled.n_repairs + _N_PRIOR_CHANGES / 2)
-        / (labelled.n_effectiveness_changes + _N_PRIOR_CHANGES),
+        repair_share=(labelled.repairs + _N_PRIOR_CHANGES / 2) / (labelled.changes + _N_PRIOR_CHANGES),
         power=_POWER_LABELLED,
     )
 
@@ -429,14 +429,16 @@ class _LabelledFaults(NamedTuple):
     """What the labels of the flights say: levels of effectiveness below 1 seen of each group that is a single
     surface, how often a level changed, how often to 1, and the hours of usable rows."""
 
-    fault_levels_by_group: dict[str, list[float]]
-    n_effectiveness_changes: int
-    n_repairs: int
-    usable_hours: float
+    levels: dict[str, list[float]]
+    changes: int
+    repairs: int
+    hours: float
 
 
 def _count_labelled_faults(parts: Sequence[FitPart], model: Model) -> _LabelledFaults:
-    levels, changes, repairs = dict[str, list[float]](), 0, 0
+    levels = dict[str, list[float]]()
+    changes = 0
+    repairs = 0
     names = list(model.vehicle.surfaces)
     for group in model.groups:
         if len(group) > 1:
@@ -479,10 +481,8 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
             F, e = _standardized(fold, held_out)
             if not len(e):  # a part without a residual shows no gain
                 continue
-            F = F.sum(axis=3)[:, :, known].reshape(e.size, -1)
-            error, rank = _error_and_rank(
-                F, e.ravel(), _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-            )
+            S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
+            error, rank = _error_and_rank(F.sum(axis=3)[:, :, known].reshape(e.size, -1), e.ravel(), S)
             total = total + error
             n = n + rank
     return total / n
@@ -497,15 +497,13 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
     for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
         others = [flight for flight in parts if all(flight is not held_out for held_out in rest)]
         for held_out in rest:
-            windows.setdefault(held_out.samples.noise_ma_coefficients, []).extend(
-                _window_inflations(fold, held_out, others)
-            )
+            found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
+            found.extend(_window_inflations(fold, held_out, others))
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
     if model.vehicle.other_laws:
-        inflation = {
-            ma: factor * (_GYRO_FACTOR if _is_gyro_noise(ma) else _GUST_FACTOR)
-            for ma, factor in inflation.items()
-        }
+        # a gyro's noise takes from the next sample what it added to one
+        factors = {ma: _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR for ma in inflation}
+        inflation = {ma: value * factors[ma] for ma, value in inflation.items()}
     return _with_inflation(model, inflation)
 
 
@@ -539,21 +537,12 @@ def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> floa
 
     def scale(flight: FitPart) -> float:
         _, e = _standardized(fold, flight)
-        ok = np.ones(len(e), dtype=bool)
-        scales = recent_scale(e, ok, np.eye(3), fold.rate_hz)
+        scales = recent_scale(e, np.ones(len(e), dtype=bool), np.eye(3), fold.rate_hz)
         return float(scales.mean()) if len(scales) else 1.0
 
-    known = [
-        scale(flight)
-        for flight in others
-        if flight.samples.noise_ma_coefficients == held_out.samples.noise_ma_coefficients
-    ]
-    return max(scale(held_out) / max([1.0, *known]), 1.0)
-
-
-def _is_gyro_noise(ma: Sequence[float]) -> bool:
-    """Whether noise takes from the next sample what it added to one, as an instrument's does."""
-    return len(ma) > 1 and ma[1] < 0.0
+    ma = held_out.samples.noise_ma_coefficients
+    scales = [scale(flight) for flight in others if flight.samples.noise_ma_coefficients == ma]
+    return max(scale(held_out) / max([1.0, *scales]), 1.0)
 
 
 def _prior_covariance(model: Model, known: NDArray[np.bool_], ma: tuple[float, ...]) -> Floats:
@@ -563,9 +552,13 @@ def _prior_covariance(model: Model, known: NDArray[np.bool_], ma: tuple[float, .
 
 
 def _error_and_rank(F: Floats, e: Floats, S: Floats) -> tuple[float, int]:
-    """Squares of the gains of a residual (m,) on F (m, G), in their covariance and what
-    lies between flights, and how many gains there are."""
-    FF, Fe = F.T @ F, F.T @ e
+    """Square of the error g of the gains that a residual e (m,) tells by F (m, G), in their covariance and
+    what lies between flights, and how many gains there are:
+
+        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
+    """
+    FF = F.T @ F
+    Fe = F.T @ e
     g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
     A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
     error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
@@ -573,16 +566,15 @@ def _error_and_rank(F: Floats, e: Floats, S: Floats) -> tuple[float, int]:
 
 
 def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
-    """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
-    both in sd of the noise, without means; where responses are quick, of the noise and their error."""
+    """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
+    those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
     _, e, F = whitened_residual(model, held_out)
     ma = held_out.samples.noise_ma_coefficients
     q = np.sqrt(quick_scale(F, model, ma))
     R = model.with_noise_of(ma).residual_covariance
     W = np.linalg.inv(np.linalg.cholesky(np.array(R))).T
     Fw = np.einsum("nga,ab->nbga", F, W)
-    ew = e @ W
-    return (_centred(Fw) / q[:, None, None, None], _centred(ew) / q[:, None])
+    return _centred(Fw) / q[:, None, None, None], _centred(e @ W) / q[:, None]
 
 
 def _centred(values: Floats) -> Floats:
@@ -594,7 +586,7 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
-    c / n differ from the next with the variance 2 c / n + 2 n w / 3: two n tell w from c.
+    c / n differ from the next with the variance v = 2 c / n + 2 n w / 3: two n tell w from c.
     """
     sums = np.zeros((2, 3))
     counts = np.zeros(2)
@@ -610,7 +602,7 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
                     means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
                     sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
                     counts[i] += max(len(means) - 1, 0)
-    usual = np.array(FilterSettings().trim_walk_sd_per_sample)
+    usual = np.array(FilterSettings().trim_step_sd)
     if not counts.all():
         return usual.tolist()
     v1, v2 = sums / counts[:, None]
@@ -634,10 +626,7 @@ def _label_levels(part: FitPart, i: int) -> list[float]:
 def validation_folds(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], FitPart, str]]:
     """Return the fitted flights, the held-out one and its name, for each fold."""
     if len(parts) > 1:
-        others = [[part for part in parts if part is not held_out] for held_out in parts]
-        return [
-            (fitted, held_out, held_out.samples.name) for fitted, held_out in zip(others, parts, strict=True)
-        ]
+        return [([part for part in parts if part is not one], one, one.samples.name) for one in parts]
     (whole,) = parts
     first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
     return [([first], second, "second half"), ([second], first, "first half")]
@@ -716,13 +705,9 @@ def _alarm_rate_and_threshold(
     if tail is None and requested is not None:
         minutes = _healthy_minutes(peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
-        missing = extremes.RULED_OUT_COUNT * 60.0 / requested - minutes
-        raise BadInput(
-            f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {missing:.0f} min more"
-        )
-    if target:
-        return target, _choose_threshold(tail, target, model)
-    return target, None
+        allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
+        raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
+    return target, _choose_threshold(tail, target, model) if target else None
 
 
 def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
@@ -736,16 +721,10 @@ def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
         return np.zeros(len(model.groups))
     share = 0.0
     for noise in model.noise_models:
-        residuals = [
-            one_step_residual(model, part)[1]
-            for part in parts
-            if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients
-        ]
-        e, n = np.vstack(residuals), sum(map(len, residuals))
-        chance = 3.0 * AR_ORDER / n if noise.ar_coefficients else 0.0
-        log_ratio = (
-            np.linalg.slogdet(np.array(noise.residual_covariance))[1] - np.linalg.slogdet(np.cov(e.T))[1]
-        )
+        e = np.vstack([one_step_residual(model, part)[1] for part in _parts_in(parts, noise)])
+        chance = 3.0 * AR_ORDER / len(e) if noise.ar_coefficients else 0.0
+        log_det = np.linalg.slogdet(np.array(noise.residual_covariance))[1]
+        log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
         share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
     power = trust.untied_power([(part.samples, part.is_usable) for part in parts], model)
     return np.minimum(np.sqrt(3.0 * share / np.maximum(power, MIN_DIVISOR)), _GAIN_SD_CAP)
@@ -757,7 +736,7 @@ def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     F, e = _standardized(model, held_out)
     F = F.sum(axis=3).reshape(e.size, len(model.groups))
     squares = np.full(F.shape[1], np.nan)
-    known = np.array(trust.known_effects(model)) & (F.any(axis=0))
+    known = np.array(trust.known_effects(model)) & F.any(axis=0)
     FF = F[:, known].T @ F[:, known]
     P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
     g = P @ (F[:, known].T @ e.ravel())
@@ -776,8 +755,8 @@ def _gain_variance_between_laws(prior: Floats, deviations: Sequence[Floats]) -> 
 
 
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
-    """By the tail, or by theory if there is no tail. Under laws of which the parts left out say nothing, by
-    theory if that asks for more."""
+    """Threshold for `target` false alarms an hour: by the tail, or by theory if there is no tail. Under laws
+    of which the parts left out say nothing, by theory if that asks for more."""
     factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
     if model.vehicle.other_laws and not model.vehicle.moving_air:
         factor = _LORDEN_FACTOR
@@ -805,9 +784,8 @@ def _cross_validate(
     if target is None or len(flights) < 2 or not all(tails):
         return {}
     thresholds = [_choose_threshold(tail, target, model) for tail in tails if tail]
-    counts = [
-        int((peaks >= threshold).sum()) for (peaks, _), threshold in zip(flights, thresholds, strict=True)
-    ]
+    pairs = zip(flights, thresholds, strict=True)
+    counts = [int((peaks >= threshold).sum()) for (peaks, _), threshold in pairs]
     return {
         "parts": len(flights),
         "minutes": _healthy_minutes(flights),
@@ -820,11 +798,9 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
     bank = build_bank(model)
     p, _, _ = bank_posterior(held_out.samples, model, bank)
-    z, labels = fault_evidence(p, bank), held_out.samples.labels
-    healthy = (
-        held_out.is_usable & ~(labels < 1.0).any(axis=1) & (p[:, bank.no_response_hypothesis_index] < 0.5)
-    )
-    rows = np.flatnonzero(healthy)
+    z = fault_evidence(p, bank)
+    answers = p[:, bank.no_response_hypothesis_index] < 0.5
+    rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
     runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in _row_runs(rows)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
@@ -835,10 +811,7 @@ def _splits(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], list[FitPart]
     if len(parts) == 1:
         return [(fitted, [held_out]) for fitted, held_out, _ in validation_folds(parts)]
     n = min(len(parts), _MAX_SPLITS)
-    splits = [[i for i in range(len(parts)) if i % n == k] for k in range(n)]
-    return [
-        ([part for i, part in enumerate(parts) if i not in rest], [parts[i] for i in rest]) for rest in splits
-    ]
+    return [([part for i, part in enumerate(parts) if i % n != k], list(parts[k::n])) for k in range(n)]
 
 
 def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
@@ -846,9 +819,11 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
     effect is made up by the past, as an elevator's by alpha, its sum is not known, and its factor is.
 
-    Responses b with errors of covariance V tell their factor with the variance 1 / (b' V^-1 b).
+    Responses z with errors of covariance C tell their factor with the variance 1 / (z' C^-1 z), both in the
+    standard errors s (L, 3) of the coefficients; b (3,) is the sum over lags, in sd of the noise.
     """
-    n, L = len(model.groups), model.n_command_lags
+    n = len(model.groups)
+    L = model.n_command_lags
     first = len(fit.coefficients) - n * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
     relative = np.zeros(n)
@@ -884,28 +859,23 @@ def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document],
         if np.isfinite(labels).all(axis=1).any():
             rows = _rows_by_mass(fold, held_out)
             entry["score"] = score_against_labels(rows[model.settings.credible_mass], labels)
-            coverage.append(
-                [score_against_labels(rows[mass], labels)["held_by_bounds"] for mass in _CREDIBLE_MASSES]
-            )
+            scores = [score_against_labels(rows[mass], labels) for mass in _CREDIBLE_MASSES]
+            coverage.append([score["held_by_bounds"] for score in scores])
         entries.append(entry)
     if not coverage:
         return entries, model.settings.credible_mass
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
 
 
-def _rows_by_mass(model: Model, held_out: FitPart) -> dict[float, DiagnosisRows]:
+def _rows_by_mass(model: Model, held_out: FitPart) -> dict[float, LogRows]:
     bank = build_bank(model)
     p, _, _ = bank_posterior(held_out.samples, model, bank)
-    candidates = [
-        model.settings.model_copy(update={"credible_mass": mass})
-        for mass in {*_CREDIBLE_MASSES, model.settings.credible_mass}
-    ]
-    return {
-        settings.credible_mass: diagnosis_rows_from_posterior(
-            held_out.samples, model.model_copy(update={"settings": settings}), bank, p
-        )
-        for settings in candidates
-    }
+    rows = {}
+    for mass in {*_CREDIBLE_MASSES, model.settings.credible_mass}:
+        settings = model.settings.model_copy(update={"credible_mass": mass})
+        candidate = model.model_copy(update={"settings": settings})
+        rows[mass] = rows_of_posterior(held_out.samples, candidate, bank, p)
+    return rows
 
 
 def prediction_quality(model: Model, held_out: FitPart) -> Document:
@@ -923,12 +893,12 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
 
 
 def whitened_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
+    """Places (n,) of the samples in use, the unpredicted part e (n, 3) of the residual, and the answers F
     (n, G, 3) as they show in it."""
     ok, y, F = regression.whitened_rates(part.samples, model, labelled=True)
     rows = np.flatnonzero(part.is_usable & ok)
     intercept = model.whitened_intercept(part.samples.noise_ma_coefficients)
-    return (rows, (y - F.sum(axis=1) - intercept)[rows], F[rows])
+    return rows, (y - F.sum(axis=1) - intercept)[rows], F[rows]
 
 
 def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:

@@ -20,15 +20,10 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
-from beaver_ftc_logs.diagnose import DiagnosisRows, reversed_command_error
+from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
-from beaver_ftc_logs.stepped import (
-    ReplayedVerdicts,
-    declared_error_sections,
-    diagnosis_rows_from_replay,
-    replay_samples,
-)
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
+from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 if TYPE_CHECKING:
@@ -36,12 +31,12 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 
-_MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
-_MAX_RELATIVE_STEP_JITTER = 0.1
-_MIN_STRETCH_SAMPLES = 50
-_AIR_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
-_MAX_COMMAND_TO_STOP_RATIO = 1.1
-_UNANTICIPATED_FAULT_AT_START_WINDOW_S = 1.0
+_MAX_HZ, _MIN_HZ = 1000.0, 20.0
+_STEP_JITTER = 0.1
+_MIN_SAMPLES = 50
+_DENSITIES_KG_M3 = (0.2, 1.6)
+_STOP_RATIO = 1.1
+_START_WINDOW_S = 1.0
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
@@ -53,7 +48,7 @@ class DiagnosedAircraft:
     declared_errors: Document = field(default_factory=dict)
 
 
-def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
+def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
     """The aircraft with this name, and the errors that a scenario (file or name) declares; without a scenario
     the default ones. Raises BadInput if the scenario has another aircraft."""
     from beaver_ftc.aircraft import UnknownAircraft
@@ -75,15 +70,15 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
     if loaded.airframe.name != aircraft.name:
         reason = f"flies {loaded.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    return DiagnosedAircraft(loaded.airframe, declared_error_sections(loaded))
+    return DiagnosedAircraft(loaded.airframe, error_sections(loaded))
 
 
 @dataclass(frozen=True)
-class AircraftDiagnosisInputs:
+class LogInputs:
     """A log as inputs of the diagnosis.
 
-    rates_signals_commands_attitude: one array (n, ...) each, as `stepped.log_column_names_of_each_input`.
-    mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
+    input_arrays: one array (n, ...) each, as `stepped.input_columns`.
+    held_age_s: mean age of the values of each column that is held. has_missing_value (n,):
     rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
     which the diagnosis is stepped without a reset. full_deflection_rad (S,): what a command of 1 is in the
     log."""
@@ -91,44 +86,37 @@ class AircraftDiagnosisInputs:
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
-    rates_signals_commands_attitude: list[Floats]
-    mean_age_s_by_held_column: dict[str, float]
+    input_arrays: list[Floats]
+    held_age_s: dict[str, float]
     has_missing_value: Mask
     gap_free_stretches: list[tuple[int, int]]
     full_deflection_rad: Floats
 
 
-def read_diagnosis_inputs(
-    log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
-) -> AircraftDiagnosisInputs:
+def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check_log_has_inputs(log, vehicle, given.aircraft)
+    _check_inputs(log, vehicle, given.aircraft)
     samples = resample(
-        log,
-        vehicle.model_copy(update={"max_rate_hz": _MAX_LOG_RATE_HZ, "reference_airspeed_mps": None}),
+        log, vehicle.model_copy(update={"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None})
     )
     rate_hz = _log_rate_hz(samples)
     diagnosis = Diagnosis(given.aircraft, rate_hz, **given.declared_errors)
     tilted = diagnosis.declared.air.moves
-    arrays, ages = _read_sample_inputs(
-        samples, log, vehicle, given.aircraft, tilted
-    )
-    _check_units_plausible(samples.name, arrays, given.aircraft)
+    arrays, ages = _read_sample_inputs(samples, log, vehicle, given.aircraft, tilted)
+    _check_plausible(samples.name, arrays, given.aircraft)
     missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
     stretches = _gap_free_stretches(samples, missing, rate_hz)
     if not stretches:
         raise BadInput(
-            f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
+            f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a "
             "missing number, allowed: all signals logged at one rate of "
-            f"{_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
+            f"{_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
-    places = _vehicle_surface_indices(vehicle, given.aircraft)
-    samples = replace(
-        samples, commands=samples.commands[:, places], labels=samples.labels[:, places]
-    )
-    return AircraftDiagnosisInputs(
+    places = _surface_places(vehicle, given.aircraft)
+    samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
+    return LogInputs(
         samples,
         diagnosis,
         rate_hz,
@@ -140,112 +128,75 @@ def read_diagnosis_inputs(
     )
 
 
-def diagnose_with_aircraft_model(
+def diagnose_aircraft(
     log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
-) -> tuple[Samples, DiagnosisRows, Document]:
+) -> tuple[Samples, LogRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    inputs = read_diagnosis_inputs(log, vehicle, given)
-    return inputs.samples, *diagnose_aircraft_inputs(inputs, given)
+    inputs = read_inputs(log, vehicle, given)
+    return inputs.samples, *diagnose_inputs(inputs, given)
 
 
-def diagnose_aircraft_inputs(
-    inputs: AircraftDiagnosisInputs, given: DiagnosedAircraft
-) -> tuple[DiagnosisRows, Document]:
+def diagnose_inputs(inputs: LogInputs, given: DiagnosedAircraft) -> tuple[LogRows, Document]:
     """The rows and the document of verdict.json."""
     samples, aircraft = inputs.samples, given.aircraft
     replay = _replay_flight(inputs, aircraft)
-    rows = _rows_of_replayed_flight(inputs, aircraft, replay)
+    rows = _replayed_rows(inputs, aircraft, replay)
     if rows.has_credible_alarm():
-        _refuse_reversed_command_without_alarm(inputs, aircraft, replay, rows)
-        _refuse_exchanged_commands_without_alarm(inputs, aircraft, rows)
-    return rows, _verdict_document(
-        samples, rows, replay, given, inputs.mean_age_s_by_held_column
-    )
+        _refuse_reversed(inputs, aircraft, replay, rows)
+        _refuse_exchanged(inputs, aircraft, rows)
+    return rows, _verdict_document(samples, rows, replay, given, inputs.held_age_s)
 
 
-def _replay_flight(inputs: AircraftDiagnosisInputs, aircraft: Aircraft) -> ReplayedVerdicts:
+def _replay_flight(inputs: LogInputs, aircraft: Aircraft) -> Replayed:
     """The verdicts of all samples. Raises BadInput if a command has the other sign in every part."""
     diagnosis = inputs.diagnosis
     replays = []
     for begin, end in inputs.gap_free_stretches:
         diagnosis.reset()
         replays.append(
-            replay_samples(
-                diagnosis,
-                [array[begin:end] for array in inputs.rates_signals_commands_attitude],
-                inputs.rate_hz,
-            )
+            replay_samples(diagnosis, [array[begin:end] for array in inputs.input_arrays], inputs.rate_hz)
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_command_signs(inputs.samples.name, aircraft, replays)
     return _join_stretch_verdicts(
-        len(inputs.samples.t_s),
-        len(aircraft.surfaces),
-        inputs.gap_free_stretches,
-        replays,
+        len(inputs.samples.t_s), len(aircraft.surfaces), inputs.gap_free_stretches, replays
     )
 
 
-def _rows_of_replayed_flight(
-    inputs: AircraftDiagnosisInputs, aircraft: Aircraft, replay: ReplayedVerdicts
-) -> DiagnosisRows:
+def _replayed_rows(inputs: LogInputs, aircraft: Aircraft, replay: Replayed) -> LogRows:
     """The rows, without a verdict where the log is not credible."""
     t_s, stretches = inputs.samples.t_s, inputs.gap_free_stretches
-    rows = diagnosis_rows_from_replay(
-        t_s, replay, aircraft.surfaces, inputs.diagnosis.config
-    )
-    reasons = _undiagnosable_rows_by_reason(
-        inputs.rates_signals_commands_attitude[1],
-        aircraft,
-        inputs.has_missing_value,
-        stretches,
-    ) | _rows_by_reason_after_unanticipated_start(t_s, stretches, replay)
-    return rows.without_verdict(
-        _drop_empty_add_doubtful_alarm_reason(stretches, rows, reasons)
-    )
+    rows = rows_of_replay(t_s, replay, aircraft.surfaces, inputs.diagnosis.config)
+    reasons = _doubtful_rows_of(
+        inputs.input_arrays[1], aircraft, inputs.has_missing_value, stretches
+    ) | _unexplained_starts(t_s, stretches, replay)
+    return rows.without_verdict(_complete_reasons(stretches, rows, reasons))
 
 
-def _refuse_reversed_command_without_alarm(
-    inputs: AircraftDiagnosisInputs,
-    aircraft: Aircraft,
-    replay: ReplayedVerdicts,
-    rows: DiagnosisRows,
-) -> None:
+def _refuse_reversed(inputs: LogInputs, aircraft: Aircraft, replay: Replayed, rows: LogRows) -> None:
     """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
-    for s in np.flatnonzero(replay.relative_command_gains < 0.0):
-        rates, signals, commands, attitude = inputs.rates_signals_commands_attitude
+    for s in np.flatnonzero(replay.command_gains < 0.0):
+        rates, signals, commands, attitude = inputs.input_arrays
         signs = np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
-        corrected = replace(
-            inputs, rates_signals_commands_attitude=[rates, signals, commands * signs, attitude]
-        )
-        rows_then = _rows_of_replayed_flight(
-            corrected, aircraft, _replay_flight(corrected, aircraft)
-        )
-        if rows_then.are_healthy_where_credible_in(rows):
-            raise reversed_command_error(
-                inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}"
-            )
+        corrected = replace(inputs, input_arrays=[rates, signals, commands * signs, attitude])
+        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
+        if rows_then.clears_alarm(rows):
+            raise reversed_command_error(inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}")
 
 
-def _refuse_exchanged_commands_without_alarm(
-    inputs: AircraftDiagnosisInputs, aircraft: Aircraft, rows: DiagnosisRows
-) -> None:
+def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> None:
     """Raise BadInput if the log has no alarm once two commands are exchanged."""
-    rates, signals, _, attitude = inputs.rates_signals_commands_attitude
+    rates, signals, _, attitude = inputs.input_arrays
     for first, second in combinations(range(len(aircraft.surfaces)), 2):
         order = np.arange(len(aircraft.surfaces))
         order[[first, second]] = second, first
         commands = inputs.samples.commands[:, order] * inputs.full_deflection_rad
-        corrected = replace(
-            inputs, rates_signals_commands_attitude=[rates, signals, commands, attitude]
-        )
+        corrected = replace(inputs, input_arrays=[rates, signals, commands, attitude])
         if _raises_any_alarm(corrected):
             continue
-        rows_then = _rows_of_replayed_flight(
-            corrected, aircraft, _replay_flight(corrected, aircraft)
-        )
-        if rows_then.are_healthy_where_credible_in(rows):
+        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
+        if rows_then.clears_alarm(rows):
             raise BadInput(
                 f"{inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
                 f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
@@ -253,44 +204,32 @@ def _refuse_exchanged_commands_without_alarm(
             )
 
 
-def _raises_any_alarm(inputs: AircraftDiagnosisInputs) -> bool:
+def _raises_any_alarm(inputs: LogInputs) -> bool:
     """Whether an alarm is raised in any stretch; nothing after it is replayed."""
     for begin, end in inputs.gap_free_stretches:
         inputs.diagnosis.reset()
-        arrays = [
-            np.ascontiguousarray(array[begin:end])
-            for array in inputs.rates_signals_commands_attitude
-        ]
+        arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
         if any(inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
             return True
     return False
 
 
-def _check_command_signs(
-    flight: str, aircraft: Aircraft, replays: list[ReplayedVerdicts]
-) -> None:
+def _check_command_signs(flight: str, aircraft: Aircraft, replays: list[Replayed]) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
     for surface, upper in zip(
-        aircraft.surfaces,
-        np.min(
-            [replayed.relative_command_gain_upper_bounds for replayed in replays], axis=0
-        ),
-        strict=True,
+        aircraft.surfaces, np.min([replayed.command_gain_bounds for replayed in replays], axis=0), strict=True
     ):
         if upper < trust.MAX_REVERSED_GAIN:
             reason = f"the rates answer the command of {surface} the other way round in all of it"
-            raise BadInput(
-                f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
-            )
+            raise BadInput(f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
 
 
-def _check_log_has_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
+def _check_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
     """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
         reason = (
-            f"surfaces: no {missing[0]}, allowed: what the commands make of "
-            f"{', '.join(aircraft.surfaces)}"
+            f"surfaces: no {missing[0]}, allowed: what the commands make of {', '.join(aircraft.surfaces)}"
         )
         raise BadInput(f"vehicle {vehicle.name}: {reason}")
     if vehicle.airspeed is None:
@@ -311,7 +250,7 @@ def _flow_input_names(aircraft: Aircraft) -> list[str]:
     return ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
 
 
-def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
+def _surface_places(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
     """Place of each of the aircraft's surfaces among the vehicle's."""
     return [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
 
@@ -322,12 +261,12 @@ def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
-    first_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
+    first_s = samples.t_s[:_MIN_SAMPLES]
     steps_s = np.diff(first_s)
-    even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
+    even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")
-    if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
-        reason = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
+    if not _MIN_HZ <= rate_hz <= _MAX_HZ:
+        reason = f"an aircraft's model takes {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {reason}")
     return rate_hz
 
@@ -335,31 +274,23 @@ def _log_rate_hz(samples: Samples) -> float:
 def _read_sample_inputs(
     samples: Samples, log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, tilted: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.log_column_names_of_each_input`, and
+    """Rates, signals, commands and attitude at each sample, as `stepped.input_columns`, and
     the mean age of the values of each held column, s. tilted: if false, the attitude is zeros."""
     columns = convert_to_si(log, vehicle).columns
-    ages = dict(samples.mean_age_s_by_held_column)
+    ages = dict(samples.held_age_s)
 
-    def sample_values_and_store_age(quantity: QuantityColumn) -> Floats:
-        values, age_s = values_and_mean_age_at(
-            columns[quantity.column], samples.t_s, samples.dt_s
-        )
+    def sampled_at(quantity: QuantityColumn) -> Floats:
+        values, age_s = sample_column(columns[quantity.column], samples.t_s, samples.dt_s)
         if age_s is not None:
             ages[quantity.column] = age_s
         return values
 
     alpha, beta_rad, qdyn_pa, *others = (
-        sample_values_and_store_age(vehicle.flow[name]) for name in _flow_input_names(aircraft)
+        sampled_at(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
-    assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signals = [
-        alpha,
-        beta_rad,
-        sample_values_and_store_age(vehicle.airspeed),
-        qdyn_pa,
-        *others,
-    ]
-    places = _vehicle_surface_indices(vehicle, aircraft)
+    assert vehicle.airspeed is not None  # as `_check_inputs` has seen
+    signals = [alpha, beta_rad, sampled_at(vehicle.airspeed), qdyn_pa, *others]
+    places = _surface_places(vehicle, aircraft)
     full_rad = _full_deflection_rad(vehicle, aircraft)
     attitude = np.zeros_like(samples.rates)
     if tilted:
@@ -368,45 +299,31 @@ def _read_sample_inputs(
             if quantity is None or quantity.column not in columns:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
                 raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
-            attitude[:, axis] = sample_values_and_store_age(quantity)
-    return [
-        samples.rates,
-        np.column_stack(signals),
-        samples.commands[:, places] * full_rad,
-        attitude,
-    ], ages
+            attitude[:, axis] = sampled_at(quantity)
+    return [samples.rates, np.column_stack(signals), samples.commands[:, places] * full_rad, attitude], ages
 
 
-def _check_units_plausible(
-    flight: str, arrays: list[Floats], aircraft: Aircraft
-) -> None:
+def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
     signals, commands = arrays[1], arrays[2]
     for i, name in enumerate(("alpha_rad", "beta_rad")):
         median = _median_without_nan(np.abs(signals[:, i]))
         if median > 0.5 * pi:
-            raise BadInput(
-                f"{flight}: flow.{name} is {median:.3g} in the middle, "
-                "allowed: rad; `unit: deg`?"
-            )
+            raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
     flies = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
     rho = 2.0 * signals[flies, 3] / signals[flies, 2] ** 2
     median_density_kg_m3 = _median_without_nan(rho)
-    if (
-        rho.size
-        and not _AIR_DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _AIR_DENSITY_LIMITS_KG_M3[1]
-    ):
+    if rho.size and not _DENSITIES_KG_M3[0] < median_density_kg_m3 < _DENSITIES_KG_M3[1]:
         reason = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
-        allowed = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
+        allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
     for s, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
         max_rad = np.nanmax(np.abs(commands[:, s]), initial=0.0)
-        if max_rad > _MAX_COMMAND_TO_STOP_RATIO * stop_rad:
+        if max_rad > _STOP_RATIO * stop_rad:
             reason = (
-                f"the command of {surface} reaches {max_rad:.3g} rad, allowed: its stop, "
-                f"{stop_rad:.3g} rad"
+                f"the command of {surface} reaches {max_rad:.3g} rad, allowed: its stop, {stop_rad:.3g} rad"
             )
             raise BadInput(f"{flight}: {reason}; full_deflection_rad says what 1 is")
 
@@ -419,26 +336,17 @@ def _median_without_nan(values: Floats) -> float:
 
 def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
-    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
+    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
     is_known = ~missing
     joins = is_known[1:] & is_known[:-1] & ~uneven
     edges = np.flatnonzero(np.diff(np.concatenate([[False], joins, [False]]).astype(int)))
-    ends = zip(
-        edges[::2].tolist(), edges[1::2].tolist(), strict=True
-    )
-    return [
-        (first, last + 1)
-        for first, last in ends
-        if last + 1 - first >= _MIN_STRETCH_SAMPLES
-    ]
+    ends = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(first, last + 1) for first, last in ends if last + 1 - first >= _MIN_SAMPLES]
 
 
 def _join_stretch_verdicts(
-    n: int,
-    n_s: int,
-    stretches: list[tuple[int, int]],
-    replays: list[ReplayedVerdicts],
-) -> ReplayedVerdicts:
+    n: int, n_s: int, stretches: list[tuple[int, int]], replays: list[Replayed]
+) -> Replayed:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
     verdicts = [Verdict()] * n
@@ -446,20 +354,18 @@ def _join_stretch_verdicts(
     high = np.ones((n, n_s))
     gains, upper = (
         np.min([getattr(replayed, name) for replayed in replays], axis=0)
-        for name in ("relative_command_gains", "relative_command_gain_upper_bounds")
+        for name in ("command_gains", "command_gain_bounds")
     )
     for (begin, end), replayed in zip(stretches, replays, strict=True):
         verdicts[begin:end], low[begin:end], high[begin:end] = (
             replayed.verdicts,
-            replayed.single_fault_effectiveness_low,
-            replayed.single_fault_effectiveness_high,
+            replayed.alone_low,
+            replayed.alone_high,
         )
-    return ReplayedVerdicts(
-        verdicts, low, high, gains, upper
-    )
+    return Replayed(verdicts, low, high, gains, upper)
 
 
-def _undiagnosable_rows_by_reason(
+def _doubtful_rows_of(
     signals: Floats, aircraft: Aircraft, missing: Mask, stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """For each reason the rows (n,) for which there is no verdict."""
@@ -472,34 +378,20 @@ def _undiagnosable_rows_by_reason(
     return {
         "a number is missing": missing,
         "samples are not evenly spaced": outside & ~missing,
-        f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (
-            airspeed < low_mps
-        )
-        | (airspeed > high_mps),
-        f"angle of attack is outside {alpha_min:.3g} to {alpha_max:.3g} rad": (
-            alpha < alpha_min
-        )
+        f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (airspeed < low_mps) | (airspeed > high_mps),
+        f"angle of attack is outside {alpha_min:.3g} to {alpha_max:.3g} rad": (alpha < alpha_min)
         | (alpha > alpha_max),
     }
 
 
-def _rows_by_reason_after_unanticipated_start(
-    t_s: Floats, stretches: list[tuple[int, int]], replay: ReplayedVerdicts
-) -> dict[str, Mask]:
+def _unexplained_starts(t_s: Floats, stretches: list[tuple[int, int]], replay: Replayed) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
     after = np.zeros(len(t_s), dtype=bool)
     for begin, end in stretches:
-        stop = begin + int(
-            np.searchsorted(t_s[begin:end], t_s[begin] + _UNANTICIPATED_FAULT_AT_START_WINDOW_S)
-        )
-        if any(
-            verdict.isolated == "unanticipated"
-            for verdict in replay.verdicts[begin:stop]
-        ):
-            first = next(
-                k for k in range(begin, stop) if replay.verdicts[k].detected
-            )
+        stop = begin + int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
+        if any(verdict.isolated == "unanticipated" for verdict in replay.verdicts[begin:stop]):
+            first = next(k for k in range(begin, stop) if replay.verdicts[k].detected)
             after[first:end] = True
     reason = (
         "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
@@ -507,8 +399,8 @@ def _rows_by_reason_after_unanticipated_start(
     return {reason: after}
 
 
-def _drop_empty_add_doubtful_alarm_reason(
-    stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
+def _complete_reasons(
+    stretches: list[tuple[int, int]], rows: LogRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
     a reason of its own."""
@@ -518,32 +410,18 @@ def _drop_empty_add_doubtful_alarm_reason(
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
             after[alarms[0] : end] = True
-    reasons = reasons | {
-        "the alarm was raised where nothing can be said": after & ~has_reason
-    }
-    return {
-        reason: mask for reason, mask in reasons.items() if mask.any()
-    }
+    reasons = reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
+    return {reason: mask for reason, mask in reasons.items() if mask.any()}
 
 
 def _verdict_document(
-    samples: Samples,
-    rows: DiagnosisRows,
-    replay: ReplayedVerdicts,
-    given: DiagnosedAircraft,
-    ages: dict[str, float],
+    samples: Samples, rows: LogRows, replay: Replayed, given: DiagnosedAircraft, ages: dict[str, float]
 ) -> Document:
     """The document of verdict.json."""
     surfaces = list(given.aircraft.surfaces)
     alarms = np.flatnonzero(rows.faulty)
-    last = (
-        replay.verdicts[alarms[-1]] if alarms.size else Verdict()
-    )
-    since = [
-        k
-        for k in alarms.tolist()
-        if replay.verdicts[k].isolated == last.isolated
-    ]
+    last = replay.verdicts[alarms[-1]] if alarms.size else Verdict()
+    since = [k for k in alarms.tolist() if replay.verdicts[k].isolated == last.isolated]
     held = [
         f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
         for name, age_s in ages.items()
@@ -558,22 +436,20 @@ def _verdict_document(
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(alarms.size),
         "detection_s": float(samples.t_s[alarms[0]]) if alarms.size else None,
-        "isolation_s": float(samples.t_s[since[0]])
-        if last.isolated
-        else None,
+        "isolation_s": float(samples.t_s[since[0]]) if last.isolated else None,
         "isolated": last.isolated,
         "type": last.type,
         "estimate": last.estimate,
         "candidates": list(last.candidates),
-        "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
+        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
         "events": findings.fault_events(rows, surfaces),
-        "can_separate": _excluded_loss_sentences(rows, surfaces),
+        "can_separate": _excluded_losses(rows, surfaces),
         "isolability": {"together": []},
         "notes": [*samples.notes, *held],
     }
 
 
-def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
+def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
     """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
     the healthy rows."""
     quiet = (rows.faulty == 0) & (rows.credible == 1)

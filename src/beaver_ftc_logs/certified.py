@@ -12,24 +12,16 @@ import numpy as np
 
 from beaver_ftc_assurance.certificates import certificate
 from beaver_ftc_assurance.certificates import proved as by_frames
-from beaver_ftc_logs.by_aircraft import AircraftDiagnosisInputs
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.by_aircraft import LogInputs
+from beaver_ftc_logs.diagnose import LogRows
 
 
-def write_certificate_and_log(
-    inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path
-) -> None:
+def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
-    alarmed = (
-        stretch
-        for stretch in inputs.gap_free_stretches
-        if rows.faulty[stretch[0] : stretch[1]].any()
-    )
+    alarmed = (stretch for stretch in inputs.gap_free_stretches if rows.faulty[stretch[0] : stretch[1]].any())
     begin, end = next(alarmed, inputs.gap_free_stretches[0])
-    stretch_inputs = [
-        np.ascontiguousarray(array[begin:end]) for array in inputs.rates_signals_commands_attitude
-    ]
+    stretch_inputs = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
     diagnosis = inputs.diagnosis
 
     def step_diagnosis_and_yield_index() -> Iterator[int]:
@@ -40,8 +32,6 @@ def write_certificate_and_log(
     diagnosis.reset()
     memory, scenario = diagnosis.inside()
     scenario_named_as_flight = scenario.model_copy(update={"name": inputs.samples.name})
-    log, document = by_frames.proved(
-        scenario_named_as_flight, memory, step_diagnosis_and_yield_index()
-    )
+    log, document = by_frames.proved(scenario_named_as_flight, memory, step_diagnosis_and_yield_index())
     document = certificate.with_digest(document | {"begins_s": float(inputs.samples.t_s[begin])})
     by_frames.write(scenario_named_as_flight, log, document, folder)

@@ -23,7 +23,7 @@ from beaver_ftc_logs.known_commands import (
 )
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
-    NAMES_OF_READERS_OF_WANTED_COLUMNS,
+    SELECTIVE_READERS,
     check_exists,
     read_flight,
     read_parts,
@@ -36,18 +36,12 @@ from beaver_ftc_logs.readers.table import (
     text_of_column_phrase,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
-from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
-from beaver_ftc_logs.units import (
-    ACCELERATION,
-    KIND_AND_SI_FACTOR_OF_UNIT,
-    RATE,
-    SECONDS_PER_TIME_UNIT,
-    nearest_unit,
-)
+from beaver_ftc_logs.samples import Samples, read_vehicle_parts, resample
+from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
 
-def _rate_name_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
+def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
     """Return a pattern of the names of a body rate: ours, by its angle, by its axis, by its place in a
     vector."""
     return "|".join((
@@ -59,10 +53,10 @@ def _rate_name_pattern(rate_name: str, angle: str, axis: str, vector_index: int)
     ))  # fmt: skip
 
 
-_COLUMN_NAME_PATTERNS = {
-    "p": _rate_name_pattern("p", "roll", "x", 0),
-    "q": _rate_name_pattern("q", "pitch", "y", 1),
-    "r": _rate_name_pattern("r", "yaw", "z", 2),
+_NAME_PATTERNS = {
+    "p": _rate_pattern("p", "roll", "x", 0),
+    "q": _rate_pattern("q", "pitch", "y", 1),
+    "r": _rate_pattern("r", "yaw", "z", 2),
     "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
     "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
     "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
@@ -70,12 +64,12 @@ _COLUMN_NAME_PATTERNS = {
     "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
     r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
-_NOT_MEASURED_NAME_PATTERN = (
+_DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
 """Names of what others derive from a quantity, or want of it: none of these is the quantity."""
-_ANGLE_DERIVATIVE_PATTERN = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
+_ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _RATE_UNIT_BY_NAME_PART = {
     "rad_s": "rad/s",
     "rad/s": "rad/s",
@@ -84,10 +78,10 @@ _RATE_UNIT_BY_NAME_PART = {
     "dps": "deg/s",
 }
 _PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
-_MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
-_MIN_ANGLE_RATE_CORRELATION = 0.7
+_LARGEST_RAD_S = 12.0
+_MIN_CORRELATION = 0.7
 _MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
-_PLAUSIBLE_LOG_RATE_RANGE_HZ = (4.0, 2000.0)
+_LOG_RATES_HZ = (4.0, 2000.0)
 
 
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
@@ -102,16 +96,9 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
         if guess is None:
             return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
         vehicle = Vehicle.model_validate(guess)
-    parts = [
-        _check_recording(log, vehicle)
-        for log in read_parts_for_vehicle(path, vehicle, reader)
-    ]
+    parts = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
     for part, (_, lines) in enumerate(parts, 1):
-        remarks += (
-            lines
-            if len(parts) == 1
-            else [f"part {part} of {len(parts)}: {line}" for line in lines]
-        )
+        remarks += lines if len(parts) == 1 else [f"part {part} of {len(parts)}: {line}" for line in lines]
     return {
         "log": str(path),
         "usable": all(usable for usable, _ in parts),
@@ -131,15 +118,8 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
         for axis, rate in zip("pqr", samples.rates.T, strict=True)
         if np.ptp(rate[np.isfinite(rate)]) == 0.0
     ]
-    lines = [
-        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still
-    ]
-    return not still, [
-        _log_size_text(samples),
-        *samples.notes,
-        *_compare_rates_and_angles(log, vehicle),
-        *lines,
-    ]
+    lines = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still]
+    return not still, [_log_size_text(samples), *samples.notes, *_compare_angles(log, vehicle), *lines]
 
 
 def _log_size_text(samples: Samples) -> str:
@@ -149,7 +129,7 @@ def _log_size_text(samples: Samples) -> str:
     return f"{text}; gaps: {n_gaps}{gap}"
 
 
-def _compare_rates_and_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
+def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
     columns, angles = log.columns, vehicle.attitude
     if angles is None or angles.roll.column not in columns:
@@ -157,50 +137,25 @@ def _compare_rates_and_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str
     gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     pitch = angles.pitch
     pitch_column_in_si = (
-        _column_in_si(columns, pitch)
-        if pitch is not None and pitch.column in columns
-        else None
+        _column_in_si(columns, pitch) if pitch is not None and pitch.column in columns else None
     )
-    roll_fit = physics.fit_roll_angle_to_rates(
-        gyros, _column_in_si(columns, angles.roll), pitch_column_in_si
-    )
+    roll_fit = physics.fit_roll(gyros, _column_in_si(columns, angles.roll), pitch_column_in_si)
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    texts = [
-        _angle_rate_fit_text(roll_fit, angles.roll.column, vehicle.rates.p.column)
-    ]
+    texts = [_fit_text(roll_fit, angles.roll.column, vehicle.rates.p.column)]
     if pitch is not None and pitch_column_in_si is not None:
-        pitch_fit = physics.fit_pitch_angle_to_rates(
-            gyros, _column_in_si(columns, angles.roll), pitch_column_in_si
+        pitch_fit = physics.fit_pitch(gyros, _column_in_si(columns, angles.roll), pitch_column_in_si)
+        texts += [_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
+    if (yaw := angles.yaw) is not None and yaw.column in columns:
+        yaw_fit = physics.fit_yaw(
+            gyros, _column_in_si(columns, angles.roll), pitch_column_in_si, _column_in_si(columns, yaw)
         )
-        texts += (
-            [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)]
-            if pitch_fit
-            else []
-        )
-    if (
-        yaw := angles.yaw
-    ) is not None and yaw.column in columns:
-        yaw_fit = physics.fit_yaw_angle_to_rates(
-            gyros,
-            _column_in_si(columns, angles.roll),
-            pitch_column_in_si,
-            _column_in_si(columns, yaw),
-        )
-        texts += (
-            [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)]
-            if yaw_fit
-            else []
-        )
+        texts += [_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
     return texts
 
 
-def _angle_rate_fit_text(fit: physics.AngleRateFit, angle: str, rate: str) -> str:
-    verdict = (
-        "they agree"
-        if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
-        else "they tell nothing of one another"
-    )
+def _fit_text(fit: physics.AngleFit, angle: str, rate: str) -> str:
+    verdict = "they agree" if abs(fit.correlation) > _MIN_CORRELATION else "they tell nothing of one another"
     return (
         f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} "
         f"(correlation {fit.correlation:.2f}): {verdict}"
@@ -216,23 +171,20 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     reader = reader or reader_name_for_path(path)
-    time = _require_time_column_and_unit(path, remarks) if reader == "table" else None
-    log, in_log, mixing = _read_columns_for_guess(path, reader, time)
+    time = _find_time(path, remarks) if reader == "table" else None
+    log, in_log, mixing = _read_likely(path, reader, time)
     remarks += mixing.lines
-    names = [
-        name for name, column in log.columns.items() if np.isfinite(column.values).any()
-    ]
+    names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
     found = {
-        quantity: _shortest_matching_column_name(
+        quantity: _shortest_match(
             pattern,
             [
                 name
                 for name in names
-                if quantity not in ("roll", "pitch")
-                or not re.search(_ANGLE_DERIVATIVE_PATTERN, _snake_case_name(name))
+                if quantity not in ("roll", "pitch") or not re.search(_ANGLE_RATE_NAME, _snake_case(name))
             ],
         )
-        for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
+        for quantity, pattern in _NAME_PATTERNS.items()
     }
     if not mixing.surfaces:
         rotors = multicopter_reason(log.parameters, in_log)
@@ -253,9 +205,7 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
         nearest = nearest_names_text("rate" if missing else "command", in_log)
         remarks.append(f"{path}: {problem}; the log has {nearest}")
         return None
-    return _propose_vehicle(
-        path.stem, log, reader, time, found, mixing
-    )
+    return _propose_vehicle(path.stem, log, reader, time, found, mixing)
 
 
 def _propose_vehicle(
@@ -268,113 +218,79 @@ def _propose_vehicle(
 ) -> Document:
     columns = log.columns
     roll = columns[found["roll"]] if found["roll"] else None
-    angle_unit = (
-        _guess_angle_unit(str(found["roll"]), roll, reader)
-        if roll is not None
-        else "rad"
-    )
-    rate_unit = _guess_rate_unit(
-        log,
-        [str(found[axis]) for axis in "pqr"],
-        roll,
-        KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
-    )
-    vehicle: Document = {"name": _as_vehicle_or_surface_name(name), "reader": reader}
+    angle_unit = _guess_angle_unit(str(found["roll"]), roll, reader) if roll is not None else "rad"
+    rate_unit = _guess_rate_unit(log, [str(found[axis]) for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
+    vehicle: Document = {"name": _plain_name(name), "reader": reader}
     if time and time != (TIME_COLUMN, "s"):
         vehicle["time"] = {"column": time[0], "unit": time[1]}
-    vehicle["rates"] = {
-        axis: _vehicle_file_column_entry(str(found[axis]), rate_unit, "rad/s")
-        for axis in "pqr"
-    }
+    vehicle["rates"] = {axis: _column_entry(str(found[axis]), rate_unit, "rad/s") for axis in "pqr"}
     vehicle["commands"] = mixing.commands
     vehicle["surfaces"] = mixing.surfaces
-    angles = {
-        axis: found[axis] for axis in ("roll", "pitch") if found[axis]
-    }
+    angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
     if roll is not None:
         vehicle["attitude"] = {
-            axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
-            for axis, name in angles.items()
+            axis: _column_entry(str(name), angle_unit, "rad") for axis, name in angles.items()
         }
     if az := found["az"]:
         median = float(np.nanmedian(np.abs(columns[az].values)))
-        unit = (
-            nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median, 2.0)
-            if median > 0.0
-            else None
-        )
+        unit = nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0) if median > 0.0 else None
         if unit:
-            vehicle["acceleration"] = _vehicle_file_column_entry(
-                az, unit, "m/s2"
-            )
+            vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
     if found["airspeed"]:
         vehicle["airspeed"] = found["airspeed"]
     return vehicle
 
 
-def _guess_surfaces(
-    mixing: Mixing,
-    log: RecordedFlight,
-    names: Sequence[str],
-) -> None:
+def _guess_surfaces(mixing: Mixing, log: RecordedFlight, names: Sequence[str]) -> None:
     """Make a surface of each column that is known to carry a command."""
     for name in command_names(names, log.parameters)[:_MAX_PROPOSED_COMMANDS]:
-        mixing.entry_by_column[name] = _vehicle_file_command_entry(name, log.columns[name].values)
-        mixing.surfaces[_as_vehicle_or_surface_name(name)] = {name: 1.0}
+        mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
+        mixing.surfaces[_plain_name(name)] = {name: 1.0}
 
 
-def _read_columns_for_guess(
+def _read_likely(
     path: Path, reader: str, time: tuple[str, str] | None
 ) -> tuple[RecordedFlight, list[str], Mixing]:
     """The columns of a log, of a long table its first part, that may be something; the names of all; the
     mixing by its parameters."""
-    if reader in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+    if reader in SELECTIVE_READERS:
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        names_to_read = [*_names_of_columns_to_read(names, None), *mixing.entry_by_column]
+        names_to_read = [*_likely_columns(names, None), *mixing.entry_by_column]
         return read_flight(path, reader, columns=names_to_read), names, mixing
-    wanted = _names_of_columns_to_read(column_names(path)) if reader == "table" else None
+    wanted = _likely_columns(column_names(path)) if reader == "table" else None
     recording = next(read_parts(path, reader, time, wanted))
     return recording, list(recording.columns), Mixing()
 
 
-def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
+def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
     """Columns that may be something: a log with many is not read whole."""
-    pattern = "|".join(f"({part})" for part in _COLUMN_NAME_PATTERNS.values())
-    likely = [
-        name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or is_command_name(name)
-    ]
+    pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
+    likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
     return likely[:max_columns]
 
 
-def _snake_case_name(name: str) -> str:
+def _snake_case(name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    text = re.sub(
-        r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower()
-    )
+    text = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
     return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
 
 
-def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | None:
+def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
     matches = [
         name
         for name in names
-        if re.fullmatch(pattern, _snake_case_name(name))
-        and not re.search(_NOT_MEASURED_NAME_PATTERN, _snake_case_name(name))
+        if re.fullmatch(pattern, _snake_case(name)) and not re.search(_DERIVED_NAME, _snake_case(name))
     ]
     return min(matches, key=lambda name: (len(name), name), default=None)
 
 
-def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
+def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     names = column_names(path)
-    likely = [
-        name
-        for name in names
-        if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
-    ]
+    likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
     phrases: list[str] = []
     for name in sorted(likely, key=lambda name: name != TIME_COLUMN):
         cells = first_cells_of_column(path, name)
@@ -384,14 +300,11 @@ def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, 
         step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
         units = [
             unit
-            for unit, seconds in SECONDS_PER_TIME_UNIT.items()
+            for unit, seconds in TIME_UNITS.items()
             if step > 0.0 and _is_log_rate_plausible(1.0 / (step * seconds))
         ]
         if units:
-            unit = next(
-                (unit for unit in units if _snake_case_name(name).endswith(unit)),
-                units[0],
-            )
+            unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
             if (name, unit) != (TIME_COLUMN, "s"):
                 remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
@@ -404,62 +317,44 @@ def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, 
 
 
 def _is_log_rate_plausible(rate_hz: float) -> bool:
-    return _PLAUSIBLE_LOG_RATE_RANGE_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATE_RANGE_HZ[1]
+    return _LOG_RATES_HZ[0] <= rate_hz <= _LOG_RATES_HZ[1]
 
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
-    if (
-        reader == "ardupilot"
-        or "deg" in name.lower()
-        or _largest_magnitude(roll.values) > 2.0 * np.pi
-    ):
+    if reader == "ardupilot" or "deg" in name.lower() or _largest_magnitude(roll.values) > 2.0 * np.pi:
         return "deg"
     return "rad"
 
 
 def _guess_rate_unit(
-    log: RecordedFlight,
-    rate_names: list[str],
-    roll: Column | None,
-    rad_per_roll_unit: float,
+    log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
     rates = [log.columns[name] for name in rate_names]
     if roll is not None:
-        roll_fit = physics.fit_roll_angle_to_rates(
-            rates, replace(roll, values=roll.values * rad_per_roll_unit), None
-        )
-        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
+        roll_fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
+        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (
-            unit
-            for name_part, unit in _RATE_UNIT_BY_NAME_PART.items()
-            if name_part in rate_names[0].lower()
-        ),
+        (unit for name_part, unit in _RATE_UNIT_BY_NAME_PART.items() if name_part in rate_names[0].lower()),
         None,
     )
     if unit_in_name:
         return unit_in_name
-    return (
-        "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in rates)
-        > _MAX_RATE_NUMBER_READ_AS_RAD_S
-        else "rad/s"
-    )
+    return "deg/s" if max(_largest_magnitude(rate.values) for rate in rates) > _LARGEST_RAD_S else "rad/s"
 
 
 def _largest_magnitude(values: Floats) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _vehicle_file_column_entry(name: str, unit: str, si_unit: str) -> Any:
+def _column_entry(name: str, unit: str, si_unit: str) -> Any:
     return name if unit == si_unit else {"column": name, "unit": unit}
 
 
-def _vehicle_file_command_entry(name: str, values: Floats) -> Any:
+def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
     median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
     if _PWM_MEDIAN_RANGE_US[0] < median < _PWM_MEDIAN_RANGE_US[1]:
@@ -467,7 +362,7 @@ def _vehicle_file_command_entry(name: str, values: Floats) -> Any:
     return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
 
 
-def _as_vehicle_or_surface_name(name: str) -> str:
+def _plain_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
 
 

@@ -61,25 +61,19 @@ def identify(
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc.results import clear_disk_errors
     from beaver_ftc.studies.engine import write_whole
-    from beaver_ftc_logs.identification import (
-        identification_text,
-        identify,
-        scale_if_better,
-    )
+    from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
-    from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
+    from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.samples import load_flights_for_fit
-    from beaver_ftc_logs.vehicle import with_false_alarm_rate
+    from beaver_ftc_logs.vehicle import with_alarm_rate
 
     page = out.with_suffix(".html")
-    refuse_to_replace_foreign_file(page)
+    refuse_foreign_file(page)
     loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader)
     if false_alarms_per_hour is not None:
-        loaded = with_false_alarm_rate(loaded, false_alarms_per_hour)
-    logs, loaded = scale_if_better(
-        load_flights_for_fit(flights, loaded, reader), loaded
-    )
+        loaded = with_alarm_rate(loaded, false_alarms_per_hour)
+    logs, loaded = scale_if_better(load_flights_for_fit(flights, loaded, reader), loaded)
     model = identify(logs, loaded)
     page_html = render_identification(logs, model)
     for path, file_text in ((out, model_file_text(model)), (page, page_html)):
@@ -93,21 +87,11 @@ def identify(
         "identified": model.identification_results,
         "settings": model.settings.model_dump(by_alias=True),
     }
-    long = [
-        f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1
-    ]
+    long = [f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1]
     answer(
         format,
         document,
-        lambda: "\n".join(
-            [
-                *mixing,
-                identification_text(model),
-                *long,
-                f"model: {out}",
-                f"page: {page}",
-            ]
-        ),
+        lambda: "\n".join([*mixing, identification_text(model), *long, f"model: {out}", f"page: {page}"]),
     )
 
 
@@ -117,9 +101,7 @@ def _check_logs(
     from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
 
-    loaded, mixing = (
-        load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
-    )
+    loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
     if out is not None and (out.exists() or loaded is not None):
         reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {reason}")
@@ -131,11 +113,7 @@ def _check_logs(
         texts.append(f"vehicle file: {out}")
     elif guess is not None:
         texts.append(vehicle_file_text(guess))
-    answer(
-        format,
-        {"logs": findings, "vehicle": guess, "mixing": mixing},
-        lambda: "\n".join(texts),
-    )
+    answer(format, {"logs": findings, "vehicle": guess, "mixing": mixing}, lambda: "\n".join(texts))
     if not all(finding["usable"] for finding in findings):
         raise typer.Exit(2)
 
@@ -189,7 +167,7 @@ def diagnose(options: DiagnoseOptions) -> None:
     _check_options_agree(options)
     flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:
-        _diagnose_with_aircraft_model(options)
+        _diagnose_with_aircraft(options)
         return
     if options.model is None:
         _replay_run_logs(flights, out, format)
@@ -202,7 +180,7 @@ def diagnose(options: DiagnoseOptions) -> None:
     check_detector_name(options.detector)
     model = load_model(options.model)
     verdicts = [
-        _diagnose_flight_and_write_results(flight, model, out, options.score, options.detector)
+        _diagnose_and_write(flight, model, out, options.score, options.detector)
         for flight in stream_flights(flights, model.vehicle, options.reader)
     ]
     answer(
@@ -246,23 +224,18 @@ def _check_replay_options(options: DiagnoseOptions) -> None:
             raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
 
-def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import (
-        as_text,
-        diagnose_aircraft_inputs,
-        load_aircraft_and_declared_errors,
-        read_diagnosis_inputs,
-    )
+def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
+    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_diagnosed, read_inputs
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
-    from beaver_ftc_logs.pages import write_diagnosis_with_aircraft_model
+    from beaver_ftc_logs.pages import write_aircraft_diagnosis
     from beaver_ftc_logs.readers import check_exists
-    from beaver_ftc_logs.samples import read_parts_for_vehicle
+    from beaver_ftc_logs.samples import read_vehicle_parts
     from beaver_ftc_logs.scoring import score_diagnosis
 
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    given = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
+    given = load_diagnosed(str(options.aircraft), options.scenario)
     verdicts: list[Document] = []
     texts: list[str] = []
     for path in options.flights:
@@ -273,20 +246,16 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
         vehicle_path = options.vehicle or str(beside)
         loaded, mixing = load_vehicle_for_logs(vehicle_path, [path], options.reader)
-        for log in read_parts_for_vehicle(path, loaded, options.reader):
-            inputs = read_diagnosis_inputs(log, loaded, given)
-            rows, verdict = diagnose_aircraft_inputs(inputs, given)
+        for log in read_vehicle_parts(path, loaded, options.reader):
+            inputs = read_inputs(log, loaded, given)
+            rows, verdict = diagnose_inputs(inputs, given)
             samples, surfaces = inputs.samples, given.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
             writer = (
-                partial(certified.write_certificate_and_log, inputs, rows)
-                if options.certificate
-                else None
+                partial(certified.write_certificate_and_log, inputs, rows) if options.certificate else None
             )
-            folder = write_diagnosis_with_aircraft_model(
-                options.out, samples, surfaces, rows, verdict, writer
-            )
+            folder = write_aircraft_diagnosis(options.out, samples, surfaces, rows, verdict, writer)
             verdicts.append(verdict | {"folder": str(folder)})
         texts += [*mixing, *map(as_text, verdicts[before:])]
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
@@ -308,7 +277,7 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _diagnose_flight_and_write_results(
+def _diagnose_and_write(
     samples: "Samples", model: "Model", out: Path, with_score: bool, detector: str
 ) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with_detector

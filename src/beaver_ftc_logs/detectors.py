@@ -29,73 +29,49 @@ from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import (
     UNKNOWN_SURFACE,
-    DiagnosisRows,
+    LogRows,
     check_log_fits_model,
     diagnose,
-    finalize_rows_at_log_stamps,
-    join_flagged_names_by_row,
-    standardized_healthy_residual,
+    finish_rows,
+    healthy_residual,
+    join_names,
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import (
-    expand_groups,
-    group_indices,
-    unexplained_rates,
-)
+from beaver_ftc_logs.regression import expand_groups, group_indices, unexplained_rates
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
-_MIN_LOSS_STANDARD_ERRORS = 5.0
-_STANDARD_ERRORS_OF_90_PERCENT = 1.645
-LOOP_SURFACE_BY_GROUP_INDEX = ("aileron", "elevator", "rudder")
-_N_LOOP_SURFACES_WITH_FLAP = 4
-_DECLARED_GYRO_NOISE_RAD_S = 1e-4
-BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
+_MIN_LOSS_SD = 5.0
+_SD_OF_90_PERCENT = 1.645
+LOOP_SURFACES = ("aileron", "elevator", "rudder")
+_N_LOOP = 4
+_DECLARED_GYRO_RAD_S = 1e-4
+OUR_DETECTOR = "bank-of-filters"
 
 
-def _diagnose_by_least_squares(samples: Samples, model: Model, fades: bool) -> DiagnosisRows:
+def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
-    X, y = _whitened_effectiveness_change_regression(samples, model)
-    M = _fading_or_sliding_sums(
-        np.einsum("nai,naj->nij", X, X), samples.dt_s, fades
-    )
-    b = _fading_or_sliding_sums(
-        np.einsum("nai,na->ni", X, y), samples.dt_s, fades
-    )
-    M0 = np.diag(
-        [*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(X.shape[2] - 3, 4.0)]
-    )
+    X, y = _whitened_regression(samples, model)
+    M = _fading_or_sliding_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
+    b = _fading_or_sliding_sums(np.einsum("nai,na->ni", X, y), samples.dt_s, fades)
+    M0 = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(X.shape[2] - 3, 4.0)])
     P = np.linalg.inv(M + M0)
     theta = np.einsum("nij,nj->ni", P, b)
-    sd = np.sqrt(
-        np.maximum(np.diagonal(P, axis1=1, axis2=2)[:, 3:], 0.0)
-    )
-    return _diagnosis_rows_from_least_squares(
-        samples, model, 1.0 + theta[:, 3:], sd
-    )
+    sd = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2)[:, 3:], 0.0))
+    return _rows_of_estimate(samples, model, 1.0 + theta[:, 3:], sd)
 
 
-def _whitened_effectiveness_change_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
+def _whitened_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    known, y, F = unexplained_rates(
-        samples, model
-    )
-    R = model.intercept_past_response_noise()[3]
+    known, y, F = unexplained_rates(samples, model)
+    R = model.as_arrays()[3]
     W = np.linalg.inv(np.linalg.cholesky(R))
-    trim = np.broadcast_to(
-        np.diag(np.sqrt(np.diag(R))), (len(known), 3, 3)
-    )
-    X = np.where(
-        known[:, None, None],
-        np.concatenate([trim, F.transpose(0, 2, 1)], axis=2),
-        0.0,
-    )
-    return np.einsum("ab,nbi->nai", W, X), standardized_healthy_residual(
-        model, known, y, F
-    )
+    trim = np.broadcast_to(np.diag(np.sqrt(np.diag(R))), (len(known), 3, 3))
+    X = np.where(known[:, None, None], np.concatenate([trim, F.transpose(0, 2, 1)], axis=2), 0.0)
+    return np.einsum("ab,nbi->nai", W, X), healthy_residual(model, known, y, F)
 
 
 def _fading_or_sliding_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
@@ -110,82 +86,42 @@ def _fading_or_sliding_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
     return sums
 
 
-def _diagnosis_rows_from_least_squares(
-    samples: Samples, model: Model, e: Floats, sd: Floats
-) -> DiagnosisRows:
+def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> LogRows:
     """Rows of a least-squares estimate. With labelled levels, the e is the nearest of them, and
-    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
+    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_SD
     standard deviations."""
     bank = build_bank(model)
-    low, high = (
-        np.clip(
-            e + sign * _STANDARD_ERRORS_OF_90_PERCENT * sd, 0.0, 1.0
-        )
-        for sign in (-1.0, 1.0)
-    )
+    low, high = (np.clip(e + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(e, 0.0, 1.0)
-    lost = e + _MIN_LOSS_STANDARD_ERRORS * sd < 1.0
+    lost = e + _MIN_LOSS_SD * sd < 1.0
     if model.settings.likely_levels:
         for g, group in enumerate(model.groups):
             labelled = model.settings.likely_levels.get("+".join(group))
-            levels = (
-                np.array([*labelled, 1.0])
-                if labelled
-                else np.unique(bank.effectiveness[:, g])
-            )
-            nearest[:, g] = levels[
-                np.abs(nearest[:, g, None] - levels).argmin(axis=1)
-            ]
+            levels = np.array([*labelled, 1.0]) if labelled else np.unique(bank.effectiveness[:, g])
+            nearest[:, g] = levels[np.abs(nearest[:, g, None] - levels).argmin(axis=1)]
         lost = nearest < 1.0
-    group_bounds = {
-        "low": np.minimum(low, nearest),
-        "high": np.maximum(high, nearest),
-    }
-    bounds = {
-        end: expand_groups(bound, model)
-        for end, bound in group_bounds.items()
-    }
-    names = join_flagged_names_by_row(lost, ["+".join(group) for group in model.groups])
-    return _rows_with_default_bounds(
-        samples,
-        names,
-        expand_groups(nearest, model),
-        **bounds,
-    )
+    group_bounds = {"low": np.minimum(low, nearest), "high": np.maximum(high, nearest)}
+    bounds = {end: expand_groups(bound, model) for end, bound in group_bounds.items()}
+    names = join_names(lost, ["+".join(group) for group in model.groups])
+    return _plain_rows(samples, names, expand_groups(nearest, model), **bounds)
 
 
-def _rows_with_default_bounds(
-    samples: Samples,
-    names: np.ndarray,
-    e: Floats,
-    **given: Floats,
-) -> DiagnosisRows:
+def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, **given: Floats) -> LogRows:
     """Rows of a detector: faulty where it names a surface. Of low, high and probability those that are not
     in given: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
-    all_of = {
-        "low": e,
-        "high": e,
-        "probability": faulty.astype(float),
-        **given,
-    }
+    all_of = {"low": e, "high": e, "probability": faulty.astype(float), **given}
     low = all_of["low"]
     high = all_of["high"]
     probability = all_of["probability"]
-    return DiagnosisRows(samples.t_s, faulty, names, e, low, high, probability)
+    return LogRows(samples.t_s, faulty, names, e, low, high, probability)
 
 
-def diagnose_by_freeze_rule(
-    log: RecordedFlight, samples: Samples, model: Model
-) -> DiagnosisRows | None:
+def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surfaces = list(model.vehicle.surfaces)
     all_outputs = model.vehicle.outputs
-    outputs = {
-        name: output.column
-        for name, output in all_outputs.items()
-        if output.column in log.columns
-    }
+    outputs = {name: output.column for name, output in all_outputs.items() if output.column in log.columns}
     if not outputs:
         return None
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)
@@ -193,17 +129,11 @@ def diagnose_by_freeze_rule(
         column = log.columns[outputs[name]]
         last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         changed = np.concatenate([[True], np.diff(column.values) != 0.0])
-        since_s = column.t_s[
-            np.maximum.accumulate(
-                np.where(changed, np.arange(len(changed)), 0)
-            )
-        ]
+        since_s = column.t_s[np.maximum.accumulate(np.where(changed, np.arange(len(changed)), 0))]
         frozen[:, surfaces.index(name)] = (
             samples.t_s - since_s[np.maximum(last, 0)] > MIN_FROZEN_OUTPUT_S
         ) & (last >= 0)
-    return _rows_with_default_bounds(
-        samples, join_flagged_names_by_row(frozen, surfaces), 1.0 - frozen
-    )
+    return _plain_rows(samples, join_names(frozen, surfaces), 1.0 - frozen)
 
 
 class LinearRateModel:
@@ -218,7 +148,7 @@ class LinearRateModel:
 
     def G(self, y: Floats) -> Floats:
         """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
-        return np.zeros((3, _N_LOOP_SURFACES_WITH_FLAP))
+        return np.zeros((3, _N_LOOP))
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
@@ -227,106 +157,78 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
     members = group_indices(model)
-    if len(members) > len(LOOP_SURFACE_BY_GROUP_INDEX):
+    if len(members) > len(LOOP_SURFACES):
         raise BadInput(
             f"{model.vehicle.name}: {len(members)} groups of surfaces, allowed for a "
-            f"detector of the loop: at most {len(LOOP_SURFACE_BY_GROUP_INDEX)}"
+            f"detector of the loop: at most {len(LOOP_SURFACES)}"
         )
-    known, y, F = unexplained_rates(
-        samples, model
-    )
-    c, dt_s = model.intercept_past_response_noise()[0], 1.0 / model.rate_hz
+    known, y, F = unexplained_rates(samples, model)
+    c, dt_s = model.as_arrays()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     before = np.vstack([rates[:1], rates[:-1]])
-    predicted = rates - np.where(
-        known[:, None], y - c - F.sum(axis=1), 0.0
-    )
+    predicted = rates - np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
     expected = (predicted - before) / dt_s
-    parts = np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP))
-    commands = np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP))
+    parts = np.zeros((len(rates), 3, _N_LOOP))
+    commands = np.zeros((len(rates), _N_LOOP))
     F0 = np.where(known[:, None, None], F, 0.0)
     for g, places in enumerate(members):
         parts[:, :, g] = F0[:, g] / dt_s
         commands[:, g] = np.nan_to_num(samples.commands[:, places].sum(axis=1))
-    frames = zip(
-        samples.t_s.tolist(), rates, expected, parts, commands, strict=True
-    )
+    frames = zip(samples.t_s.tolist(), rates, expected, parts, commands, strict=True)
     sd = _model_error_sd_rad_s2(model)
     return [
-        (
-            Measured(
-                t_s,
-                x,
-                np.zeros(N_Y),
-                acceleration,
-                part,
-                sd.copy(),
-            ),
-            u,
-        )
+        (Measured(t_s, x, np.zeros(N_Y), acceleration, part, sd.copy()), u)
         for t_s, x, acceleration, part, u in frames
     ]
 
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(model.intercept_past_response_noise()[3])) / (1.0 / model.rate_hz))
+    return np.asarray(np.sqrt(np.diag(model.as_arrays()[3])) / (1.0 / model.rate_hz))
 
 
 def loop_detector_context(model: Model) -> Context:
     """Return the context that a detector is given before the flight."""
     dt_s = 1.0 / model.rate_hz
     noise = np.zeros(7)
-    noise[:3] = _DECLARED_GYRO_NOISE_RAD_S
-    design: Any = LinearRateModel(model.intercept_past_response_noise()[1], dt_s)
+    noise[:3] = _DECLARED_GYRO_RAD_S
+    design: Any = LinearRateModel(model.as_arrays()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
-        trim_rad=np.zeros(_N_LOOP_SURFACES_WITH_FLAP),
-        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES_WITH_FLAP)),
+        trim_rad=np.zeros(_N_LOOP),
+        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
-        surfaces=(*LOOP_SURFACE_BY_GROUP_INDEX, "flap"),
+        surfaces=(*LOOP_SURFACES, "flap"),
         declared=Declared(noise=noise, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
 
-def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> DiagnosisRows:
+def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> LogRows:
     """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
     inputs = loop_detector_inputs(samples, model)
     detector.reset(loop_detector_context(model))
-    return diagnosis_rows_from_verdicts([detector.step(*frame) for frame in inputs], samples, model)
+    return rows_of_verdicts([detector.step(*frame) for frame in inputs], samples, model)
 
 
-def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
+def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n, members = len(verdicts), group_indices(model)
-    faulty = np.array([_is_statistic_high_or_detected(verdict) for verdict in verdicts], dtype=np.int64)
+    faulty = np.array([_is_alarm(verdict) for verdict in verdicts], dtype=np.int64)
     e, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACE_BY_GROUP_INDEX[: len(members)]:
+        if verdicts[k].isolated not in LOOP_SURFACES[: len(members)]:
             names[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
-        g = LOOP_SURFACE_BY_GROUP_INDEX.index(str(verdicts[k].isolated))
-        names[k], low[k, members[g]] = (
-            "+".join(model.groups[g]),
-            0.0,
-        )
-        e[k, members[g]] = _remaining_effectiveness(
-            verdicts[k], g
-        )
+        g = LOOP_SURFACES.index(str(verdicts[k].isolated))
+        names[k], low[k, members[g]] = ("+".join(model.groups[g]), 0.0)
+        e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     p = np.where(np.isfinite(p), p, faulty)
-    return _rows_with_default_bounds(
-        samples,
-        names,
-        e,
-        low=low,
-        high=np.ones_like(low),
-        probability=p,
-    )
+    return _plain_rows(samples, names, e, low=low, high=np.ones_like(low), probability=p)
 
 
-def _is_statistic_high_or_detected(verdict: Verdict) -> bool:
+def _is_alarm(verdict: Verdict) -> bool:
     """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
     return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
 
@@ -337,10 +239,10 @@ def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
     return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0
 
 
-_FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], DiagnosisRows]] = {
-    BANK_OF_FILTERS_DETECTOR: diagnose,
-    "sliding-least-squares": partial(_diagnose_by_least_squares, fades=False),
-    "forgetting-least-squares": partial(_diagnose_by_least_squares, fades=True),
+_FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {
+    OUR_DETECTOR: diagnose,
+    "sliding-least-squares": partial(_least_squares, fades=False),
+    "forgetting-least-squares": partial(_least_squares, fades=True),
 }
 
 
@@ -356,18 +258,14 @@ def check_detector_name(name: str) -> None:
         raise BadInput(f"--detector {name}: is not known{suggestion(name, known)}")
 
 
-def diagnose_with_detector(name: str, samples: Samples, model: Model) -> DiagnosisRows:
+def diagnose_with_detector(name: str, samples: Samples, model: Model) -> LogRows:
     """The rows of one detector. Raises BadInput for an unknown name, or a log at another rate."""
     check_detector_name(name)
     check_log_fits_model(samples, model)
-    if name == BANK_OF_FILTERS_DETECTOR:
+    if name == OUR_DETECTOR:
         return diagnose(samples, model)
     known = without_dead_rows(samples, model)
     if name in _FLIGHT_DETECTORS:
-        return finalize_rows_at_log_stamps(
-            samples, model, _FLIGHT_DETECTORS[name](known, model)
-        )
+        return finish_rows(samples, model, _FLIGHT_DETECTORS[name](known, model))
     detector: Detector = made(DETECTORS, name)
-    return finalize_rows_at_log_stamps(
-        samples, model, run_loop_detector(detector, known, model)
-    )
+    return finish_rows(samples, model, run_loop_detector(detector, known, model))

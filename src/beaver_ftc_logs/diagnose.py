@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
-from beaver_ftc_logs.filtering import (
-    fault_evidence,
-    bank_posterior,
-    page_cusum,
-)
+from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import expand_groups, unexplained_rates
@@ -25,25 +21,25 @@ from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
-_MIN_FAULT_PROBABILITY_SHARE_FOR_NAME = 0.5
-_MAX_WRONG_EXCLUSION_PROBABILITY = 0.001
+_NAME_SHARE = 0.5
+_EXCLUSION_RISK = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
-_RESIDUAL_DIRECTION_WINDOW_S = 1.0
-_MIN_COMMAND_MOTION_TRAVEL_SHARE = 1e-6
+_DIRECTION_WINDOW_S = 1.0
+_COMMAND_ROUNDING = 1e-6
 """Share of travel that a command moves by rounding alone."""
-_MAX_NO_RESPONSE_PROBABILITY = 0.5
+_NO_RESPONSE_LIMIT = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
 @dataclass(frozen=True)
-class DiagnosisRows:
+class LogRows:
     """The diagnosis of a flight, one row for each sample.
 
     t_s (n,). faulty (n,): 0 or 1. isolated_surfaces (n,): names joined by +, empty without an alarm.
     effectiveness of each surface, its bounds effectiveness_low and effectiveness_high (n, S).
     fault_probability (n,) of any surface. credible (n,): 0 or 1, by default 1. evidence_start_time_s (n,):
-    time at which the evidence for a fault began to increase, by default t_s. not_credible_rows_by_reason:
+    time at which the evidence for a fault began to increase, by default t_s. doubtful_rows:
     for each reason the rows (n,) that are not credible.
     """
 
@@ -56,7 +52,7 @@ class DiagnosisRows:
     fault_probability: Floats
     credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
-    not_credible_rows_by_reason: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    doubtful_rows: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.evidence_start_time_s) != len(self.t_s):
@@ -68,12 +64,12 @@ class DiagnosisRows:
         """Whether an alarm is raised in a credible row."""
         return bool(((self.faulty == 1) & (self.credible == 1)).any())
 
-    def are_healthy_where_credible_in(self, other: "DiagnosisRows") -> bool:
+    def clears_alarm(self, other: "LogRows") -> bool:
         """Whether there is no alarm in these rows, and each credible row of `other`, of the same log with
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
-    def with_uninformative_estimate(self, removed: NDArray[np.bool_]) -> "DiagnosisRows":
+    def without_estimate(self, removed: NDArray[np.bool_]) -> "LogRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where removed (n,) or (n, S) is true."""
         mask = removed if removed.ndim == 2 else removed[:, None]
         return replace(
@@ -83,7 +79,7 @@ class DiagnosisRows:
             effectiveness_high=np.where(mask, 1.0, self.effectiveness_high),
         )
 
-    def without_alarm(self, removed: NDArray[np.bool_]) -> "DiagnosisRows":
+    def without_alarm(self, removed: NDArray[np.bool_]) -> "LogRows":
         """The rows without alarm and name where removed (n,) is true."""
         return replace(
             self,
@@ -92,17 +88,17 @@ class DiagnosisRows:
             fault_probability=np.where(removed, 0.0, self.fault_probability),
         )
 
-    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "DiagnosisRows":
+    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true."""
         removed = np.zeros(len(self.t_s), dtype=bool)
         for mask in reasons.values():
             removed |= mask
-        rows = self.with_uninformative_estimate(removed).without_alarm(removed)
-        return replace(rows, credible=np.where(removed, 0, 1), not_credible_rows_by_reason=reasons)
+        rows = self.without_estimate(removed).without_alarm(removed)
+        return replace(rows, credible=np.where(removed, 0, 1), doubtful_rows=reasons)
 
 
-def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
+def diagnose(samples: Samples, model: Model) -> LogRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate, columns or units are not the
     model's."""
     check_log_fits_model(samples, model)
@@ -111,7 +107,7 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
         for group in trust.find_reversed(samples, model):
             signs = [-1.0 if surface in group else 1.0 for surface in model.vehicle.surfaces]
             corrected = _diagnose_checked_log(replace(samples, commands=samples.commands * signs), model)
-            if corrected.are_healthy_where_credible_in(rows):
+            if corrected.clears_alarm(rows):
                 raise reversed_command_error(samples.name, "+".join(group), "in the flights of the model")
     return rows
 
@@ -125,51 +121,36 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
     )
 
 
-def _diagnose_checked_log(samples: Samples, model: Model) -> DiagnosisRows:
+def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
     P, _, _ = bank_posterior(known, model, bank)
-    silent = P[:, bank.no_response_hypothesis_index] > _MAX_NO_RESPONSE_PROBABILITY
-    rows = diagnosis_rows_from_posterior(samples, model, bank, P)
+    silent = P[:, bank.no_response_hypothesis_index] > _NO_RESPONSE_LIMIT
+    rows = rows_of_posterior(samples, model, bank, P)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
-        rows = _withdraw_contradicted_isolation(
-            known, model, rows, model.settings.alarm_threshold
-        )
-    return finalize_rows_at_log_stamps(samples, model, rows, silent)
+        rows = _withdraw_contradicted(known, model, rows, model.settings.alarm_threshold)
+    return finish_rows(samples, model, rows, silent)
 
 
-def finalize_rows_at_log_stamps(
-    samples: Samples,
-    model: Model,
-    rows: DiagnosisRows,
-    silent: NDArray[np.bool_] | None = None,
-) -> DiagnosisRows:
+def finish_rows(
+    samples: Samples, model: Model, rows: LogRows, silent: NDArray[np.bool_] | None = None
+) -> LogRows:
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
     reasons = trust.untrusted_rows(samples, model)
     if silent is not None and silent.any():
-        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
-            silent
-        )
+        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
     if not any(trust.known_effects(model)):
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _add_unknown_effect_surfaces_widening_bounds(
-        samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
-    )
+    rows = _add_unknown_surfaces(samples, model, _withdraw_by_engine(samples, model, rows))
     gain_known = np.array(trust.known_gains(model), dtype=float)[None]
-    unknown = np.broadcast_to(
-        expand_groups(gain_known, model) == 0.0, rows.effectiveness_low.shape
-    )
-    return _rows_at_log_stamps(
-        samples, rows.with_uninformative_estimate(unknown).without_verdict(reasons)
-    )
+    unknown = np.broadcast_to(expand_groups(gain_known, model) == 0.0, rows.effectiveness_low.shape)
+    return _at_log_stamps(samples, rows.without_estimate(unknown).without_verdict(reasons))
 
 
-def _add_unknown_effect_surfaces_widening_bounds(
-    samples: Samples, model: Model, rows: DiagnosisRows
-) -> DiagnosisRows:
+def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows whose name also has each surface of unknown effect that may be at fault in place of the isolated
     one. If a name has several surfaces, the bounds hold whichever of them is at fault.
 
@@ -177,26 +158,19 @@ def _add_unknown_effect_surfaces_widening_bounds(
     is not added. If surfaces can be stuck, any is added.
     """
     surfaces = list(model.vehicle.surfaces)
-    moved = (
-        np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0)
-        > _MIN_COMMAND_MOTION_TRAVEL_SHARE
-    )
+    moved = np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0) > _COMMAND_ROUNDING
     moved |= "stuck" in model.vehicle.faults
     unknown = trust.unknown_surfaces(model)
-    addable = moved & np.array(
-        [surface in unknown for surface in surfaces]
-    )
+    addable = moved & np.array([surface in unknown for surface in surfaces])
     names, high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
         named = set(str(names[k]).split("+"))
         if not named <= set(surfaces):
             continue
-        in_name = np.array(
-            [surface in named or bool(addable[k, i]) for i, surface in enumerate(surfaces)]
-        )
+        in_name = np.array([surface in named or bool(addable[k, i]) for i, surface in enumerate(surfaces)])
         names[k] = "+".join(compress(surfaces, in_name))
         if in_name.sum() > len(named) or (
-            model.settings.assumes_one_group_at_fault and not _are_in_one_group(named, model)
+            model.settings.one_faulty_group and not _are_in_one_group(named, model)
         ):
             high[k, in_name] = 1.0
     return replace(rows, isolated_surfaces=names, effectiveness_high=high)
@@ -207,33 +181,19 @@ def _are_in_one_group(named: set[str], model: Model) -> bool:
     return any(named <= set(group) for group in model.groups)
 
 
-def _withdraw_isolation_after_engine_failure(
-    samples: Samples, model: Model, rows: DiagnosisRows
-) -> DiagnosisRows:
+def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_mps = (
-        model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges is not None else None
-    )
+    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges is not None else None
     if unpowered_mps is None or samples.energy_height_rate_mps is None:
         return rows
     rate_mps = samples.energy_height_rate_mps
     named = energy.withdraw_surfaces(
-        rows.t_s,
-        rows.faulty,
-        rows.isolated_surfaces,
-        rate_mps,
-        unpowered_mps,
-        rows.evidence_start_time_s,
+        rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
-    return replace(
-        rows.with_uninformative_estimate(named != rows.isolated_surfaces),
-        isolated_surfaces=named,
-    )
+    return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
 
 
-def _withdraw_contradicted_isolation(
-    samples: Samples, model: Model, rows: DiagnosisRows, least: float
-) -> DiagnosisRows:
+def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
     """Rows with the name `unknown` where the residual of the last second lies along another group.
 
     A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
@@ -241,50 +201,33 @@ def _withdraw_contradicted_isolation(
     residual better by least, whatever the course of time along it. Not used in moving air,
     since gusts have directions too.
     """
-    r = standardized_healthy_residual(model, *unexplained_rates(samples, model))
-    _, _, F, R = model.intercept_past_response_noise()
-    m = np.linalg.solve(
-        np.linalg.cholesky(R), F.sum(axis=1).T
-    )
+    r = healthy_residual(model, *unexplained_rates(samples, model))
+    _, _, F, R = model.as_arrays()
+    m = np.linalg.solve(np.linalg.cholesky(R), F.sum(axis=1).T)
     norms = np.linalg.norm(m, axis=0)
     p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
     total = np.cumsum(p, axis=0)
-    begin = np.maximum(
-        np.arange(len(total)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
-    )
-    gain = (
-        0.5
-        * model.settings.effective_sample_share
-        * (total - total[begin])
-    )
+    begin = np.maximum(np.arange(len(total)) - round(_DIRECTION_WINDOW_S * model.rate_hz), 0)
+    gain = 0.5 * model.settings.effective_sample_share * (total - total[begin])
     best = gain.max(axis=1)
     wrong = np.zeros(len(r), dtype=bool)
     for g, group in enumerate(model.groups):
-        wrong |= _rows_isolating_any(rows.isolated_surfaces, set(group)) & (
-            best - gain[:, g] > least
-        )
+        wrong |= _names_any(rows.isolated_surfaces, set(group)) & (best - gain[:, g] > least)
     return replace(
-        rows.with_uninformative_estimate(wrong),
+        rows.without_estimate(wrong),
         isolated_surfaces=np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces),
     )
 
 
-def standardized_healthy_residual(
-    model: Model,
-    known: NDArray[np.bool_],
-    y: Floats,
-    F: Floats,
-) -> Floats:
+def healthy_residual(model: Model, known: NDArray[np.bool_], y: Floats, F: Floats) -> Floats:
     """Residual of a healthy vehicle by `unexplained_rates`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
-    c, _, _, R = model.intercept_past_response_noise()
-    r = np.where(
-        known[:, None], y - c - F.sum(axis=1), 0.0
-    )
+    c, _, _, R = model.as_arrays()
+    r = np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
     return np.asarray(r @ np.linalg.inv(np.linalg.cholesky(R)).T)
 
 
-def _rows_isolating_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
+def _names_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
     """Which rows (n,) name at least one of these surfaces."""
     return np.array([bool(surfaces & set(name.split("+"))) for name in named], dtype=bool)
 
@@ -301,61 +244,32 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
     trust.refuse_columns(samples, model)
 
 
-def diagnosis_rows_from_posterior(
-    samples: Samples, model: Model, bank: HypothesisBank, P: Floats
-) -> DiagnosisRows:
+def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: Floats) -> LogRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
     p_silent = P[:, bank.no_response_hypothesis_index]
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
-    P_live = (
-        P[:, : bank.no_response_hypothesis_index]
-        / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
-    )
+    P_live = P[:, : bank.no_response_hypothesis_index] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     calm = P[:, 0] + p_silent > 0.5
     mu = model.settings.alarm_threshold
     steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
-    alarmed = nameable = _has_held_long_enough(
-        p_fault >= model.settings.fault_probability_for_alarm, model
-    )
+    alarmed = nameable = _held_long_enough(p_fault >= model.settings.alarm_probability, model)
     if mu is not None:
-        mu_name = (
-            model.settings.isolation_to_alarm_evidence_ratio * mu
-        )
+        mu_name = model.settings.name_evidence_ratio * mu
         alarmed = (evidence >= mu) & ~calm
-        nameable = (
-            page_cusum(steps, mu_name) >= mu_name
-        ) & ~calm
+        nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latch_until_healthy(alarmed, calm).astype(np.int64)
-    start = np.maximum.accumulate(
-        np.where(evidence <= 0.0, np.arange(len(evidence)), 0)
-    )
-    per_group = [
-        _group_effectiveness_and_bounds(bank, P_live, g, model)
-        for g in range(len(model.groups))
-    ]
-    e, low, high = (
-        np.column_stack(column)
-        for column in zip(*per_group, strict=True)
-    )
-    silent = p_silent > _MAX_NO_RESPONSE_PROBABILITY
-    (
-        e[silent],
-        low[silent],
-        high[silent],
-    ) = 1.0, 0.0, 1.0
+    start = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
+    per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
+    e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
+    silent = p_silent > _NO_RESPONSE_LIMIT
+    (e[silent], low[silent], high[silent]) = 1.0, 0.0, 1.0
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
         high[faulty == 0] = 1.0
-    return DiagnosisRows(
+    return LogRows(
         t_s=samples.t_s,
         faulty=faulty,
-        isolated_surfaces=_surfaces_at_fault(
-            model,
-            bank,
-            P,
-            faulty,
-            _latch_until_healthy(nameable, calm),
-        ),
+        isolated_surfaces=_surfaces_at_fault(model, bank, P, faulty, _latch_until_healthy(nameable, calm)),
         effectiveness=expand_groups(e, model),
         effectiveness_low=expand_groups(low, model),
         effectiveness_high=expand_groups(high, model),
@@ -364,21 +278,14 @@ def diagnosis_rows_from_posterior(
     )
 
 
-def _group_effectiveness_and_bounds(
-    bank: HypothesisBank, P_live: Floats, g: int, model: Model
-) -> tuple[Floats, ...]:
+def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) -> tuple[Floats, ...]:
     """A group's effectiveness and its bounds, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
-    levels, p = _group_level_distribution(bank, P_live, g)
+    levels, p = _group_levels(bank, P_live, g)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
-        p = (
-            p
-            / _group_level_distribution(
-                bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g
-            )[1]
-        )
+        p = p / _group_levels(bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g)[1]
         p /= p.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, p, model.settings.credible_mass)
     if len(model.groups[g]) > 1:
@@ -386,30 +293,22 @@ def _group_effectiveness_and_bounds(
     return _median_level(levels, p), low, high
 
 
-def _has_held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
+def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     """Return the rows at which a holds holds and has held for long enough, (n,)."""
-    n = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
-    held = np.arange(len(holds)) - np.maximum.accumulate(
-        np.where(holds, -1, np.arange(len(holds)))
-    )
+    n = round(model.settings.confirmation_s * model.rate_hz)
+    held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
     return np.asarray(holds & (held > n))
 
 
-def _latch_until_healthy(
-    alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _latch_until_healthy(alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
     k = np.arange(len(alarmed))
     last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))
-    last_calm = np.maximum.accumulate(
-        np.where(calm & ~alarmed, k, -1)
-    )
+    last_calm = np.maximum.accumulate(np.where(calm & ~alarmed, k, -1))
     return np.asarray((last_alarm >= 0) & (last_alarm > last_calm))
 
 
-def _group_level_distribution(
-    bank: HypothesisBank, P_live: Floats, g: int
-) -> tuple[Floats, Floats]:
+def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
     levels, level_of = np.unique(
         bank.effectiveness[: bank.no_response_hypothesis_index, g], return_inverse=True
@@ -425,9 +324,7 @@ def _median_level(levels: Floats, p: Floats) -> Floats:
     return np.asarray(levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
 
 
-def _credible_bounds(
-    levels: Floats, p: Floats, mass: float
-) -> tuple[Floats, Floats]:
+def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
     """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
     order = np.argsort(-p, axis=1, kind="stable")
     ranked = np.take_along_axis(p, order, axis=1)
@@ -439,11 +336,7 @@ def _credible_bounds(
 
 
 def _surfaces_at_fault(
-    model: Model,
-    bank: HypothesisBank,
-    P: Floats,
-    faulty: NDArray[np.int64],
-    nameable: NDArray[np.bool_],
+    model: Model, bank: HypothesisBank, P: Floats, faulty: NDArray[np.int64], nameable: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
@@ -452,85 +345,52 @@ def _surfaces_at_fault(
     out.
     """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    columns = [
-        P[:, bank.is_fault_of_group(g)].sum(axis=1) / p_fault
-        for g in range(len(model.groups))
-    ]
+    columns = [P[:, bank.is_fault_of_group(g)].sum(axis=1) / p_fault for g in range(len(model.groups))]
     share = np.column_stack(columns)
-    likely = (
-        share > _MIN_FAULT_PROBABILITY_SHARE_FOR_NAME
-    ) & nameable[:, None]
-    if model.settings.assumes_one_group_at_fault:
+    likely = (share > _NAME_SHARE) & nameable[:, None]
+    if model.settings.one_faulty_group:
         is_loss = bank.hypothesis_kind == GROUP_LOSS
         p_loss = np.column_stack(
-            [
-                P[:, bank.is_fault_of_group(g) & is_loss].sum(axis=1)
-                for g in range(len(model.groups))
-            ]
+            [P[:, bank.is_fault_of_group(g) & is_loss].sum(axis=1) for g in range(len(model.groups))]
         )
-        likely = (
-            p_loss
-            > _MAX_WRONG_EXCLUSION_PROBABILITY * p_loss.max(axis=1, keepdims=True)
-        ) & nameable[:, None]
+        likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
         can_lose = p_loss.max(axis=0) > 0.0
-        likely &= ~(
-            likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1)
-        )[:, None]
-    names = join_flagged_names_by_row(likely, ["+".join(group) for group in model.groups])
+        likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
+    names = join_names(likely, ["+".join(group) for group in model.groups])
     named = np.full(len(P), "", dtype=object)
-    offset = (
-        P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
-    )
-    n_hold = round(model.settings.isolation_change_hold_s * model.rate_hz)
+    offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
+    n_hold = round(model.settings.rename_hold_s * model.rate_hz)
     n_same = 0
     for k in np.flatnonzero(faulty):
         new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
-        n_same = (
-            n_same + 1
-            if k and new == (names[k - 1] or UNKNOWN_SURFACE)
-            else 0
-        )
+        n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
         keeps = old and (
-            offset[k]
-            or (
-                old != UNKNOWN_SURFACE
-                and (
-                    n_same < n_hold
-                    or _would_name_all_named_before(new, old, model)
-                )
-            )
+            offset[k] or (old != UNKNOWN_SURFACE and (n_same < n_hold or _names_all_again(new, old, model)))
         )
         named[k] = old if keeps else new
     return named
 
 
-def _would_name_all_named_before(new: str, old: str, model: Model) -> bool:
+def _names_all_again(new: str, old: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.assumes_one_group_at_fault and (
+    return model.settings.one_faulty_group and (
         new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
     )
 
 
-def join_flagged_names_by_row(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+def join_names(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
     """The names that are flagged in flags (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 
 
-def _rows_at_log_stamps(samples: Samples, rows: DiagnosisRows) -> DiagnosisRows:
+def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     """The rows at the log's own stamps: each stamp has the last row up to it."""
     if len(samples.log_stamps_s) == len(rows.t_s) and np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
     last = np.maximum(np.searchsorted(rows.t_s, samples.log_stamps_s, side="right") - 1, 0)
-    names = [
-        name
-        for name in DiagnosisRows.__dataclass_fields__
-        if name not in ("t_s", "not_credible_rows_by_reason")
-    ]
-    reasons = {
-        reason: mask[last]
-        for reason, mask in rows.not_credible_rows_by_reason.items()
-    }
+    names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]
+    reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
     fields = {name: getattr(rows, name)[last] for name in names}
-    return DiagnosisRows(t_s=samples.log_stamps_s, not_credible_rows_by_reason=reasons, **fields)
+    return LogRows(t_s=samples.log_stamps_s, doubtful_rows=reasons, **fields)

@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.results import Document
 from beaver_ftc_logs import trust
 from beaver_ftc_logs.bank import HypothesisBank, build_bank
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
@@ -23,17 +23,17 @@ from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
-_MIN_COSINE_OF_PROPORTIONAL_EFFECTS = 0.9
+_ALIKE_COSINE = 0.9
 _MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
-_SURFACES_OF_ONE_GROUP_NOTE = (
+_ONE_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
     "together."
 )
 
 
-def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Document:
+def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
     """The document of verdict.json."""
     isolable = isolability_document(samples, model)
     return {
@@ -44,7 +44,7 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(rows.faulty.any()),
-        "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
+        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_sentences(model), *isolability_sentences(isolable)],
         "isolability": isolable,
@@ -53,25 +53,19 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
     }
 
 
-def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
+def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
     """Each time with one name and one effectiveness: when, what, how much is left.
 
     What lasts less than MAX_BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone
     is brief. This is hindsight, for the reader; the rows have none.
     """
     _, index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
-    columns = np.column_stack(
-        [index, rows.faulty, rows.faulty[:, None] * rows.effectiveness]
-    )
-    runs = _join_brief_and_alike_runs(rows, constant_stretches(columns))
-    return [
-        _fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]
-    ]
+    columns = np.column_stack([index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
+    runs = _join_runs(rows, constant_stretches(columns))
+    return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
-def _join_brief_and_alike_runs(
-    rows: DiagnosisRows, runs: list[tuple[int, int]]
-) -> list[tuple[int, int]]:
+def _join_runs(rows: LogRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
     joined: list[tuple[int, int]] = []
@@ -80,48 +74,36 @@ def _join_brief_and_alike_runs(
         joins = (
             _is_brief(rows, begin, end)
             or _is_brief_and_unnamed(rows, *before)
-            or _have_same_surfaces_and_effectiveness(rows, before[0], begin)
+            or _are_alike(rows, before[0], begin)
         )
-        if (
-            before[0] < begin
-            and rows.faulty[before[0]]
-            and rows.faulty[begin]
-            and joins
-        ):
+        if before[0] < begin and rows.faulty[before[0]] and rows.faulty[begin] and joins:
             joined[-1] = (before[0], end)
         else:
             joined.append((begin, end))
     return joined
 
 
-def _is_brief(rows: DiagnosisRows, begin: int, end: int) -> bool:
+def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
     return bool(rows.t_s[end - 1] - rows.t_s[begin] < MAX_BRIEF_EVENT_S)
 
 
-def _is_brief_and_unnamed(rows: DiagnosisRows, begin: int, end: int) -> bool:
+def _is_brief_and_unnamed(rows: LogRows, begin: int, end: int) -> bool:
     return rows.isolated_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
 
 
-def _have_same_surfaces_and_effectiveness(rows: DiagnosisRows, first: int, second: int) -> bool:
+def _are_alike(rows: LogRows, first: int, second: int) -> bool:
     return rows.isolated_surfaces[first] == rows.isolated_surfaces[second] and bool(
         (rows.effectiveness[first] == rows.effectiveness[second]).all()
     )
 
 
-def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list[str]) -> Document:
+def _fault_event_entry(rows: LogRows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event; name and effectiveness as they stood for most of it."""
     names, counts = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     main = str(names[counts.argmax()])
     shown = surfaces if main in (UNKNOWN_SURFACE, ENGINE) else main.split("+")
-    columns = {
-        "estimate": rows.effectiveness,
-        "low": rows.effectiveness_low,
-        "high": rows.effectiveness_high,
-    }
-    medians = {
-        key: np.median(values[begin:end], axis=0)
-        for key, values in columns.items()
-    }
+    columns = {"estimate": rows.effectiveness, "low": rows.effectiveness_low, "high": rows.effectiveness_high}
+    medians = {key: np.median(values[begin:end], axis=0) for key, values in columns.items()}
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
@@ -136,24 +118,17 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
     }
 
 
-def lasting_or_else_all_events(events: list[Document]) -> list[Document]:
+def events_to_show(events: list[Document]) -> list[Document]:
     """The events that are not brief; all of them where every one is."""
     return [event for event in events if not event["brief"]] or events
 
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    shown, n_events = lasting_or_else_all_events(verdict["events"]), len(verdict["events"])
-    summary = (
-        f"{len(shown)} event{'s' if len(shown) > 1 else ''}"
-        if shown
-        else _no_event_text(verdict)
-    )
-    lines = [
-        f"{verdict['flight']}: {summary} in {diagnosed_duration_text(verdict)}",
-        *map(_event_text, shown),
-    ]
-    lines += credibility_text_lines(verdict)
+    shown, n_events = events_to_show(verdict["events"]), len(verdict["events"])
+    summary = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
+    lines = [f"{verdict['flight']}: {summary} in {duration_text(verdict)}", *map(_event_text, shown)]
+    lines += credibility_lines(verdict)
     if brief_n := n_events - len(shown):
         lines.append(
             f"  and {brief_n} brief alarm{'s' if brief_n > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s"
@@ -172,21 +147,19 @@ def _no_event_text(verdict: Document) -> str:
     return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
 
 
-def credibility_text_lines(verdict: Document) -> list[str]:
+def credibility_lines(verdict: Document) -> list[str]:
     """Return lines on the parts of a flight without a statement, and the reasons."""
     credible = verdict["credible"]
     if credible["share"] >= 1.0:
         return []
-    lines = [
-        f"  {reason['says']}: {reason['share']:.1%} of the rows" for reason in credible["reasons"]
-    ]
+    lines = [f"  {reason['says']}: {reason['share']:.1%} of the rows" for reason in credible["reasons"]]
     return [
         f"  credible in {credible['share']:.1%} of the rows; in the others nothing is said, because",
         *lines,
     ]
 
 
-def diagnosed_duration_text(verdict: Document) -> str:
+def duration_text(verdict: Document) -> str:
     """How much flight was diagnosed, in words: a gap in the log is no flight."""
     if not (n_gaps := verdict["gaps"]):
         return f"{verdict['duration_s']:.0f} s"
@@ -195,132 +168,87 @@ def diagnosed_duration_text(verdict: Document) -> str:
 
 def _event_text(event: Document) -> str:
     text = ", ".join(
-        f"{name} {bounds['estimate']:.2f} "
-        f"({bounds['low']:.2f} to {bounds['high']:.2f})"
+        f"{name} {bounds['estimate']:.2f} ({bounds['low']:.2f} to {bounds['high']:.2f})"
         for name, bounds in event["effectiveness"].items()
     )
     brief = "  (brief)" if event["brief"] else ""
-    return (
-        f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  "
-        f"effectiveness {text}{brief}"
-    )
+    return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {text}{brief}"
 
 
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_bank(model)
-    F = _standardized_group_responses(samples, model)
+    F = _white_responses(samples, model)
     return {
         "together": [
-            {"surfaces": group, "says": _SURFACES_OF_ONE_GROUP_NOTE.format(", ".join(group))}
+            {"surfaces": group, "says": _ONE_GROUP_NOTE.format(", ".join(group))}
             for group in model.groups
             if len(group) > 1
         ],
         "groups": [
-            {
-                "surfaces": group,
-                **_group_isolability_entry(
-                    F, g, model, bank, samples.dt_s
-                ),
-            }
+            {"surfaces": group, **_group_entry(F, g, model, bank, samples.dt_s)}
             for g, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosine_entries(F, model),
-        "columns_held_s": {
-            name: round(age_s, 4) for name, age_s in samples.mean_age_s_by_held_column.items()
-        },
+        "alike": _alike_pairs(F, model),
+        "columns_held_s": {name: round(age_s, 4) for name, age_s in samples.held_age_s.items()},
     }
 
 
-def _standardized_group_responses(samples: Samples, model: Model) -> Floats:
+def _white_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     known, _, F = unexplained_rates(samples, model)
     F = F[known]
     R = np.array(model.residual_covariance)
-    white = np.linalg.solve(
-        np.linalg.cholesky(R), F.reshape(-1, 3).T
-    ).T
-    return np.asarray(
-        white.reshape(F.shape)
-        * np.sqrt(model.settings.effective_sample_share)
-    )
+    white = np.linalg.solve(np.linalg.cholesky(R), F.reshape(-1, 3).T).T
+    return np.asarray(white.reshape(F.shape) * np.sqrt(model.settings.effective_sample_share))
 
 
-def _group_isolability_entry(
-    F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float
-) -> dict[str, Any]:
+def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
-    odds = _log_odds_needed_for_alarm(model, bank, g, dt_s)
+    odds = _alarm_odds(model, bank, g, dt_s)
     if not len(F):
-        return {
-            "information_per_s": 0.0,
-            "smallest_loss": _smallest_detectable_losses(0.0, odds),
-        }
+        return {"information_per_s": 0.0, "smallest_loss": _smallest_losses(0.0, odds)}
     J = float((F[:, g] ** 2).sum(axis=1).mean()) / dt_s
-    J_own = (
-        _conditional_information_per_sample(F, g) / dt_s
-    )
+    J_own = _own_information(F, g) / dt_s
     return {
         "information_per_s": J,
         "information_per_s_of_its_motion": J_own,
-        "smallest_loss": _smallest_detectable_losses(J, odds),
-        "smallest_loss_by_motion_alone": _smallest_detectable_losses(
-            J_own, odds
-        ),
+        "smallest_loss": _smallest_losses(J, odds),
+        "smallest_loss_by_motion_alone": _smallest_losses(J_own, odds),
     }
 
 
-def _conditional_information_per_sample(F: Floats, g: int) -> float:
+def _own_information(F: Floats, g: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
     n, G, m = F.shape
     trim = np.tile(np.eye(m), (n, 1))
-    others = [
-        F[:, i].reshape(-1, 1)
-        for i in range(G)
-        if i != g
-    ]
+    others = [F[:, i].reshape(-1, 1) for i in range(G) if i != g]
     N = np.column_stack([trim, *others])
     f = F[:, g].reshape(-1)
-    r = (
-        f
-        - N @ np.linalg.lstsq(N, f, rcond=None)[0]
-    )
+    r = f - N @ np.linalg.lstsq(N, f, rcond=None)[0]
     return float(r @ r) / n
 
 
-def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
+def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
         return float("inf")
-    p = (
-        settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
-    )
-    return float(
-        np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
-        - np.log(p)
-    )
+    p = settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
+    return float(np.log(settings.alarm_probability / (1.0 - settings.alarm_probability)) - np.log(p))
 
 
-def _smallest_detectable_losses(
-    J: float, odds: float
-) -> dict[str, float | None]:
+def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
     """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {
-        f"{h_s:g}": J * h_s for h_s in DETECTION_HORIZONS_S
-    }
+    gathered = {f"{h_s:g}": J * h_s for h_s in DETECTION_HORIZONS_S}
     losses = {
-        horizon: np.sqrt(2.0 * odds / gain) if gain > 0.0 else np.inf
-        for horizon, gain in gathered.items()
+        horizon: np.sqrt(2.0 * odds / gain) if gain > 0.0 else np.inf for horizon, gain in gathered.items()
     }
-    return {
-        horizon: float(loss) if loss <= 1.0 else None
-        for horizon, loss in losses.items()
-    }
+    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in losses.items()}
 
 
-def _group_pair_cosine_entries(F: Floats, model: Model) -> list[dict[str, Any]]:
+def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
@@ -329,13 +257,7 @@ def _group_pair_cosine_entries(F: Floats, model: Model) -> list[dict[str, Any]]:
         norm = float(np.sqrt((f @ f) * (f_h @ f_h)))
         cosine = float(f @ f_h) / max(norm, MIN_DIVISOR)
         surfaces = [model.groups[g], model.groups[h]]
-        pairs.append(
-            {
-                "surfaces": surfaces,
-                "cosine": cosine,
-                "separable": abs(cosine) < _MIN_COSINE_OF_PROPORTIONAL_EFFECTS,
-            }
-        )
+        pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE_COSINE})
     return pairs
 
 
@@ -343,9 +265,7 @@ def isolability_sentences(isolable: dict[str, Any]) -> list[str]:
     """The statement in words."""
     lines = [entry["says"] for entry in isolable["together"]]
     for entry in isolable["groups"]:
-        lines.append(
-            f"{', '.join(entry['surfaces'])}: {_smallest_detectable_loss_text(entry['smallest_loss'])}"
-        )
+        lines.append(f"{', '.join(entry['surfaces'])}: {_smallest_loss_text(entry['smallest_loss'])}")
     for pair in isolable["alike"]:
         if not pair["separable"]:
             first, second = (" and ".join(names) for names in pair["surfaces"])
@@ -356,7 +276,7 @@ def isolability_sentences(isolable: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _smallest_detectable_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
+def _smallest_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
     loss_texts = [
         f"{loss:.0%} within {horizon} s"
         for horizon, loss in smallest_loss_by_horizon.items()

@@ -17,47 +17,30 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 
 
-def residual_predictor_by_yule_walker(
-    model: Model, Q: Floats, s: float, L: int
-) -> tuple[Floats, Floats]:
+def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Floats, Floats]:
     """Coefficients (3 L, 3), latest lag first, that predict the residual from earlier ones, and the
     covariance (3, 3) of the rest. Q: Q (3, 3), (rad/s)2; s: standard
     deviation of a gyro."""
-    R = _residual_autocovariance(model, Q, s, L)
+    R = _autocovariance(model, Q, s, L)
     lags = np.arange(L)
-    blocks = np.array(
-        [
-            [_autocovariance_at_lag(R, int(j - i)) for j in lags]
-            for i in lags
-        ]
-    )
+    blocks = np.array([[_at_lag(R, int(j - i)) for j in lags] for i in lags])
     P = blocks.transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
-    S = np.concatenate(
-        [_autocovariance_at_lag(R, -int(i) - 1) for i in lags]
-    )
+    S = np.concatenate([_at_lag(R, -int(i) - 1) for i in lags])
     B = np.linalg.solve(P, S)
-    return np.asarray(B), np.asarray(
-        R[0] - S.T @ B
-    )
+    return np.asarray(B), np.asarray(R[0] - S.T @ B)
 
 
-def _residual_autocovariance(
-    model: Model, Q: Floats, s: float, L: int
-) -> NDArray[np.float64]:
+def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> NDArray[np.float64]:
     """E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3)."""
-    A = np.array(model.past_coefficients)[
-        : 3 * model.n_rate_lags
-    ].reshape(model.n_rate_lags, 3, 3)
+    A = np.array(model.past_coefficients)[: 3 * model.n_rate_lags].reshape(model.n_rate_lags, 3, 3)
     M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])
     R = np.zeros((max(L, model.n_rate_lags) + 1, 3, 3))
     for t in range(len(M)):
-        R[t] = s**2 * np.einsum(
-            "jab,jcb->ac", M[t:], M[: len(M) - t]
-        )
+        R[t] = s**2 * np.einsum("jab,jcb->ac", M[t:], M[: len(M) - t])
     R[0] += Q
     return R[: L + 1]
 
 
-def _autocovariance_at_lag(R: Floats, t: int) -> Floats:
+def _at_lag(R: Floats, t: int) -> Floats:
     """E w[k] w[k-lag]' at any lag."""
     return np.asarray(R[t] if t >= 0 else R[-t].T)

@@ -19,12 +19,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
-from beaver_ftc_logs.readers import (
-    NAMES_OF_READERS_OF_WANTED_COLUMNS,
-    check_exists,
-    read_flight,
-    reader_name_for_path,
-)
+from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.recording import Floats, Parameters
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
@@ -49,7 +44,7 @@ _ARDUPILOT_SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, 
 the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it."""
 _FLAPERONS = ("left_flaperon", "right_flaperon")
 _ARDUPILOT_AXIS_COLUMNS, _ARDUPILOT_FULL_COMMAND = ("AETR.Ail", "AETR.Elev", "AETR.Rudd"), 4500.0
-_ARDUPILOT_MESSAGE_BY_LAST_CHANNEL = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
+_ARDUPILOT_MESSAGES = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
 
 _PX4_SURFACES = {
     1: "left_aileron", 2: "right_aileron", 3: "elevator", 4: "rudder", 5: "left_elevon", 6: "right_elevon",
@@ -58,7 +53,7 @@ _PX4_SURFACES = {
 """CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis."""
 _PX4_OUTPUT_PATTERN = r"(PWM_MAIN|PWM_AUX)_FUNC(\d{1,2})"
 _MAX_TORQUE = 1000.0
-_PX4_MAX_SURFACES, _PX4_FIRST_SERVO_FUNCTION, _PX4_FIXED_WING = 8, 201, 1
+_PX4_MAX_SURFACES, _PX4_FIRST_SERVO, _PX4_FIXED_WING = 8, 201, 1
 _PX4_AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
 _ASSUMED_MIN_US, _ASSUMED_MAX_US = 1100.0, 1900.0
@@ -128,17 +123,17 @@ class _Axes:
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing that the params of a log say, with commands out of these columns. Without surfaces where
     they say none, or their commands are not in the log."""
-    if reader not in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+    if reader not in SELECTIVE_READERS:
         return Mixing()
     mixing_by = _ardupilot_mixing if reader == "ardupilot" else _px4_mixing
-    mixing = mixing_by(_ParametersOfLog(params), set(column_names))
+    mixing = mixing_by(_Parameters(params), set(column_names))
     if not mixing.surfaces:
         mixing.lines.append("the parameters of the log give no mixing: it stays out")
     return mixing
 
 
 @dataclass
-class _ParametersOfLog:
+class _Parameters:
     """Access to the parameters of a log that says what is wrong with one."""
 
     values_by_name: Parameters
@@ -170,7 +165,7 @@ class _ParametersOfLog:
         return sorted(int(match[1]) for match in matches if match)
 
 
-def _ardupilot_mixing(params: _ParametersOfLog, column_names: set[str]) -> Mixing:
+def _ardupilot_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
     mixing = Mixing()
     surfaces = _ardupilot_surfaces(params, mixing.lines)
     columns = [_ardupilot_channel_column(surface.number) for surface in surfaces]
@@ -181,7 +176,7 @@ def _ardupilot_mixing(params: _ParametersOfLog, column_names: set[str]) -> Mixin
     return mixing
 
 
-def _ardupilot_surfaces(params: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
+def _ardupilot_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
     """The surfaces by SERVOn_FUNCTION. lines: receives what stays out."""
     channels = params.numbers_in_names(r"SERVO(\d{1,2})_FUNCTION")
     if not channels:
@@ -218,7 +213,7 @@ def _ardupilot_surfaces(params: _ParametersOfLog, lines: list[str]) -> list[_Sur
 
 
 def _ardupilot_mixers(
-    params: _ParametersOfLog, functions: Collection[int], lines: list[str]
+    params: _Parameters, functions: Collection[int], lines: list[str]
 ) -> tuple[Floats | None, str]:
     """The factors of the mixers on aileron, elevator and rudder, None where they are not known, and the
     params that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
@@ -236,13 +231,11 @@ def _ardupilot_mixers(
 
 
 def _ardupilot_channel_column(channel: int) -> str:
-    message = next(
-        (text for last, text in _ARDUPILOT_MESSAGE_BY_LAST_CHANNEL.items() if channel <= last), "RCO?"
-    )
+    message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if channel <= last), "RCO?")
     return f"{message}.C{channel}"
 
 
-def _ardupilot_channel_reading(params: _ParametersOfLog, channel: int) -> Reading:
+def _ardupilot_channel_reading(params: _Parameters, channel: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range."""
     prefix = f"SERVO{channel}"
     try:
@@ -271,7 +264,7 @@ def _assumed_reading(problem: _BadParameter) -> Reading:
     return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
 
 
-def _px4_mixing(params: _ParametersOfLog, column_names: set[str]) -> Mixing:
+def _px4_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
     mixing = Mixing()
     surfaces = _px4_surfaces(params, mixing.lines)
     outputs = [_px4_servos(surfaces)]
@@ -285,7 +278,7 @@ def _px4_mixing(params: _ParametersOfLog, column_names: set[str]) -> Mixing:
     return mixing
 
 
-def _px4_surfaces(params: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
+def _px4_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
     """The surfaces by CA_SV_CSn_TYPE, their shares by the torques. lines: receives what stays out."""
     try:
         n = params.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)
@@ -313,7 +306,7 @@ def _px4_surfaces(params: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
             lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
             continue
         full = name if used_kinds.count(kind) == 1 else f"{name}_{i}"
-        outputs = "".join(f", {output} {_PX4_FIRST_SERVO_FUNCTION + i}"
+        outputs = "".join(f", {output} {_PX4_FIRST_SERVO + i}"
                                for output in _px4_output_parameters(params, i))  # fmt: skip
         reason = f"CA_SV_CS{i}_TYPE {kind}{outputs}"
         surfaces.append(_Surface(full, f"surface {i}", i, i, shares, reason))
@@ -321,7 +314,7 @@ def _px4_surfaces(params: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
 
 
 def _px4_axis_shares(
-    params: _ParametersOfLog, indices: Collection[int], lines: list[str]
+    params: _Parameters, indices: Collection[int], lines: list[str]
 ) -> dict[int, Floats | None]:
     """The share of each torque command in each surface: the pseudo-inverse of the torques of all surfaces
     [PX4, ControlAllocationPseudoInverse]. None of any where a torque is not known."""
@@ -339,12 +332,12 @@ def _px4_axis_shares(
     return dict(zip(indices, np.where(np.abs(shares) < _LEAST_WEIGHT, 0.0, shares), strict=True))
 
 
-def _px4_output_parameters(params: _ParametersOfLog, index: int) -> list[str]:
+def _px4_output_parameters(params: _Parameters, index: int) -> list[str]:
     """The params that give an output to a surface: PWM_MAIN_FUNC3."""
     return [
         name
         for name, values in params.values_by_name.items()
-        if re.fullmatch(_PX4_OUTPUT_PATTERN, name) and values[-1] == _PX4_FIRST_SERVO_FUNCTION + index
+        if re.fullmatch(_PX4_OUTPUT_PATTERN, name) and values[-1] == _PX4_FIRST_SERVO + index
     ]
 
 
@@ -353,7 +346,7 @@ def _px4_servos(surfaces: Sequence[_Surface]) -> _Outputs:
     return _Outputs(columns, [(1.0, 0.0, "")] * len(surfaces))
 
 
-def _px4_pulses(params: _ParametersOfLog, surfaces: Sequence[_Surface]) -> list[_Outputs]:
+def _px4_pulses(params: _Parameters, surfaces: Sequence[_Surface]) -> list[_Outputs]:
     """The pulses of each surface's first output; none where one has none, or where there are two drivers."""
     names = [_px4_output_parameters(params, surface.number)[:1] for surface in surfaces]
     matches = [re.fullmatch(_PX4_OUTPUT_PATTERN, name) for one in names for name in one]
@@ -364,7 +357,7 @@ def _px4_pulses(params: _ParametersOfLog, surfaces: Sequence[_Surface]) -> list[
     return [_Outputs([f"actuator_outputs.output[{number - 1}]" for _, number in outputs], readings)]
 
 
-def _px4_output_reading(params: _ParametersOfLog, driver: str, number: int) -> Reading:
+def _px4_output_reading(params: _Parameters, driver: str, number: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text [PX4, mixer_module.cpp]."""
     try:
         low, high = (
@@ -535,7 +528,7 @@ def _missing_keys_of_log(
     """The keys that a vehicle file leaves out, by a log's parameters; none in a format without parameters."""
     check_exists(log)
     used_reader = reader or data.get("reader") or reader_name_for_path(log)
-    if used_reader not in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+    if used_reader not in SELECTIVE_READERS:
         return {}, []
     recording = read_flight(log, used_reader, columns=())
     own = _columns_in_file(data)
@@ -545,9 +538,7 @@ def _missing_keys_of_log(
         raise BadInput(f"{log}: {'; '.join(mixing.lines)}, allowed: {' and '.join(missing)} in the file")
     keys = {"commands": mixing.commands, "surfaces": mixing.surfaces}
     if own is not None and "commands" in missing:
-        keys["commands"] = [
-            mixing.entry_by_column.get(column, column) for column in sorted(own)
-        ]
+        keys["commands"] = [mixing.entry_by_column.get(column, column) for column in sorted(own)]
     return {key: keys[key] for key in missing}, mixing.lines
 
 

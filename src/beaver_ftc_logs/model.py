@@ -17,7 +17,7 @@ from beaver_ftc_logs.vehicle import Vehicle
 
 _MAX_FILE_BYTES = 20_000_000
 
-_MAX_COEFFICIENT = 1e6  # of any coefficient: those of logs are below 100
+_MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
 _KEYS_WITHOUT_EFFECT = (
@@ -27,9 +27,9 @@ _KEYS_WITHOUT_EFFECT = (
     "column_sd",
 )  # of `fitted`, in files of release 1.0.0
 
-Coefficient = Annotated[Number, Field(ge=-_MAX_COEFFICIENT, le=_MAX_COEFFICIENT)]
-CoefficientRow = list[Coefficient]
-CoefficientMatrix = list[CoefficientRow]
+Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
+CoefRow = list[Coefficient]
+CoefRows = list[CoefRow]
 ShareBelowOne = Annotated[Number, Field(ge=0, lt=1)]
 
 
@@ -39,32 +39,28 @@ class FilterSettings(Section):
     effectiveness_changes_per_hour: Number = Field(
         12.0,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="how often a surface changes its effectiveness",
         alias="changes_per_hour",
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = (
-        Field(
-            default={},
-            description="likelier levels of effectiveness, by group",
-            alias="levels",
-        )
+    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field(
+        default={}, description="likelier levels of effectiveness, by group", alias="levels"
     )
-    share_of_faults_at_likely_levels: Number = Field(
+    likely_share: Number = Field(
         0.9, ge=0, le=1, description="share of faults at the likelier levels", alias="level_share"
     )
     trim_sd: Number = Field(
-        0.5, gt=0, le=_MAX_COEFFICIENT, description="free spread of the trim between flights, in residual sd"
+        0.5, gt=0, le=_MAX_COEF, description="free spread of the trim between flights, in residual sd"
     )
     trim_command_shift_sd: Number = Field(
         0.0,
         ge=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="spread of the trim as a shift of each group's command",
         alias="trim_shift",
     )
-    trim_walk_sd_per_sample: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+    trim_step_sd: list[Annotated[Number, Field(ge=0, le=_MAX_COEF)]] = Field(
         [3e-4] * 3,
         min_length=3,
         max_length=3,
@@ -75,17 +71,17 @@ class FilterSettings(Section):
     gain_return_time_s: Number = Field(
         5e4,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="in which the control gain returns to the model's, s",
         alias="gain_time_s",
     )
-    group_gain_offset_sd: Number = Field(
+    own_gain_spread: Number = Field(
         0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
     )
     own_gain_return_s: Number = Field(
         2000.0,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="in which that returns to the common gain, s",
         alias="own_gain_time_s",
     )
@@ -96,21 +92,13 @@ class FilterSettings(Section):
         description="error of responses quicker than the fitted flights have, as a share of them",
         alias="quick_error",
     )
-    max_trim_deviation_in_sd: Number = Field(
-        4.0,
-        gt=0,
-        le=_MAX_COEFFICIENT,
-        description="farthest the trim is adapted, in its spread",
-        alias="trim_bound",
+    max_trim_sd: Number = Field(
+        4.0, gt=0, le=_MAX_COEF, description="farthest the trim is adapted, in its spread", alias="trim_bound"
     )
-    max_gain_deviation_in_sd: Number = Field(
-        3.0,
-        gt=0,
-        le=_MAX_COEFFICIENT,
-        description="farthest the gain is adapted, in its spread",
-        alias="gain_bound",
+    max_gain_sd: Number = Field(
+        3.0, gt=0, le=_MAX_COEF, description="farthest the gain is adapted, in its spread", alias="gain_bound"
     )
-    command_delays_s: CoefficientRow = Field(
+    command_delays_s: CoefRow = Field(
         [0.0],
         min_length=1,
         max_length=9,
@@ -120,7 +108,7 @@ class FilterSettings(Section):
     jam_rate_offset_sd: Number = Field(
         2.0,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="offset of the rates a sample by a stuck surface, in sd",
         alias="jam_sd",
     )
@@ -130,52 +118,48 @@ class FilterSettings(Section):
     t_degrees_of_freedom: Number = Field(
         8.0,
         gt=2,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="degrees of freedom of the residual's t distribution",
         alias="tail",
     )
     noise_scale_memory_s: Number = Field(
         60.0,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="memory of the running scale of the residual, s",
         alias="noise_memory_s",
     )
-    fault_probability_for_alarm: Number = Field(
+    alarm_probability: Number = Field(
         0.5, gt=0, lt=1, description="probability of a fault that raises the alarm", alias="alarm"
     )
-    alarm_confirmation_time_s: Number = Field(
-        0.0,
-        ge=0,
-        le=_MAX_COEFFICIENT,
-        description="for how long the probability must stand, s",
-        alias="hold_s",
+    confirmation_s: Number = Field(
+        0.0, ge=0, le=_MAX_COEF, description="for how long the probability must stand, s", alias="hold_s"
     )
     false_alarms_per_hour: Number | None = Field(
-        None, gt=0, le=_MAX_COEFFICIENT, description="the rate that was asked for"
+        None, gt=0, le=_MAX_COEF, description="the rate that was asked for"
     )
     alarm_threshold: Number | None = Field(
         None,
         gt=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="evidence for a fault that raises the alarm, instead of both: for that rate",
         alias="threshold",
     )
-    isolation_to_alarm_evidence_ratio: Number = Field(
+    name_evidence_ratio: Number = Field(
         1.0,
         ge=1,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="evidence for a name, over that for an alarm",
         alias="name_evidence",
     )
-    isolation_change_hold_s: Number = Field(
+    rename_hold_s: Number = Field(
         0.0,
         ge=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="for how long another name stands before it counts, s",
         alias="rename_s",
     )
-    assumes_one_group_at_fault: bool = Field(
+    one_faulty_group: bool = Field(
         False,
         description="whether one group alone is at fault: a name has every group that is not excluded",
         alias="one_group",
@@ -192,24 +176,22 @@ class FittedRanges(Section):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible."""
 
-    command_ranges: CoefficientMatrix = Field(
+    command_ranges: CoefRows = Field(
         description="least and largest command of each surface, share of travel", alias="commands"
     )
-    rate_ranges_rad_s: CoefficientMatrix = Field(
-        description="least and largest p, q and r, rad/s", alias="rates"
-    )
-    airspeed_range_mps: CoefficientRow | None = Field(
+    rate_ranges_rad_s: CoefRows = Field(description="least and largest p, q and r, rad/s", alias="rates")
+    airspeed_range_mps: CoefRow | None = Field(
         default=None, description="least and largest airspeed, m/s", alias="airspeed"
     )
-    rate_sd_rad_s: CoefficientRow = Field(
+    rate_sd_rad_s: CoefRow = Field(
         default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    tied_shares: CoefficientRow = Field(
+    tied_shares: CoefRow = Field(
         default=[],
         description="share of each group's effect that past, signals and other groups make up",
         alias="tied",
     )
-    group_gain_sd: CoefficientRow = Field(
+    group_gain_sd: CoefRow = Field(
         default=[], description="standard error of each group's gain", alias="gain_sd"
     )
     longest_still_s: dict[str, Number] = Field(
@@ -218,15 +200,13 @@ class FittedRanges(Section):
     misread_gain: Number = Field(
         0.0,
         ge=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="how much likelier at most a sample of a part not fitted was with its columns read "
         "wrongly, in natural logarithms",
         alias="misread",
     )
     unpowered_climb_mps: Number | None = Field(
-        default=None,
-        description="rate of the energy height as without power, m/s",
-        alias="energy_climb",
+        default=None, description="rate of the energy height as without power, m/s", alias="energy_climb"
     )
     alarm_peak_tail: PeakTail | None = Field(
         default=None, description="highest alarm statistic on parts not fitted", alias="tail"
@@ -244,16 +224,16 @@ class FittedRanges(Section):
 class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained."""
 
-    ma_coefficients: CoefficientRow = Field(
+    ma_coefficients: CoefRow = Field(
         min_length=1,
         max_length=1000,
         description="1, c1, ...: its moving average, newest first",
         alias="average",
     )
-    residual_covariance: CoefficientMatrix = Field(
+    residual_covariance: CoefRows = Field(
         description="covariance of the residual whitened by that, (3, 3), (rad/s)2", alias="noise"
     )
-    ar_coefficients: CoefficientMatrix = Field(
+    ar_coefficients: CoefRows = Field(
         default=[],
         description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
         alias="before",
@@ -261,7 +241,7 @@ class NoiseModel(Section):
     covariance_inflation: Number = Field(
         1.0,
         ge=1,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="how many times as far, in squares, gains left out and other laws' differ",
         alias="wider",
     )
@@ -273,7 +253,7 @@ class NoiseModel(Section):
     usual_quick_power: Number | None = Field(
         default=None,
         ge=0,
-        le=_MAX_COEFFICIENT,
+        le=_MAX_COEF,
         description="power of the quick part of the responses, in variances of the noise, that the fitted "
         "flights exceed in a tenth of their samples",
         alias="quick",
@@ -290,55 +270,46 @@ class Model(Section):
     )
     n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
     n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
-    intercept: CoefficientRow = Field(min_length=3, max_length=3)
-    past_coefficients: CoefficientMatrix = Field(
-        description="(3 history + signal_regressor_names x signal lags, 3)", alias="past"
+    intercept: CoefRow = Field(min_length=3, max_length=3)
+    past_coefficients: CoefRows = Field(
+        description="(3 history + regressor_columns x signal lags, 3)", alias="past"
     )
-    command_response: list[CoefficientMatrix] = Field(
+    command_response: list[CoefRows] = Field(
         description="(groups, lags, 3), a share of command to rad/s a sample", alias="response"
     )
-    command_response_standard_error: list[CoefficientMatrix] = Field(
+    response_error: list[CoefRows] = Field(
         description="standard errors of `response`, colour included", alias="response_sd"
     )
-    residual_covariance: CoefficientMatrix = Field(
+    residual_covariance: CoefRows = Field(
         description="covariance of the residual, (3, 3), (rad/s)2", alias="noise"
     )
     noise_models: list[NoiseModel] = Field(
-        default=[],
-        description="noises that flights were seen to have, for `moving_air`",
-        alias="colours",
+        default=[], description="noises that flights were seen to have, for `moving_air`", alias="colours"
     )
     settings: FilterSettings = FilterSettings()
     fitted_ranges: FittedRanges | None = Field(
-        default=None,
-        description="what it was fitted on; None: nothing is known",
-        alias="fitted",
+        default=None, description="what it was fitted on; None: nothing is known", alias="fitted"
     )
     identification_results: dict[str, object] = Field(
         default={}, description="what it was found from, and how well", alias="identified"
     )
 
     @model_validator(mode="after")
-    def _check_shapes_groups_and_covariances(self) -> "Model":
-        n_past = 3 * self.n_rate_lags + len(
-            self.vehicle.signal_regressor_names
-        ) * self.vehicle.n_signal_lags(self.n_rate_lags)
+    def _check_arrays(self) -> "Model":
+        n_past = 3 * self.n_rate_lags + len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(
+            self.n_rate_lags
+        )
         reason = (
             f"has {len(self.past_coefficients)} rows, "
             f"allowed: {n_past}, as `identify` writes them: identify it again"
         )
-        conflicts: list[Conflict] = [(("past",), reason)] * (
-            len(self.past_coefficients) != n_past
-        )
-        conflicts += [
-            *self._group_and_settings_mistakes(),
-            *self._shape_mistakes(len(self.past_coefficients)),
-        ]
+        conflicts: list[Conflict] = [(("past",), reason)] * (len(self.past_coefficients) != n_past)
+        conflicts += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
         refuse(conflicts)  # before any of it is computed with
-        refuse(self._covariance_and_standard_error_mistakes())
+        refuse(self._covariance_mistakes())
         return self
 
-    def _group_and_settings_mistakes(self) -> Iterator[Conflict]:
+    def _group_mistakes(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
         seen: set[str] = set()
         for i, group in enumerate(self.groups):
@@ -362,7 +333,7 @@ class Model(Section):
         expected: list[tuple[Location, object, tuple[int, ...]]] = [
             (("past",), self.past_coefficients, (n_past, 3)),
             (("response",), self.command_response, (G, self.n_command_lags, 3)),
-            (("response_sd",), self.command_response_standard_error, (G, self.n_command_lags, 3)),
+            (("response_sd",), self.response_error, (G, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
         ]
         for i, noise in enumerate(self.noise_models):
@@ -385,24 +356,17 @@ class Model(Section):
                 ("tied", ranges.tied_shares, (G,)),
                 ("gain_sd", ranges.group_gain_sd, (G,)),
             ]  # fmt: skip
-            expected += [
-                (("fitted", key), array, shape)
-                for key, array, shape in fitted
-                if array
-            ]
+            expected += [(("fitted", key), array, shape) for key, array, shape in fitted if array]
         for key_path, array, shape in expected:
             if not _has_shape(array, shape):
                 shape_text = " x ".join(map(str, shape))
                 yield key_path, f"has another shape, allowed: {shape_text} numbers"
 
-    def _covariance_and_standard_error_mistakes(self) -> Iterator[Conflict]:
+    def _covariance_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, CoefficientMatrix]] = [
-            (("noise",), self.residual_covariance)
-        ]
+        covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.residual_covariance)]
         covariances += [
-            (("colours", i, "noise"), noise.residual_covariance)
-            for i, noise in enumerate(self.noise_models)
+            (("colours", i, "noise"), noise.residual_covariance) for i, noise in enumerate(self.noise_models)
         ]
         for key_path, rows in covariances:
             R = np.array(rows)
@@ -416,7 +380,7 @@ class Model(Section):
                     "is singular or nearly so, allowed: a covariance, conditioned to "
                     f"{_MAX_CONDITION_NUMBER:g}",
                 )
-        if np.min(self.command_response_standard_error) < 0.0:
+        if np.min(self.response_error) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
         ranges = self.fitted_ranges
         if ranges is not None and any(
@@ -424,7 +388,7 @@ class Model(Section):
         ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def with_single_noise_model(self, noise: NoiseModel) -> "Model":
+    def with_single_noise(self, noise: NoiseModel) -> "Model":
         """The model with one of its noise models only."""
         return self.model_copy(update={"noise_models": [noise]})
 
@@ -434,39 +398,29 @@ class Model(Section):
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        if not self._noise_models_of(average):
+        if not self._noises_of(average):
             return self
-        R = self.inflation_of(
-            average
-        ) * self.covariance_of_noise_model(average)
+        R = self.inflation_of(average) * self.covariance_of_noise(average)
         return self.model_copy(update={"residual_covariance": R.tolist()})
 
-    def covariance_of_noise_model(self, average: Sequence[float]) -> Floats:
+    def covariance_of_noise(self, average: Sequence[float]) -> Floats:
         """Covariance (3, 3) of the noise fitted for flights of this moving average, (rad/s)2; that of all
         flights where none was fitted."""
-        noises = self._noise_models_of(average)
+        noises = self._noises_of(average)
         return np.array(noises[0].residual_covariance if noises else self.residual_covariance)
 
-    def _noise_models_of(self, average: Sequence[float]) -> list[NoiseModel]:
-        return [
-            noise
-            for noise in self.noise_models
-            if noise.ma_coefficients == list(average)
-        ]
+    def _noises_of(self, average: Sequence[float]) -> list[NoiseModel]:
+        return [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
 
     def inflation_of(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        noises = self._noise_models_of(average)
+        noises = self._noises_of(average)
         return float(noises[0].covariance_inflation) if noises else 1.0
 
     def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
-        errors = [
-            noise.misread_shares
-            for noise in self._noise_models_of(average)
-            if noise.misread_shares
-        ]
+        errors = [noise.misread_shares for noise in self._noises_of(average) if noise.misread_shares]
         return np.array(errors[0]) if errors else np.zeros(len(self.groups))
 
     def usual_quick_power(self, average: Sequence[float]) -> float:
@@ -474,14 +428,14 @@ class Model(Section):
         the noise; infinite where that is not known."""
         powers = [
             noise.usual_quick_power
-            for noise in self._noise_models_of(average)
+            for noise in self._noises_of(average)
             if noise.usual_quick_power is not None
         ]
         return powers[0] if powers else float("inf")
 
     def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        noises = self._noise_models_of(average)
+        noises = self._noises_of(average)
         return np.reshape(np.array(noises[0].ar_coefficients if noises else []), (-1, 3, 3))
 
     def whitened_intercept(self, average: Sequence[float]) -> Floats:
@@ -489,7 +443,7 @@ class Model(Section):
         intercept = np.array(self.intercept)
         return np.asarray(intercept - intercept @ self.residual_ar_coefficients(average).sum(axis=0))
 
-    def intercept_past_response_noise(self) -> tuple[Floats, Floats, Floats, Floats]:
+    def as_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return (
             np.array(self.intercept),

@@ -14,8 +14,8 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import as_json, result_folder
 from beaver_ftc_logs import fitting
-from beaver_ftc_logs.diagnose import DiagnosisRows
-from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, diagnosed_duration_text, lasting_or_else_all_events
+from beaver_ftc_logs.diagnose import LogRows
+from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-_TARGET_PLOTTED_POINTS = 6000
-IDENTIFICATION_PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
-_PREDICTION_FIGURE_SPAN_S = 40.0
+_PLOTTED_POINTS = 6000
+PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
+_FIGURE_SPAN_S = 40.0
 _MAX_SHOWN_FLIGHTS = 3
 
 
@@ -44,12 +44,9 @@ def load_template(name: str) -> "Template":
     return loader.get_template(name)
 
 
-def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]) -> str:
+def render_diagnosis(samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
-    quiet = (
-        "The probability of a fault stayed below the alarm level of "
-        f"{model.settings.fault_probability_for_alarm}."
-    )
+    quiet = f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}."
     predicts = (
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands."
@@ -59,22 +56,18 @@ def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdic
 
 
 def _render_flight_page(
-    samples: Samples,
-    surfaces: Sequence[str],
-    rows: DiagnosisRows,
-    verdict: dict[str, Any],
-    words: dict[str, str],
+    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: dict[str, Any], words: dict[str, str]
 ) -> str:
     """A flight's page. wording: what its bounds are called, what is said without an event, and of the
     model."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
-        diagnosed_duration_text=diagnosed_duration_text(verdict),
-        events=lasting_or_else_all_events(verdict["events"]),
+        duration_text=duration_text(verdict),
+        events=events_to_show(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
         words=words,
         picture=_encode_png(flight_figure(samples, surfaces, rows, words["bounds"])),
-        ages=samples.mean_age_s_by_held_column,
+        ages=samples.held_age_s,
         notes=[*_log_notes(samples), words["predicts"]],
     )
 
@@ -85,13 +78,13 @@ def _log_notes(samples: Samples) -> list[str]:
     notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gaps} in the log."]
     notes += [
         f"{name} has its own stamps: its last value is held, {age_s:.2f} s old on average."
-        for name, age_s in samples.mean_age_s_by_held_column.items()
+        for name, age_s in samples.held_age_s.items()
     ]
     return [*notes, *samples.notes]
 
 
 def flight_figure(
-    samples: Samples, surfaces: Sequence[str], rows: DiagnosisRows, label: str = "90 % bounds"
+    samples: Samples, surfaces: Sequence[str], rows: LogRows, label: str = "90 % bounds"
 ) -> Any:
     """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault.
     label: what they are called."""
@@ -100,9 +93,7 @@ def flight_figure(
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
     _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
-    axes[0].set_ylim(
-        -max(limit, 1.0), max(limit, 1.0)
-    )  # a landing's spike does not flatten the flight
+    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
     _draw_lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
     _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
@@ -124,33 +115,25 @@ def _label_axis(axis: Any, label: str, **grid_options: Any) -> None:
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
-    shown = slice(None, None, max(len(t_s) // _TARGET_PLOTTED_POINTS, 1))
+    shown = slice(None, None, max(len(t_s) // _PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
-        axis.plot(
-            t_s[shown], values[shown, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name
-        )
+        axis.plot(t_s[shown], values[shown, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
     _label_axis(axis, y_label)
 
 
-def _draw_effectiveness(axis: Any, rows: DiagnosisRows, s: int, label: str) -> None:
-    shown = slice(None, None, max(len(rows.t_s) // _TARGET_PLOTTED_POINTS, 1))
+def _draw_effectiveness(axis: Any, rows: LogRows, s: int, label: str) -> None:
+    shown = slice(None, None, max(len(rows.t_s) // _PLOTTED_POINTS, 1))
     axis.fill_between(
         rows.t_s[shown], rows.effectiveness_low[shown, s],
         rows.effectiveness_high[shown, s],
         color="#9cc4e4", step="post", linewidth=0, label=label,
     )  # fmt: skip
-    axis.step(
-        rows.t_s[shown],
-        rows.effectiveness[shown, s],
-        where="post",
-        color="#0b3d66",
-        linewidth=1.1,
-    )
+    axis.step(rows.t_s[shown], rows.effectiveness[shown, s], where="post", color="#0b3d66", linewidth=1.1)
     axis.set_ylim(-0.05, 1.08)
 
 
-def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
+def _shade_alarms(axis: Any, rows: LogRows) -> None:
     """Shade the time in which the alarm stands."""
     edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
     times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
@@ -160,14 +143,12 @@ def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
 
 def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
     """Columns of diagnosis.parquet, by the vehicle's surfaces."""
-    names = (
-        f"{surface}_{suffix}" for surface in surfaces for suffix in ("effectiveness", "low", "high")
-    )
+    names = (f"{surface}_{suffix}" for surface in surfaces for suffix in ("effectiveness", "low", "high"))
     return ("t_s", "faulty", "named", *names, "fault_probability", "credible")
 
 
 def write_diagnosis(
-    parent: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
+    parent: Path, samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]
 ) -> Path:
     """Write the folder `parent/<flight>` whole or not at all; returns it."""
     columns = (
@@ -185,40 +166,32 @@ def write_diagnosis(
         rows.fault_probability,
         rows.credible,
     )
-    table = dict(
-        zip(diagnosis_column_names(model.vehicle.surfaces), columns_in_order, strict=True)
-    )
+    table = dict(zip(diagnosis_column_names(model.vehicle.surfaces), columns_in_order, strict=True))
     return write_results(
-        parent,
-        samples.name,
-        table,
-        verdict,
-        render_diagnosis(samples, model, rows, verdict),
+        parent, samples.name, table, verdict, render_diagnosis(samples, model, rows, verdict)
     )
 
 
-def write_diagnosis_with_aircraft_model(
+def write_aircraft_diagnosis(
     parent: Path,
     samples: Samples,
     surfaces: Sequence[str],
-    rows: DiagnosisRows,
+    rows: LogRows,
     verdict: dict[str, Any],
     extra: Callable[[Path], None] | None = None,
 ) -> Path:
     """The same of a flight that an aircraft's own model diagnosed; extra: writes into the folder,
     too."""
-    from beaver_ftc_logs.stepped import EFFECTIVENESS_BOUND_WINDOW_S
+    from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     words = {
         "bounds": "bounds",
         "quiet": "No residual left the bound of the errors declared.",
         "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
-        f"is at fault, has stood for {EFFECTIVENESS_BOUND_WINDOW_S:g} s, and the errors declared hold.",
+        f"is at fault, has stood for {BOUND_WINDOW_S:g} s, and the errors declared hold.",
     }
     page = _render_flight_page(samples, surfaces, rows, verdict, words)
-    return write_results(
-        parent, samples.name, diagnosis_columns(rows, surfaces), verdict, page, extra
-    )
+    return write_results(parent, samples.name, diagnosis_columns(rows, surfaces), verdict, page, extra)
 
 
 def write_results(
@@ -243,10 +216,10 @@ def write_results(
     return parent / name
 
 
-def refuse_to_replace_foreign_file(path: Path) -> None:
+def refuse_foreign_file(path: Path) -> None:
     """Raise BadInput where the page would take the place of a file that is not a page of ours."""
     if path.exists() and (
-        not path.is_file() or IDENTIFICATION_PAGE_MARK not in path.read_text("utf-8", errors="replace")[:2000]
+        not path.is_file() or PAGE_MARK not in path.read_text("utf-8", errors="replace")[:2000]
     ):
         raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
 
@@ -254,29 +227,17 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     usable = fitting.fit_parts(flights)
-    fit = fitting.fit_order(
-        usable, model.vehicle, model.n_rate_lags, model.n_command_lags
-    )
+    fit = fitting.fit_order(usable, model.vehicle, model.n_rate_lags, model.n_command_lags)
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
-        mark=IDENTIFICATION_PAGE_MARK,
+        mark=PAGE_MARK,
         model=model,
         found=model.identification_results,
-        used=sum(
-            int(flight.is_usable.sum())
-            for flight in usable
-        ),
-        coefficients=list(
-            zip(
-                names,
-                fit.coefficients.tolist(),
-                fit.standard_errors.tolist(),
-                strict=True,
-            )
-        ),
+        used=sum(int(flight.is_usable.sum()) for flight in usable),
+        coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encode_png(_prediction_figure(usable, model)),
         spectrum=_encode_png(_spectrum_figure(usable, model)),
-        correlation=_encode_png(_coefficient_correlation_figure(fit, names)),
+        correlation=_encode_png(_correlation_figure(fit, names)),
     )
 
 
@@ -298,19 +259,13 @@ def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
         (fitting.refit(fitted, model), held_out, name)
         for fitted, held_out, name in fitting.validation_folds(usable)
     ]
-    folds = [
-        fold
-        for fold in folds
-        if fold[1].is_usable.any()
-    ][:_MAX_SHOWN_FLIGHTS]
+    folds = [fold for fold in folds if fold[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
     n = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
     for part, (fold_model, held_out, name) in zip(parts, folds, strict=False):
         axes = part.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _times_rates_residual_in_liveliest_window(
-            fold_model, held_out, round(_PREDICTION_FIGURE_SPAN_S * model.rate_hz)
-        )
+        t_s, rates, residual = _liveliest_window(fold_model, held_out, round(_FIGURE_SPAN_S * model.rate_hz))
         for i, axis in enumerate(axes):
             residuals, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
             axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
@@ -323,48 +278,33 @@ def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     return figure
 
 
-def _times_rates_residual_in_liveliest_window(
-    model: Model, held_out: fitting.FitPart, n: int
-) -> tuple[Floats, Floats, Floats]:
+def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
     rows, residual = fitting.one_step_residual(model, held_out)
     rates = np.full_like(held_out.samples.rates, np.nan)
     r = np.full_like(held_out.samples.rates, np.nan)
     rates[rows], r[rows] = held_out.samples.rates[rows], residual
-    first = _first_row_of_liveliest_window(rates, rows, n)
+    first = _liveliest_row(rates, rows, n)
     window = slice(first, first + n)
     return held_out.samples.t_s[window], rates[window], r[window]
 
 
-def _first_row_of_liveliest_window(
-    rates: Floats, rows: NDArray[np.int64], n: int
-) -> int:
+def _liveliest_row(rates: Floats, rows: NDArray[np.int64], n: int) -> int:
     """First sample of the window in which the rates known moved most."""
     squares = np.zeros(len(rates))
     squares[rows] = (rates[rows] ** 2).sum(axis=1)
     total = np.concatenate([[0.0], np.cumsum(squares)])
-    return (
-        int(np.argmax(total[n:] - total[:-n]))
-        if len(rates) > n
-        else 0
-    )
+    return int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
 
 
 def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack(
-        [
-            fitting.one_step_residual(model, flight)[1]
-            for flight in usable
-        ]
-    )
+    residual = np.vstack([fitting.one_step_residual(model, flight)[1] for flight in usable])
     f_hz, power = spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
-        axis.loglog(
-            f_hz[1:], power[1:, i], color=SERIES[i], linewidth=1.1, label=name
-        )
+        axis.loglog(f_hz[1:], power[1:, i], color=SERIES[i], linewidth=1.1, label=name)
         white = residual[:, i].var() / (0.5 * model.rate_hz)
         axis.axhline(white, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)
@@ -374,7 +314,7 @@ def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     return figure
 
 
-def _coefficient_correlation_figure(fit: Regression, names: list[str]) -> Any:
+def _correlation_figure(fit: Regression, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
     side = 2.5 + 0.19 * len(names)
     figure = _new_figure(side + 0.8, side)

@@ -12,31 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from beaver_ftc_logs.recording import Column, Floats
-from beaver_ftc_logs.units import (
-    ACCELERATION,
-    ANGLE,
-    KIND_AND_SI_FACTOR_OF_UNIT,
-    RATE,
-    SIGN_AND_UNIT_FACTORS,
-    nearest_unit,
-)
+from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, SIGN_AND_UNIT_FACTORS, nearest_unit
 
-_INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_RATIO_TO_UNIT_FACTOR = 20, 0.7, 1.3
-_HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
-_MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
-_MAX_EXCHANGED_CORRELATION, _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
-_MIN_RMS_ANGLE_RATE_RAD_S = 1e-3
+_ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
+_MIN_MANY_WINDOWS, _AGREEING, _UNIT_RATIO = 20, 0.7, 1.3
+_CLOSE, _EXACT = 0.95, 0.99
+_SLOPE_FACTOR, _SLOPE_FACTOR_FEW = 1.5, 1.8
+_EXCHANGED, _EXCHANGED_FEW = 0.4, 0.2
+_MIN_RMS_RAD_S = 1e-3
 """Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
 A change of an angle that is not far above them says nothing of a rate."""
-_GRAVITY_MPS2 = KIND_AND_SI_FACTOR_OF_UNIT["g"][1]
-_PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
-_MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
+_GRAVITY_MPS2 = SI_UNITS["g"][1]
+_GRAVITIES_G = (0.5, 2.0)
+_MAX_ANGLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
 _MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
 
 
 @dataclass(frozen=True)
-class AngleRateFit:
+class AngleFit:
     """slope: change of an angle over the integral of its rate; correlation of the two; n_windows: how many
     were seen; max_angle_magnitude, max_rate_magnitude: as the log says."""
 
@@ -52,126 +45,73 @@ class AngleRateFit:
         return self.n_windows >= _MIN_MANY_WINDOWS
 
 
-def fit_roll_angle_to_rates(
-    gyros: list[Column], roll: Column, pitch: Column | None
-) -> AngleRateFit | None:
+def fit_roll(gyros: list[Column], roll: Column, pitch: Column | None) -> AngleFit | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
     gyros: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
     t = gyros[0].t_s
-    p, q, r = (_interpolate_column(gyro, t) for gyro in gyros)
-    angle = _interpolate_column(roll, t)
+    p, q, r = (_interpolate(gyro, t) for gyro in gyros)
+    angle = _interpolate(roll, t)
     circle = _full_circle(roll.values)
     # The circle is known whatever the unit.
     phi = angle * 2.0 * np.pi / circle
     terms, theta = [p], None
     if pitch is not None:
-        theta = _interpolated_pitch_rad(roll, pitch, t)
-        terms += [
-            np.tan(theta) * q * np.sin(phi),
-            np.tan(theta) * r * np.cos(phi),
-        ]
-    return _fit_angle_to_rate(
-        t, angle, terms, circle, theta
-    )
+        theta = _pitch_rad(roll, pitch, t)
+        terms += [np.tan(theta) * q * np.sin(phi), np.tan(theta) * r * np.cos(phi)]
+    return _fit_angle(t, angle, terms, circle, theta)
 
 
-def fit_pitch_angle_to_rates(
-    gyros: list[Column], roll: Column, pitch: Column
-) -> AngleRateFit | None:
-    """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
+def fit_pitch(gyros: list[Column], roll: Column, pitch: Column) -> AngleFit | None:
+    """How the pitch angle follows the rates, as `fit_roll`."""
     t = gyros[0].t_s
-    _, q, r = (_interpolate_column(gyro, t) for gyro in gyros)
-    phi = (
-        _interpolate_column(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    )
-    return _fit_angle_to_rate(
-        t,
-        _interpolate_column(pitch, t),
-        [q * np.cos(phi), -r * np.sin(phi)],
-    )
+    _, q, r = (_interpolate(gyro, t) for gyro in gyros)
+    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
+    return _fit_angle(t, _interpolate(pitch, t), [q * np.cos(phi), -r * np.sin(phi)])
 
 
-def fit_yaw_angle_to_rates(
-    gyros: list[Column], roll: Column, pitch: Column | None, yaw: Column
-) -> AngleRateFit | None:
-    """How the yaw angle follows the rates, as `fit_roll_angle_to_rates`; r and q are in one unit, since a
+def fit_yaw(gyros: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> AngleFit | None:
+    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a
     turn changes both alike."""
     t = gyros[0].t_s
-    _, q, r = (_interpolate_column(gyro, t) for gyro in gyros)
-    phi = (
-        _interpolate_column(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    )
-    theta = (
-        np.zeros(len(t))
-        if pitch is None
-        else _interpolated_pitch_rad(roll, pitch, t)
-    )
-    psi_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(
-        theta
-    )
-    return _fit_angle_to_rate(
-        t,
-        _interpolate_column(yaw, t),
-        [psi_rate],
-        _full_circle(yaw.values),
-        theta,
-    )
+    _, q, r = (_interpolate(gyro, t) for gyro in gyros)
+    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
+    theta = np.zeros(len(t)) if pitch is None else _pitch_rad(roll, pitch, t)
+    psi_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
+    return _fit_angle(t, _interpolate(yaw, t), [psi_rate], _full_circle(yaw.values), theta)
 
 
-def _interpolated_pitch_rad(roll: Column, pitch: Column, t: Floats) -> Floats:
+def _pitch_rad(roll: Column, pitch: Column, t: Floats) -> Floats:
     """The pitch angle at given times, rad, of two angles in one unit."""
-    return (
-        _interpolate_column(pitch, t)
-        * 2.0
-        * np.pi
-        / _full_circle(np.append(4.0 * pitch.values, roll.values))
-    )
+    return _interpolate(pitch, t) * 2.0 * np.pi / _full_circle(np.append(4.0 * pitch.values, roll.values))
 
 
-def _fit_angle_to_rate(
-    t: Floats,
-    angle: Floats,
-    terms: list[Floats],
-    circle: float | None = None,
-    theta: Floats | None = None,
-) -> AngleRateFit | None:
+def _fit_angle(
+    t: Floats, angle: Floats, terms: list[Floats], circle: float | None = None, theta: Floats | None = None
+) -> AngleFit | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
     unit they are; circle: a circle, where it may go round; theta: the pitch angle, where
     windows in which it is steep say nothing."""
     h = np.diff(t)
-    w = np.where(h < _INTEGRATION_WINDOW_S, h, 0.0)
+    w = np.where(h < _ANGLE_WINDOW_S, h, 0.0)
     S = np.vstack(
-        [
-            np.zeros(len(terms)),
-            np.cumsum(
-                [w * _means_of_neighbours(term) for term in terms], axis=1
-            ).T,
-        ]
+        [np.zeros(len(terms)), np.cumsum([w * _means_of_neighbours(term) for term in terms], axis=1).T]
     )
-    n = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
+    n = max(round(_ANGLE_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
     a = np.arange(0, len(t) - n, n)
     b = np.arange(n, len(t), n)
-    ok = (
-        t[b] - t[a]
-    ) < 2.0 * _INTEGRATION_WINDOW_S
+    ok = (t[b] - t[a]) < 2.0 * _ANGLE_WINDOW_S
     if theta is not None:
         steep = np.cumsum(np.abs(theta) > _STEEP_PITCH_RAD)
-        ok &= (
-            steep[b] == steep[a]
-        )
-    y = (angle[b] - angle[a])[
-        ok
-    ]
-    X = (S[b] - S[a])[
-        ok
-    ]
+        ok &= steep[b] == steep[a]
+    y = (angle[b] - angle[a])[ok]
+    X = (S[b] - S[a])[ok]
     if circle is not None:
         y = (y + 0.5 * circle) % circle - 0.5 * circle
     known = np.isfinite(y) & np.isfinite(X).all(axis=1)
     y, X = y[known], X[known]
-    least = len(y) * (_MIN_RMS_ANGLE_RATE_RAD_S * _INTEGRATION_WINDOW_S) ** 2
+    least = len(y) * (_MIN_RMS_RAD_S * _ANGLE_WINDOW_S) ** 2
     if len(y) < _MIN_WINDOWS or y @ y < least:
         return None
     beta = np.linalg.lstsq(X, y, rcond=None)[0]
@@ -182,7 +122,7 @@ def _fit_angle_to_rate(
     if not xx * yy > 0.0:
         return None
     xy = float(X @ y)
-    return AngleRateFit(
+    return AngleFit(
         slope=np.sign(xy) * np.sqrt(yy / xx),
         correlation=xy / np.sqrt(xx * yy),
         n_windows=len(X),
@@ -195,7 +135,7 @@ def _means_of_neighbours(x: Floats) -> Floats:
     return np.nan_to_num(0.5 * (x[1:] + x[:-1]))
 
 
-def _interpolate_column(column: Column, t: Floats) -> Floats:
+def _interpolate(column: Column, t: Floats) -> Floats:
     if len(column.t_s) == len(t) and np.array_equal(column.t_s, t):
         return column.values
     known = np.isfinite(column.values)
@@ -214,84 +154,54 @@ NamedColumn = tuple[str, Column]
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
-def find_attitude_mistake(
-    named: Mapping[str, Column],
-    angles: Sequence[NamedColumn | None],
-    others: Mapping[str, Column],
+def attitude_mistake(
+    named: Mapping[str, Column], angles: Sequence[NamedColumn | None], others: Mapping[str, Column]
 ) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. others: what may
     have taken the place of a rate."""
     gyros = list(named.values())
-    for axis, (rate, angle) in enumerate(
-        zip(named, angles, strict=True)
-    ):
+    for axis, (rate, angle) in enumerate(zip(named, angles, strict=True)):
         if angle is None:
             continue
-        if axis == 1 and (remark := pitch_angle_unit_remark(angle[1], angle[0])):
+        if axis == 1 and (remark := pitch_remark(angle[1], angle[0])):
             return remark
-        fit = _fit_angle_of_axis(gyros, angles, axis)
+        fit = _fit_axis(gyros, angles, axis)
         if fit is None:
             continue
-        for name, column in {
-            **named,
-            **others,
-        }.items():
-            trial = _fit_angle_of_axis(
-                [*gyros[:axis], column, *gyros[axis + 1 :]], angles, axis
-            )
-            if trial is not None and abs(
-                trial.correlation
-            ) > _min_correlation_to_replace_rate(fit, name in named):
-                return _exchanged_column_text(
-                    angle[0],
-                    (rate, fit),
-                    (name, trial),
-                    _RATE_TITLES[axis],
-                )
-        if remark := angle_rate_factor_remark(
-            fit, rate, angle[0]
-        ) or _agreeing_rate_factor_remark(fit, gyros, angles, axis, rate):
+        for name, column in {**named, **others}.items():
+            trial = _fit_axis([*gyros[:axis], column, *gyros[axis + 1 :]], angles, axis)
+            if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
+                return _exchanged_column_text(angle[0], (rate, fit), (name, trial), _RATE_TITLES[axis])
+        if remark := factor_remark(fit, rate, angle[0]) or _exact_factor_remark(
+            fit, gyros, angles, axis, rate
+        ):
             return remark
     return None
 
 
-def rates_confirmed_by_attitude(
-    named: Mapping[str, Column], angles: Sequence[NamedColumn | None]
-) -> frozenset[str]:
+def confirmed_rates(named: Mapping[str, Column], angles: Sequence[NamedColumn | None]) -> frozenset[str]:
     """The columns of p, q and r whose integral is the change of roll, pitch and yaw, in sign and unit too."""
     gyros = list(named.values())
-    fits = {
-        rate: _fit_angle_of_axis(gyros, angles, axis)
-        for axis, rate in enumerate(named)
-    }
+    fits = {rate: _fit_axis(gyros, angles, axis) for axis, rate in enumerate(named)}
     return frozenset(name for name, fit in fits.items() if fit is not None and _is_exact(fit))
 
 
-def _is_exact(fit: AngleRateFit) -> bool:
-    return (
-        fit.correlation > _EXACT_CORRELATION
-        and 1.0 / _MAX_RATIO_TO_UNIT_FACTOR < fit.slope < _MAX_RATIO_TO_UNIT_FACTOR
-    )
+def _is_exact(fit: AngleFit) -> bool:
+    return fit.correlation > _EXACT and 1.0 / _UNIT_RATIO < fit.slope < _UNIT_RATIO
 
 
-def _agreeing_rate_factor_remark(
-    fit: AngleRateFit,
-    gyros: list[Column],
-    angles: Sequence[NamedColumn | None],
-    axis: int,
-    rate: str,
+def _exact_factor_remark(
+    fit: AngleFit, gyros: list[Column], angles: Sequence[NamedColumn | None], axis: int, rate: str
 ) -> str | None:
     """Describe the sign or unit by which a rate explains its angle exactly, where it does not as it is; None
     where none does. In a banked flight a yaw rate in another unit does not even correlate with the yaw angle,
     since q turns it as well."""
-    if abs(fit.correlation) >= _MIN_AGREEING_CORRELATION:
+    if abs(fit.correlation) >= _AGREEING:
         return None
     for factor in SIGN_AND_UNIT_FACTORS:
         scaled = replace(gyros[axis], values=factor * gyros[axis].values)
-        trial = _fit_angle_of_axis(
-            [*gyros[:axis], scaled, *gyros[axis + 1 :]], angles, axis
-        )
+        trial = _fit_axis([*gyros[:axis], scaled, *gyros[axis + 1 :]], angles, axis)
         if trial is not None and _is_exact(trial):
             return (
                 f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
@@ -301,47 +211,26 @@ def _agreeing_rate_factor_remark(
     return None
 
 
-def _min_correlation_to_replace_rate(fit: AngleRateFit, is_rate: bool) -> float:
+def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
     corr = abs(fit.correlation)
-    if is_rate and corr < (
-        _MAX_EXCHANGED_CORRELATION
-        if fit.has_many_windows
-        else _MAX_EXCHANGED_CORRELATION_OF_FEW_WINDOWS
-    ):
-        return _MIN_AGREEING_CORRELATION
-    return (
-        _HIGH_CORRELATION
-        if corr < _MIN_AGREEING_CORRELATION
-        else _EXACT_CORRELATION
-        if corr < _HIGH_CORRELATION
-        else np.inf
-    )
+    if is_rate and corr < (_EXCHANGED if fit.has_many_windows else _EXCHANGED_FEW):
+        return _AGREEING
+    return _CLOSE if corr < _AGREEING else _EXACT if corr < _CLOSE else np.inf
 
 
-def _fit_angle_of_axis(
-    gyros: list[Column], angles: Sequence[NamedColumn | None], axis: int
-) -> AngleRateFit | None:
+def _fit_axis(gyros: list[Column], angles: Sequence[NamedColumn | None], axis: int) -> AngleFit | None:
     """How the angle of a place follows the rates; None where too little moves, or it is not known."""
-    (roll, pitch, yaw) = (
-        None if named is None else named[1] for named in angles
-    )
+    (roll, pitch, yaw) = (None if named is None else named[1] for named in angles)
     if roll is None or (angle := (roll, pitch, yaw)[axis]) is None:
         return None
     if axis == 2:
-        return fit_yaw_angle_to_rates(gyros, roll, pitch, angle)
-    return (
-        fit_pitch_angle_to_rates(gyros, roll, angle)
-        if axis
-        else fit_roll_angle_to_rates(gyros, roll, pitch)
-    )
+        return fit_yaw(gyros, roll, pitch, angle)
+    return fit_pitch(gyros, roll, angle) if axis else fit_roll(gyros, roll, pitch)
 
 
 def _exchanged_column_text(
-    angle: str,
-    named: tuple[str, AngleRateFit],
-    better: tuple[str, AngleRateFit],
-    title: str,
+    angle: str, named: tuple[str, AngleFit], better: tuple[str, AngleFit], title: str
 ) -> str:
     (rate, fit), (other, trial) = named, better
     return (
@@ -350,91 +239,49 @@ def _exchanged_column_text(
     )
 
 
-def angle_rate_factor_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
+def factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
     nothing is. rate, angle: their columns.
 
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
     slope = abs(fit.slope)
-    limit = _MAX_SLOPE_FACTOR if fit.has_many_windows else _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS
+    limit = _SLOPE_FACTOR if fit.has_many_windows else _SLOPE_FACTOR_FEW
     near = 1.0 / limit < slope < limit
-    if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (near and fit.slope > 0.0):
+    if abs(fit.correlation) < _AGREEING or (near and fit.slope > 0.0):
         return None
-    ratio = (
-        f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
-    )
+    ratio = f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
     if near:
         return f"{ratio}: one of them has the other sign, `scale: -1` fits"
-    if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
-        unit := nearest_unit(ANGLE, 1.0 / slope, _MAX_RATIO_TO_UNIT_FACTOR)
-    ):
-        return (
-            f"{ratio}: {angle} is in {unit}, a factor of "
-            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
-        )
-    if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
-        unit := nearest_unit(RATE, slope, _MAX_RATIO_TO_UNIT_FACTOR)
-    ):
-        return (
-            f"{ratio}: {rate} is in {unit}, a factor of "
-            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
-        )
-    return (
-        f"{ratio}: a factor of {slope:.4g} on {rate} fits, "
-        f"or of {1.0 / slope:.4g} on {angle}"
-    )
+    if fit.max_angle_magnitude > _MAX_ANGLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / slope, _UNIT_RATIO)):
+        return f"{ratio}: {angle} is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
+    if fit.max_rate_magnitude > _FAST_RAD_S and (unit := nearest_unit(RATE, slope, _UNIT_RATIO)):
+        return f"{ratio}: {rate} is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
+    return f"{ratio}: a factor of {slope:.4g} on {rate} fits, or of {1.0 / slope:.4g} on {angle}"
 
 
-def pitch_angle_unit_remark(pitch: Column, name: str) -> str | None:
+def pitch_remark(pitch: Column, name: str) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
     largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))
     if largest <= _MAX_PITCH_RAD:
         return None
-    unit = next(
-        (
-            u
-            for u in ("deg", "cdeg")
-            if largest * KIND_AND_SI_FACTOR_OF_UNIT[u][1] <= _MAX_PITCH_RAD
-        ),
-        None,
-    )
-    hint = (
-        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
-        if unit
-        else "no unit fits"
-    )
-    return (
-        f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {hint}; "
-        "look at the rates' too"
-    )
+    unit = next((u for u in ("deg", "cdeg") if largest * SI_UNITS[u][1] <= _MAX_PITCH_RAD), None)
+    hint = f"it is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
+    return f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {hint}; look at the rates' too"
 
 
 def gravity_remark(az: Column, name: str) -> str | None:
     """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
     is."""
     known = az.values[np.isfinite(az.values)]
-    g = (
-        float(np.median(np.abs(known))) if known.size else 0.0
-    )
-    if (
-        _PLAUSIBLE_GRAVITY_RANGE_G[0]
-        < g / _GRAVITY_MPS2
-        < _PLAUSIBLE_GRAVITY_RANGE_G[1]
-    ):
+    g = float(np.median(np.abs(known))) if known.size else 0.0
+    if _GRAVITIES_G[0] < g / _GRAVITY_MPS2 < _GRAVITIES_G[1]:
         return None
-    unit = (
-        nearest_unit(ACCELERATION, _GRAVITY_MPS2 / g, 2.0)
-        if g > 0.0
-        else None
-    )
+    unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / g, 2.0) if g > 0.0 else None
     hint = (
-        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+        f"it is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
         if unit
         else "no unit fits: is 1 g in it?"
     )
-    return (
-        f"{name}: is {g:.4g} m/s2 on the middle of the flight, 1 g is "
-        f"{_GRAVITY_MPS2:.4g}: {hint}"
-    )
+    return f"{name}: is {g:.4g} m/s2 on the middle of the flight, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"

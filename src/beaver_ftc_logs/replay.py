@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document, Metrics, read_metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
-from beaver_ftc_logs.readers.table import check_row_count_and_time, read_numbers
+from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 
 
@@ -33,19 +33,13 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    column_names_of_each_input = [*stepped.log_column_names_of_each_input(aircraft), ["altitude_m"]]
+    column_names_of_each_input = [*stepped.input_columns(aircraft), ["altitude_m"]]
     log = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
-    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_error_sections(scenario))
-    arrays = [
-        np.column_stack([log[name] for name in names]) for names in column_names_of_each_input
-    ]
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
+    arrays = [np.column_stack([log[name] for name in names]) for names in column_names_of_each_input]
     replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
-    rows = stepped.diagnosis_rows_from_replay(
-        log["t_s"], replay, aircraft.surfaces, scenario.fdi
-    )
-    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(
-        path, scenario, log, replay.verdicts
-    )
+    rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
+    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
 
 
 def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
@@ -54,7 +48,7 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
     missing = [name for name in names if name not in log]
     if missing:
         raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
-    check_row_count_and_time(path, log["t_s"])
+    check_time(path, log["t_s"])
     return log
 
 
@@ -75,9 +69,7 @@ def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     return columns | {"credible": rows.credible}
 
 
-def _replay_verdict(
-    path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]
-) -> Document:
+def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log["t_s"]
     detected = [
@@ -94,10 +86,7 @@ def _replay_verdict(
         "detection_s": detected[0] if detected else None,
         "isolation_s": isolation_s,
         "isolated": name,
-        "rows_that_differ": sum(
-            bool(flag) != row_verdict.detected
-            for flag, row_verdict in pairs
-        ),
+        "rows_that_differ": sum(bool(flag) != row_verdict.detected for flag, row_verdict in pairs),
         "left_out": _unreplayed_input_texts(scenario),
     }
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
@@ -115,15 +104,9 @@ def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[fl
 def _unreplayed_input_texts(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal_sensors = type(scenario.sensors)()
-    declared = [
-        name for name, settings in scenario.sensors if settings != getattr(ideal_sensors, name)
-    ]
-    ideal = [
-        name for name in declared if name not in ("p", "q", "r")
-    ]
-    return [
-        f"the declared errors of {name}: the log has the true value" for name in ideal
-    ]
+    declared = [name for name, settings in scenario.sensors if settings != getattr(ideal_sensors, name)]
+    ideal = [name for name in declared if name not in ("p", "q", "r")]
+    return [f"the declared errors of {name}: the log has the true value" for name in ideal]
 
 
 def _is_as_flown(path: Path, verdict: Document) -> bool | None:
@@ -155,10 +138,6 @@ def as_text(verdict: Document) -> str:
     )
     if verdict["isolated"]:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
-    texts = {
-        True: "as flown",
-        False: "not as flown",
-        None: "nothing beside it to compare with",
-    }
+    texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
     lines = [f"{verdict['flight']}: {outcome}; {texts[verdict['as_flown']]}"]
     return "\n".join([*lines, *(f"  left out: {text}" for text in verdict["left_out"])])

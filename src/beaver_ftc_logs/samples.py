@@ -20,15 +20,15 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_flight, read_parts, split_long_recording
 from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight
-from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
+from beaver_ftc_logs.units import TIME_UNITS
 from beaver_ftc_logs.vehicle import Vehicle
 
-MIN_LOG_RATE_HZ, _MAX_LOG_RATE_HZ = 4.0, 1e5
-_MIN_LOG_SAMPLES = 50
-_MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _MAX_PLAUSIBLE_RATE_SD_RAD_S = 1e6, 60.0, 3.0
-_DYNAMIC_PRESSURE_RATIO_LIMITS = (0.1, 10.0)
+MIN_HZ, _MAX_HZ = 4.0, 1e5
+_LEAST_SAMPLES = 50
+_MAX_NUMBER, _MAX_RATE_RAD_S, _MAX_RATE_SD_RAD_S = 1e6, 60.0, 3.0
+_QDYN_RATIOS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
-MAX_FIT_SAMPLES, _FIT_STRETCH_SAMPLES = 200_000, 5000
+MAX_FIT_SAMPLES, _FIT_SAMPLES = 200_000, 5000
 """Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
 NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
@@ -50,14 +50,14 @@ class Samples:
     t_s (n,) s: the log's own stamps, or an even grid within each stretch if the log is faster than the
     vehicle's largest sample rate. rates (n, 3) rad/s. commands (n, S): command of each surface as the mixer
     makes it, in shares of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown.
-    stretch_number (n,): number of the gap-free stretch. mean_age_s_by_held_column: mean age of the values of
+    stretch_number (n,): number of the gap-free stretch. held_age_s: mean age of the values of
     each column that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading.
     airspeed (n,) m/s, nan where unknown. unchanged_s: for how long each column of rates,
     commands and signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of
     the energy height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving
     average of the noise by which rates, commands and signals are whitened, empty if they are not. fit_weight
     of each sample in a fit. n_log_parts: number of parts in which the log was read; if several, the samples
-    are chosen stretches. rates_confirmed_by_attitude: the columns of rates that the logged angles confirm.
+    are chosen stretches. confirmed_rates: the columns of rates that the logged angles confirm.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Samples:
     labels: Floats
     stretch_number: NDArray[np.int64]
     dt_s: float
-    mean_age_s_by_held_column: dict[str, float]
+    held_age_s: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
@@ -79,7 +79,7 @@ class Samples:
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
     n_log_parts: int = 1
-    rates_confirmed_by_attitude: frozenset[str] = frozenset()
+    confirmed_rates: frozenset[str] = frozenset()
 
 
 _PER_SAMPLE_FIELDS = (
@@ -91,97 +91,55 @@ _PER_SAMPLE_FIELDS = (
 def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     """Put a log on one time base. Raises BadInput with the reason where the log cannot be used."""
     rate_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    used = list(
-        dict.fromkeys([*rate_names, *vehicle.command_column_names, *vehicle.signal_column_names])
-    )
+    used = list(dict.fromkeys([*rate_names, *vehicle.command_columns, *vehicle.signal_columns]))
     log = convert_to_si(log, vehicle)
-    _refuse_missing_or_implausible_columns(log, used, rate_names=rate_names)
-    confirmed = _check_gravity_and_confirm_rates_by_attitude(log, vehicle)
+    _refuse_columns(log, used, rate_names=rate_names)
+    confirmed = _check_attitude(log, vehicle)
     stamps = log.columns[rate_names[0]].t_s
-    t_s, stretch, step_s = _check_stamps_and_make_time_base(
-        log.name, stamps, vehicle.max_sample_rate_hz
-    )
-    held = {
-        name: values_and_mean_age_at(log.columns[name], t_s, step_s) for name in used
-    }
+    t_s, stretch, step_s = _time_base(log.name, stamps, vehicle.max_sample_rate_hz)
+    held = {name: sample_column(log.columns[name], t_s, step_s) for name in used}
     for name in rate_names:
         values, age_s = held[name]
-        held[name] = (
-            np.where(_is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values),
-            age_s,
-        )
+        held[name] = (np.where(_is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values), age_s)
 
     def stacked_columns(names: list[str]) -> Floats:
-        return (
-            np.column_stack([held[name][0] for name in names])
-            if names
-            else np.empty((len(t_s), 0))
-        )
+        return np.column_stack([held[name][0] for name in names]) if names else np.empty((len(t_s), 0))
 
     samples = Samples(
         name=log.name,
         t_s=t_s,
         rates=stacked_columns(rate_names),
-        commands=_mixed_commands(log.name, stacked_columns(vehicle.command_column_names), vehicle),
-        signals=stacked_columns(vehicle.signal_column_names),
-        labels=_labelled_surface_effectiveness(log, vehicle, t_s),
+        commands=_mixed_commands(log.name, stacked_columns(vehicle.command_columns), vehicle),
+        signals=stacked_columns(vehicle.signal_columns),
+        labels=_sampled_labels(log, vehicle, t_s),
         stretch_number=stretch,
         dt_s=step_s,
-        mean_age_s_by_held_column={
-            name: age_s
-            for name, (_, age_s) in held.items()
-            if age_s is not None
-        },
+        held_age_s={name: age_s for name, (_, age_s) in held.items() if age_s is not None},
         logged_failures=log.logged_failures,
         log_stamps_s=stamps,
-        notes=(
-            *log.notes,
-            *dict.fromkeys(_used_column_defect_texts(log, used, rate_names)),
-        ),
+        notes=(*log.notes, *dict.fromkeys(_defects(log, used, rate_names))),
         airspeed=_sampled_airspeed(log, vehicle, t_s, step_s),
-        unchanged_s={
-            name: _time_since_column_change_s(log.columns[name], t_s) for name in used
-        },
+        unchanged_s={name: _unchanged_s(log.columns[name], t_s) for name in used},
         is_rate_clipped=_is_rate_clipped([log.columns[name] for name in rate_names], t_s),
-        energy_height_rate_mps=_sampled_energy_height_rate_mps(
-            log, vehicle, (t_s, stretch, step_s)
-        ),
-        rates_confirmed_by_attitude=confirmed,
+        energy_height_rate_mps=_sampled_height_rate(log, vehicle, (t_s, stretch, step_s)),
+        confirmed_rates=confirmed,
     )
     V0 = vehicle.reference_airspeed_mps
-    return (
-        samples
-        if V0 is None
-        else with_airspeed_scaling_and_products(
-            samples, V0, vehicle.surface_airspeed_powers
-        )
-    )
+    return samples if V0 is None else scale_by_airspeed(samples, V0, vehicle.surface_airspeed_powers)
 
 
-def with_airspeed_scaling_and_products(
-    samples: Samples, V0: float, powers: Sequence[float] = (2.0,)
-) -> Samples:
+def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float] = (2.0,)) -> Samples:
     """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
     surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
     and stability grow with it; as at the reference where the airspeed is unknown."""
     V = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
-    ratio = np.clip(
-        np.nan_to_num(V / V0, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
-    )[:, None]
-    products = np.column_stack([samples.rates, samples.signals]) * (
-        np.sqrt(ratio) - 1.0
-    )
+    ratio = np.clip(np.nan_to_num(V / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
+    products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(ratio) - 1.0)
     joined = np.column_stack([samples.signals, products])
-    return replace(
-        samples,
-        commands=samples.commands * ratio ** (0.5 * np.array(powers)),
-        signals=joined,
-    )
+    return replace(samples, commands=samples.commands * ratio ** (0.5 * np.array(powers)), signals=joined)
 
 
-def whiten_samples(
-    samples: Samples, C: Sequence[float], fit_weight: float = 1.0
-) -> Samples:
+def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0) -> Samples:
     """The flight with rates, commands and signals filtered by C(1) / C(z), C the moving average of the noise
     (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins again
     after a gap, and where a number is missing."""
@@ -194,12 +152,7 @@ def whiten_samples(
     x[~known] = np.nan
     for a, b in pairwise([0, *edges.tolist(), len(x)]):
         x0 = x[a]
-        x[a:b] = x0 + lfilter(
-            [sum(C)],
-            C,
-            x[a:b] - x0,
-            axis=0,
-        )
+        x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
     rates, commands, whitened_signals = np.split(
         x, np.cumsum([array.shape[1] for array in arrays])[:2], axis=1
     )
@@ -213,18 +166,11 @@ def whiten_samples(
     )
 
 
-def _used_column_defect_texts(
-    log: RecordedFlight, used: list[str], rate_names: list[str]
-) -> Iterator[str]:
+def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Iterator[str]:
     """Yield a line for each mistake in the columns that are used."""
     for name in used:
-        yield from signals.column_defect_texts(
-            name, log.columns[name], is_rate=name in rate_names
-        )
-        if (
-            name in rate_names
-            and (sd := float(np.nanstd(log.columns[name].values))) > _MAX_PLAUSIBLE_RATE_SD_RAD_S
-        ):
+        yield from signals.column_defect_texts(name, log.columns[name], is_rate=name in rate_names)
+        if name in rate_names and (sd := float(np.nanstd(log.columns[name].values))) > _MAX_RATE_SD_RAD_S:
             yield (
                 f"{name}: spreads {sd:.3g} rad/s, as hardly an aircraft does: is it "
                 "in deg/s? a factor "
@@ -232,10 +178,10 @@ def _used_column_defect_texts(
             )
 
 
-def _time_since_column_change_s(column: Column, t_s: Floats) -> Floats:
+def _unchanged_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
-    column = _column_of_finite_rows(column)
+    column = _finite_rows(column)
     return np.nan_to_num(
         _latest_values(t_s, column.t_s, signals.time_since_change_s(column)) + _held_age_s(column, t_s)
     )
@@ -243,85 +189,63 @@ def _time_since_column_change_s(column: Column, t_s: Floats) -> Floats:
 
 def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
     """Whether at each sample a gap has opened since the last number of a column."""
-    column = _column_of_finite_rows(column)
-    usual_step_s = max(_median_step_of_first_stamps_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
+    column = _finite_rows(column)
+    usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
 
 
 def _is_rate_clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
     """Whether a rate is clipped at each sample."""
     clipped = [
-        _latest_values(t_s, rate.t_s, signals.find_clipped_rows(rate.values).astype(float))
-        for rate in rates
+        _latest_values(t_s, rate.t_s, signals.find_clipped_rows(rate.values).astype(float)) for rate in rates
     ]
     return np.asarray(np.nan_to_num(clipped).any(axis=0))
 
 
-def _sampled_airspeed(
-    log: RecordedFlight, vehicle: Vehicle, t_s: Floats, step_s: float
-) -> Floats | None:
+def _sampled_airspeed(log: RecordedFlight, vehicle: Vehicle, t_s: Floats, step_s: float) -> Floats | None:
     """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
     column = log.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
-    return None if column is None else values_and_mean_age_at(column, t_s, step_s)[0]
+    return None if column is None else sample_column(column, t_s, step_s)[0]
 
 
-def _sampled_energy_height_rate_mps(
-    log: RecordedFlight,
-    vehicle: Vehicle,
-    grid: tuple[Floats, NDArray[np.int64], float],
+def _sampled_height_rate(
+    log: RecordedFlight, vehicle: Vehicle, grid: tuple[Floats, NDArray[np.int64], float]
 ) -> Floats | None:
     """As in Samples; grid: of the samples."""
     quantities = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    columns = [
-        log.columns[quantity.column]
-        for quantity in quantities
-        if quantity.column in log.columns
-    ]
+    columns = [log.columns[quantity.column] for quantity in quantities if quantity.column in log.columns]
     if len(columns) < 2 or not all(len(column.t_s) > 1 for column in columns):
         return None
     t_s, stretch, step_s = grid
-    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in columns)
+    altitude, airspeed = (sample_column(column, t_s, step_s)[0] for column in columns)
     return energy.energy_climb_mps(t_s, altitude, airspeed, stretch)
 
 
-def _check_gravity_and_confirm_rates_by_attitude(
-    log: RecordedFlight, vehicle: Vehicle
-) -> frozenset[str]:
+def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
     contradict one another: what is in another unit."""
     columns, attitude, mistake = log.columns, vehicle.attitude, None
     confirmed = frozenset[str]()
     rates = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if (
-        attitude
-        and not signals.find_clipped_rows(next(iter(rates.values())).values).any()
-    ):
+    if attitude and not signals.find_clipped_rows(next(iter(rates.values())).values).any():
         quantities = [attitude.roll, attitude.pitch, attitude.yaw]
         angles = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
             for quantity in quantities
         ]
         possible = [
-            *vehicle.signal_column_names,
+            *vehicle.signal_columns,
             *(quantity.column for quantity in vehicle.flow.values()),
-            *vehicle.command_column_names,
+            *vehicle.command_columns,
         ]
-        candidates = {
-            name: columns[name] for name in dict.fromkeys(possible) if name in columns
-        }
-        mistake = physics.find_attitude_mistake(
-            rates, angles, candidates
-        )
-        confirmed = physics.rates_confirmed_by_attitude(
-            rates, angles
-        )
+        candidates = {name: columns[name] for name in dict.fromkeys(possible) if name in columns}
+        mistake = physics.attitude_mistake(rates, angles, candidates)
+        confirmed = physics.confirmed_rates(rates, angles)
     az = vehicle.acceleration and log.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and az:
         mistake = physics.gravity_remark(az, vehicle.acceleration.column)
     if mistake:
-        raise BadInput(
-            f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended"
-        )
+        raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
     return confirmed
 
 
@@ -329,7 +253,7 @@ def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
     """A log with the columns that a vehicle names in SI."""
     quantities = {quantity.column: quantity for _, quantity in vehicle.located_model_quantities()}
     quantities |= {quantity.column: quantity for quantity in vehicle.flow.values()}
-    quantities |= {quantity.column: quantity for _, _, quantity in vehicle.quantities_of_known_kind()}
+    quantities |= {quantity.column: quantity for _, _, quantity in vehicle.typed_quantities()}
     columns = {
         name: replace(column, values=quantities[name].to_si(column.values))
         for name, column in log.columns.items()
@@ -341,8 +265,7 @@ def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
 def mixer_matrix(vehicle: Vehicle) -> Floats:
     """Return the share of each command in each surface, (surfaces, commands)."""
     mixer_rows = [
-        [shares.get(name, 0.0) for name in vehicle.command_column_names]
-        for shares in vehicle.surfaces.values()
+        [shares.get(name, 0.0) for name in vehicle.command_columns] for shares in vehicle.surfaces.values()
     ]
     return np.array(mixer_rows, dtype=float)
 
@@ -352,17 +275,15 @@ def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> F
     weight makes one larger than a logged number may be."""
     with np.errstate(over="ignore", invalid="ignore"):
         commands: Floats = np.einsum("nc,sc->ns", logged_commands, mixer_matrix(vehicle))
-    too_large = (np.isinf(commands) | (np.abs(commands) > _MAX_LOGGED_MAGNITUDE)).any(axis=0)
+    too_large = (np.isinf(commands) | (np.abs(commands) > _MAX_NUMBER)).any(axis=0)
     if too_large.any():
         surface = list(vehicle.surfaces)[int(too_large.argmax())]
-        allowed = f"allowed: weights in `surfaces` that give up to {_MAX_LOGGED_MAGNITUDE:g}"
+        allowed = f"allowed: weights in `surfaces` that give up to {_MAX_NUMBER:g}"
         raise BadInput(f"{flight}: the command of {surface} is too large, {allowed}")
     return commands
 
 
-def _refuse_missing_or_implausible_columns(
-    log: RecordedFlight, used: list[str], rate_names: list[str]
-) -> None:
+def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str]) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
     missing = [name for name in used if name not in log.columns]
@@ -376,54 +297,45 @@ def _refuse_missing_or_implausible_columns(
         if not np.isfinite(values).any():
             raise BadInput(f"{log.name}: column {name} holds no number, allowed: a logged quantity")
         largest[name] = float(np.nanmax(np.abs(values)))
-        if largest[name] > _MAX_LOGGED_MAGNITUDE:
-            mistake = (
-                f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
-            )
+        if largest[name] > _MAX_NUMBER:
+            mistake = f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_NUMBER:g}"
             raise BadInput(f"{log.name}: {mistake}")
     for name in rate_names:
-        if largest[name] > _MAX_BODY_RATE_RAD_S:
+        if largest[name] > _MAX_RATE_RAD_S:
             as_deg = np.deg2rad(largest[name])
-            hint = (
-                f" (deg/s would be {as_deg:.3g} rad/s: `unit: deg/s`)"
-                if as_deg < _MAX_BODY_RATE_RAD_S
-                else ""
-            )
+            hint = f" (deg/s would be {as_deg:.3g} rad/s: `unit: deg/s`)" if as_deg < _MAX_RATE_RAD_S else ""
             raise BadInput(
                 f"{log.name}: column {name} reaches {largest[name]:g}, allowed: rates in "
-                f"rad/s, up to {_MAX_BODY_RATE_RAD_S:g}{hint}"
+                f"rad/s, up to {_MAX_RATE_RAD_S:g}{hint}"
             )
 
 
-def _check_stamps_and_make_time_base(
-    flight: str, stamps: Floats, max_hz: float
-) -> tuple[Floats, NDArray[np.int64], float]:
+def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
-    if len(stamps) < _MIN_LOG_SAMPLES:
+    if len(stamps) < _LEAST_SAMPLES:
         raise BadInput(
-            f"{flight}: has {len(stamps)} samples of the rates, allowed: at least {_MIN_LOG_SAMPLES}"
+            f"{flight}: has {len(stamps)} samples of the rates, allowed: at least {_LEAST_SAMPLES}"
         )
-    step_s = _median_step_of_first_stamps_s(stamps)
+    step_s = _median_step_s(stamps)
     rate_hz = 1.0 / step_s
-    if rate_hz < MIN_LOG_RATE_HZ:
+    if rate_hz < MIN_HZ:
         raise BadInput(
             f"{flight}: rates are logged at {rate_hz:.2g} Hz, allowed: at least "
-            f"{MIN_LOG_RATE_HZ:g} Hz to tell "
+            f"{MIN_HZ:g} Hz to tell "
             f"a surface's effect from the vehicle's own motion{_other_time_unit_hint(rate_hz)}"
         )
-    if rate_hz > _MAX_LOG_RATE_HZ:
+    if rate_hz > _MAX_HZ:
         raise BadInput(
-            f"{flight}: rates are logged at {rate_hz:.2g} Hz, allowed: up to {_MAX_LOG_RATE_HZ:g} Hz, "
-            "time in seconds"
+            f"{flight}: rates are logged at {rate_hz:.2g} Hz, allowed: up to {_MAX_HZ:g} Hz, time in seconds"
         )
     if rate_hz <= 1.05 * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
-    even = _regular_time_base(stamps, 1.0 / max_hz)
-    if len(even[0]) < _MIN_LOG_SAMPLES:
+    even = _even_time_base(stamps, 1.0 / max_hz)
+    if len(even[0]) < _LEAST_SAMPLES:
         raise BadInput(
             f"{flight}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are "
             f"{len(even[0])} samples at "
-            f"{max_hz:g} Hz, allowed: at least {_MIN_LOG_SAMPLES}; is time in another unit?"
+            f"{max_hz:g} Hz, allowed: at least {_LEAST_SAMPLES}; is time in another unit?"
         )
     return even
 
@@ -431,58 +343,47 @@ def _check_stamps_and_make_time_base(
 def _other_time_unit_hint(rate_hz: float) -> str:
     """The units of time in which a log too slow would be one of 10 to 1000 Hz."""
     units = [
-        unit
-        for unit, seconds in SECONDS_PER_TIME_UNIT.items()
-        if unit != "s" and 10.0 <= rate_hz / seconds <= 1000.0
+        unit for unit, seconds in TIME_UNITS.items() if unit != "s" and 10.0 <= rate_hz / seconds <= 1000.0
     ]
-    return (
-        f" (time in {units[0]} would be "
-        f"{rate_hz / SECONDS_PER_TIME_UNIT[units[0]]:.3g} Hz)"
-        if units
-        else ""
-    )
+    return f" (time in {units[0]} would be {rate_hz / TIME_UNITS[units[0]]:.3g} Hz)" if units else ""
 
 
-def _regular_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
+def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
     """Samples a step apart over each stretch of the log, from its first stamp on: as
-    `_check_stamps_and_make_time_base`."""
+    `_time_base`."""
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1
-    counts = np.ceil(
-        (stamps[last] - stamps[begin]) / step_s + 0.5
-    ).astype(np.int64)
+    counts = np.ceil((stamps[last] - stamps[begin]) / step_s + 0.5).astype(np.int64)
     stretch = np.repeat(np.arange(len(begin)), counts)
-    index = np.arange(len(stretch)) - np.repeat(
-        np.cumsum(counts) - counts, counts
-    )
+    index = np.arange(len(stretch)) - np.repeat(np.cumsum(counts) - counts, counts)
     return stamps[begin][stretch] + index * step_s, stretch, step_s
 
 
-def _median_step_of_first_stamps_s(stamps: Floats) -> float:
+def _median_step_s(stamps: Floats) -> float:
     """The usual step of the first stamps, s: a log cut short later has the same."""
-    return float(np.median(np.diff(stamps[:_MIN_LOG_SAMPLES]))) if len(stamps) > 1 else float("inf")
+    return float(np.median(np.diff(stamps[:_LEAST_SAMPLES]))) if len(stamps) > 1 else float("inf")
 
 
-def values_and_mean_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
+def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None
     return (
-        _interval_means_and_mean_age(column, t_s, step_s)
-        if _median_step_of_first_stamps_s(column.t_s) < 0.6 * step_s
-        else _latest_values_and_mean_age(column, t_s)
+        _means_and_age(column, t_s, step_s)
+        if _median_step_s(column.t_s) < 0.6 * step_s
+        else _latest_and_age(column, t_s)
     )
 
 
-def _latest_values_and_mean_age(column: Column, t_s: Floats) -> tuple[Floats, float]:
+def _latest_and_age(column: Column, t_s: Floats) -> tuple[Floats, float]:
     """The last value up to each time, nan before the first; and its mean age, s."""
-    column = _column_of_finite_rows(column)
+    column = _finite_rows(column)
     age_s = _held_age_s(column, t_s)
     age_s = age_s[np.isfinite(age_s)]
     return _latest_values(t_s, column.t_s, column.values), float(age_s.mean()) if age_s.size else float("nan")
 
 
-def _column_of_finite_rows(column: Column) -> Column:
+def _finite_rows(column: Column) -> Column:
     """The rows of a column that have a number."""
     is_number = np.isfinite(column.values)
     return replace(column, t_s=column.t_s[is_number], values=column.values[is_number])
@@ -499,22 +400,20 @@ def _latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
     return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
-def _interval_means_and_mean_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
+def _means_and_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
-    column = _column_of_finite_rows(column)
+    column = _finite_rows(column)
     ts, total = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
     eps = 1e-6 * h  # of stamps that are meant to fall on the edge
     end = np.searchsorted(ts, t + eps, side="right")
     begin = np.searchsorted(ts, t - h + eps, side="right")
     count = end - begin
-    held, _ = _latest_values_and_mean_age(column, t)
-    mean = (
-        total[end] - total[begin]
-    ) / np.maximum(count, 1)
+    held, _ = _latest_and_age(column, t)
+    mean = (total[end] - total[begin]) / np.maximum(count, 1)
     return np.where(count > 0, mean, held), 0.5 * h
 
 
-def _labelled_surface_effectiveness(log: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
+def _sampled_labels(log: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
     """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
     labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
     for i, surface in enumerate(vehicle.surfaces):
@@ -532,46 +431,41 @@ def constant_stretches(values: Floats) -> list[tuple[int, int]]:
     return list(pairwise([0, *edges.tolist(), len(values)]))
 
 
-def read_columns_of_vehicle(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
+def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
-    return read_flight(path, *_positional_reader_arguments(vehicle, reader))
+    return read_flight(path, *_reader_arguments(vehicle, reader))
 
 
-def read_parts_for_vehicle(
-    path: Path, vehicle: Vehicle, reader: str | None = None
-) -> Iterator[RecordedFlight]:
+def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[RecordedFlight]:
     """The same, a long log in parts."""
-    for log in read_parts(path, *_positional_reader_arguments(vehicle, reader)):
+    for log in read_parts(path, *_reader_arguments(vehicle, reader)):
         column = log.columns.get(vehicle.rates.p.column)
         if column is None:  # said where the columns are used
             yield log
             continue
-        ratio = 1.0 / (_median_step_of_first_stamps_s(column.t_s) * vehicle.max_sample_rate_hz)
+        ratio = 1.0 / (_median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
         yield from split_long_recording(log, column.t_s, max(ratio, 1.0))
 
 
-def _positional_reader_arguments(
+def _reader_arguments(
     vehicle: Vehicle, reader: str | None
 ) -> tuple[str | None, tuple[str, str] | None, list[str]]:
     time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
     return reader or vehicle.reader, time, vehicle.column_names()
 
 
-def stream_flights(
-    paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None
-) -> Iterator[Samples]:
+def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
     """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
     that cannot be used."""
     flights = [
-        flight if flight.n_log_parts == 1 else None
-        for flight in load_flights_for_fit(paths, vehicle, reader)
+        flight if flight.n_log_parts == 1 else None for flight in load_flights_for_fit(paths, vehicle, reader)
     ]
     for path, samples in zip(paths, flights, strict=True):
         if samples is not None:
             yield samples
             continue
-        for log in read_parts_for_vehicle(path, vehicle, reader):
+        for log in read_vehicle_parts(path, vehicle, reader):
             yield resample(log, vehicle)
 
 
@@ -579,17 +473,15 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
     """A flight; of a long one stretches that are spread over it evenly."""
     kept: list[Samples] = []
     every, n_seen, until_s = 1, 0, -np.inf
-    for part, log in enumerate(read_parts_for_vehicle(path, vehicle, reader), 1):
+    for part, log in enumerate(read_vehicle_parts(path, vehicle, reader), 1):
         samples = resample(log, vehicle)
         for begin in range(
-            int(np.searchsorted(samples.t_s, until_s, side="right")),
-            len(samples.t_s),
-            _FIT_STRETCH_SAMPLES,
+            int(np.searchsorted(samples.t_s, until_s, side="right")), len(samples.t_s), _FIT_SAMPLES
         ):
             if n_seen % every == 0:
-                kept.append(_select_rows(samples, slice(begin, begin + _FIT_STRETCH_SAMPLES)))
+                kept.append(_select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
             n_seen += 1
-        while len(kept) * _FIT_STRETCH_SAMPLES > MAX_FIT_SAMPLES and part > 1:
+        while len(kept) * _FIT_SAMPLES > MAX_FIT_SAMPLES and part > 1:
             kept, every = kept[::2], 2 * every
         until_s = samples.t_s[-1]
     return samples if part == 1 else _concatenate_samples(path.stem, kept, part)
@@ -607,15 +499,8 @@ def _select_rows(samples: Samples, row_slice: slice) -> Samples:
         for name in _PER_SAMPLE_FIELDS
         if (values := getattr(samples, name)) is not None
     }
-    unchanged = {
-        name: values[row_slice].copy() for name, values in samples.unchanged_s.items()
-    }
-    return replace(
-        samples,
-        log_stamps_s=chosen["t_s"],
-        unchanged_s=unchanged,
-        **chosen,
-    )
+    unchanged = {name: values[row_slice].copy() for name, values in samples.unchanged_s.items()}
+    return replace(samples, log_stamps_s=chosen["t_s"], unchanged_s=unchanged, **chosen)
 
 
 def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> Samples:
@@ -624,9 +509,7 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
     joined: dict[str, Any] = {
         name: np.concatenate([getattr(stretch, name) for stretch in stretches]) for name in names
     }
-    is_begin = (
-        np.diff(joined["stretch_number"], prepend=joined["stretch_number"][0]) != 0
-    )
+    is_begin = np.diff(joined["stretch_number"], prepend=joined["stretch_number"][0]) != 0
     is_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
     joined["stretch_number"] = np.cumsum(is_begin)
     unchanged = {
@@ -634,8 +517,7 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
         for name in stretches[0].unchanged_s
     }
     long_log_note = (
-        f"a long log, read in {n_parts} parts: {len(is_begin)} samples of it, spread evenly, are "
-        "looked at"
+        f"a long log, read in {n_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked at"
     )
     notes = (long_log_note, *dict.fromkeys(note for stretch in stretches for note in stretch.notes))
     return replace(
@@ -645,16 +527,12 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
         n_log_parts=n_parts,
         log_stamps_s=joined["t_s"],
         unchanged_s=unchanged,
-        rates_confirmed_by_attitude=frozenset.intersection(
-            *(stretch.rates_confirmed_by_attitude for stretch in stretches)
-        ),
+        confirmed_rates=frozenset.intersection(*(stretch.confirmed_rates for stretch in stretches)),
         **joined,
     )
 
 
-def load_flights_for_fit(
-    paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None
-) -> list[Samples]:
+def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
     """The flights, each on one time base, of a long one what a fit wants of it. Raises BadInput with a line
     for each that cannot be used."""
     flights: list[Samples] = []

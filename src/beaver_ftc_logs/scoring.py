@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.results import Document, Onset
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.recording import Floats, LoggedFailure
 from beaver_ftc_logs.samples import Samples
 
-_SIMULTANEOUS_FAILURE_SPAN_S = 2.0
+_SAME_FAILURE_S = 2.0
 
 
-def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str]]) -> Document:
+def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) -> Document:
     """All figures that the log allows: by its labels, or by its failure if it has no labels.
 
     Where the log has more rows than samples, each row is compared with the label of the last sample up to its
@@ -24,20 +24,17 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
     labelled = np.isfinite(samples.labels).any(axis=0)
     if not labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
-    last = np.maximum(
-        np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0
-    )
+    last = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
     labelled_rows = {
         name: getattr(rows, name).compress(labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(rows, **labelled_rows),
-        samples.labels[last].compress(labelled, axis=1),
+        replace(rows, **labelled_rows), samples.labels[last].compress(labelled, axis=1)
     )
 
 
-def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
+def score_against_labels(rows: LogRows, labels: Floats) -> Document:
     """Scores against labelled effectiveness (n, S), on the rows in which every label is known.
 
     A setting is a row of labels that makes up at least 0.5 % of the flight. classes: share of rows whose
@@ -56,80 +53,53 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     return {
         "rows": int(known.sum()),
         "settings": frequent.tolist(),
-        "classes": float(
-            np.mean(
-                nearest_label_setting_index(e, frequent)
-                == nearest_label_setting_index(truth, frequent)
-            )
-        ),
-        "healthy_or_faulty": float(
-            np.mean((rows.faulty[known] == 1) == faulty)
-        ),
+        "classes": float(np.mean(nearest_setting(e, frequent) == nearest_setting(truth, frequent))),
+        "healthy_or_faulty": float(np.mean((rows.faulty[known] == 1) == faulty)),
         "side": float(np.mean(((e < 1.0) == (truth < 1.0)).all(axis=1))),
         "mean_error": float(np.abs(e - truth).mean()),
         "held_by_bounds": float(
-            np.mean(
-                (rows.effectiveness_low[known] <= truth)
-                & (truth <= rows.effectiveness_high[known])
-            )
+            np.mean((rows.effectiveness_low[known] <= truth) & (truth <= rows.effectiveness_high[known]))
         ),
     }
 
 
-def nearest_label_setting_index(e: Floats, levels: Floats) -> np.ndarray:
+def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:
     """Index of the setting nearest to each row of e (n, S), (n,)."""
     distance = ((e[:, None, :] - levels[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(distance.argmin(axis=1))
 
 
 def score_against_failures(
-    rows: DiagnosisRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
+    rows: LogRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
 ) -> Document:
     """Scores against the first failure in the log: alarms before it are false, the first one after it has the
     delay delay_s."""
     first_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_s) else float(first_s))
-    failed = sorted(
-        {
-            failure.surface
-            for failure in failures
-            if failure.t_s < first_s + _SIMULTANEOUS_FAILURE_SPAN_S
-        }
-    )
+    failed = sorted({failure.surface for failure in failures if failure.t_s < first_s + _SAME_FAILURE_S})
     before = onset.is_false(rows.t_s)
     alarms = np.flatnonzero(~before & (rows.faulty == 1))
     detected = bool(alarms.size)
-    shares = _name_shares_after_failure(rows, alarms)
+    shares = _name_shares(rows, alarms)
     return {
         "failure": "+".join(failed) or None,
         "failure_s": onset.at_s,
-        "healthy_s": float(rows.t_s[before][-1] - rows.t_s[0])
-        if before.any()
-        else 0.0,
+        "healthy_s": float(rows.t_s[before][-1] - rows.t_s[0]) if before.any() else 0.0,
         "false_alarms": int(np.sum(np.diff(rows.faulty[before], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": onset.delay_s(float(rows.t_s[alarms[0]]))
-        if detected
-        else None,
+        "delay_s": onset.delay_s(float(rows.t_s[alarms[0]])) if detected else None,
         "named": shares,
-        "right_group": _is_most_frequent_name_right(shares, failed, groups),
+        "right_group": _is_main_name_right(shares, failed, groups),
     }
 
 
-def _name_shares_after_failure(
-    rows: DiagnosisRows, alarms: np.ndarray
-) -> dict[str, float]:
+def _name_shares(rows: LogRows, alarms: np.ndarray) -> dict[str, float]:
     """Return the names after the failure, as shares of the rows with an alarm."""
-    names, counts = np.unique(
-        rows.isolated_surfaces[alarms].astype(str), return_counts=True
-    )
-    return {
-        str(name): float(share)
-        for name, share in zip(names, counts / max(len(alarms), 1), strict=True)
-    }
+    names, counts = np.unique(rows.isolated_surfaces[alarms].astype(str), return_counts=True)
+    return {str(name): float(share) for name, share in zip(names, counts / max(len(alarms), 1), strict=True)}
 
 
-def _is_most_frequent_name_right(
+def _is_main_name_right(
     name_shares: dict[str, float], failed_surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure is a group that failed; None without a failure or
@@ -144,10 +114,6 @@ def _is_most_frequent_name_right(
     shares = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
     if not failed or not shares:
         return None
-    main = set(
-        max(shares, key=lambda name: shares[name]).split("+")
-    )
-    named = {
-        g for g, group in enumerate(groups) if main & set(group)
-    }
+    main = set(max(shares, key=lambda name: shares[name]).split("+"))
+    named = {g for g, group in enumerate(groups) if main & set(group)}
     return bool(named) and named <= failed

@@ -11,8 +11,8 @@ from beaver_ftc_logs.recording import Column, Floats
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
-_MIN_CLIPPED_CONSECUTIVE_ROWS, _MIN_CLIPPED_TOTAL_ROWS = 3, 10
-_MIN_SPIKE_STEP_OVER_MEDIAN, _MAX_SPIKE_SHARE = 40.0, 0.01
+_CLIPPED_IN_TURN, _CLIPPED_IN_ALL = 3, 10
+_SPIKE_RATIO, _MAX_SPIKE_SHARE = 40.0, 0.01
 
 Mask = NDArray[np.bool_]
 
@@ -20,13 +20,11 @@ Mask = NDArray[np.bool_]
 def time_since_change_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
     row = np.arange(len(column.values))
-    since = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row, 0))
-    return np.where(
-        row - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0
-    )
+    since = np.maximum.accumulate(np.where(_changed_rows(column.values), row, 0))
+    return np.where(row - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
 
 
-def _differs_from_previous(values: Floats) -> Mask:
+def _changed_rows(values: Floats) -> Mask:
     """Rows (n,) whose value differs from that of the row before. The first row and each row without a number
     count as different."""
     return np.concatenate([[True], values[1:] != values[:-1]])[: len(values)]
@@ -41,41 +39,23 @@ def find_clipped_rows(values: Floats) -> Mask:
     clipped = np.zeros(len(values), dtype=bool)
     for v in (values, -values):
         known = np.where(np.isfinite(v), v, -np.inf)
-        at_top = (v == np.maximum.accumulate(known)) & (
-            v > 0.0
-        )
+        at_top = (v == np.maximum.accumulate(known)) & (v > 0.0)
         row = np.arange(len(v))
-        since = np.maximum.accumulate(
-            np.where(_differs_from_previous(v) | ~at_top, row, 0)
-        )
+        since = np.maximum.accumulate(np.where(_changed_rows(v) | ~at_top, row, 0))
         ordinal = np.cumsum(
-            _differs_from_previous(np.maximum.accumulate(known)).astype(np.int64)
+            _changed_rows(np.maximum.accumulate(known)).astype(np.int64)
         )  # a larger value begins the count again
-        count = np.cumsum(at_top) - _count_rows_at_previous_maxima(
-            at_top, ordinal
-        )
-        clipped |= (
-            at_top
-            & (row - since >= _MIN_CLIPPED_CONSECUTIVE_ROWS - 1)
-            & (count >= _MIN_CLIPPED_TOTAL_ROWS)
-        )
+        count = np.cumsum(at_top) - _count_at_previous(at_top, ordinal)
+        clipped |= at_top & (row - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
     return clipped
 
 
-def _count_rows_at_previous_maxima(
-    at_top: Mask, ordinal: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _count_at_previous(at_top: Mask, ordinal: NDArray[np.int64]) -> NDArray[np.int64]:
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
     reached. ordinal (n,): number of the present largest value, counted from 1."""
     total = np.cumsum(at_top)
     firsts = np.flatnonzero(np.diff(ordinal, prepend=0))
-    return (
-        (total - at_top)[firsts][
-            ordinal - 1
-        ]
-        if len(firsts)
-        else np.zeros(len(ordinal), dtype=np.int64)
-    )
+    return (total - at_top)[firsts][ordinal - 1] if len(firsts) else np.zeros(len(ordinal), dtype=np.int64)
 
 
 def find_spike_rows(values: Floats) -> NDArray[np.int64]:
@@ -85,19 +65,11 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     if len(finite) < MIN_STILL_ROWS:
         return finite[:0]
     steps = np.diff(values[finite])
-    usual = (
-        float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    )
-    is_spike = (np.abs(steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * usual) & (
-        np.abs(steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * usual
-    )
+    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
+    is_spike = (np.abs(steps[:-1]) > _SPIKE_RATIO * usual) & (np.abs(steps[1:]) > _SPIKE_RATIO * usual)
     is_spike &= steps[:-1] * steps[1:] < 0.0
     spikes = finite[1:-1][is_spike]
-    return (
-        spikes
-        if usual > 0.0 and len(spikes) <= _MAX_SPIKE_SHARE * len(finite)
-        else finite[:0]
-    )
+    return spikes if usual > 0.0 and len(spikes) <= _MAX_SPIKE_SHARE * len(finite) else finite[:0]
 
 
 def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
@@ -113,9 +85,7 @@ def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
     if not is_rate and values.size and np.nanmin(values) == np.nanmax(values):
         texts.append(f"{name}: does not move, nothing can be said of what it moves alone")
     if is_rate and (clipped := find_clipped_rows(values)).any():
-        texts.append(
-            f"{name}: clipped at {np.abs(values[clipped]).max():.4g} in {clipped.sum()} rows"
-        )
+        texts.append(f"{name}: clipped at {np.abs(values[clipped]).max():.4g} in {clipped.sum()} rows")
     if is_rate and len(spikes := find_spike_rows(values)):
         jumps = "1 jump" if len(spikes) == 1 else f"{len(spikes)} jumps"
         texts.append(f"{name}: {jumps}, the first at {column.t_s[spikes[0]]:.2f} s")

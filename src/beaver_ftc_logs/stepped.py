@@ -14,43 +14,40 @@ import numpy as np
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import (
-    bound_above,
-    split_parts,
-)
+from beaver_ftc_logs.regression import bound_above, split_parts
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
-EFFECTIVENESS_BOUND_WINDOW_S = 1.0
+BOUND_WINDOW_S = 1.0
 _LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
 _EFFECTIVE_SAMPLE_SHARE = 0.4
-_ERROR_DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
+_ERROR_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
 @dataclass(frozen=True)
-class ReplayedVerdicts:
+class Replayed:
     """The verdicts of a stretch, one for each sample.
 
-    single_fault_effectiveness_low and single_fault_effectiveness_high (n, S): bounds on the effectiveness of
-    each surface if it alone is at fault. relative_command_gains (S,): measured effect of each command over
-    the expected one, in all of the stretch. relative_command_gain_upper_bounds (S,): its upper bound, the
+    alone_low and alone_high (n, S): bounds on the effectiveness of
+    each surface if it alone is at fault. command_gains (S,): measured effect of each command over
+    the expected one, in all of the stretch. command_gain_bounds (S,): its upper bound, the
     largest of all parts of the stretch. Both are 1 if the stretch is too short."""
 
     verdicts: list[Verdict]
-    single_fault_effectiveness_low: Floats
-    single_fault_effectiveness_high: Floats
-    relative_command_gains: Floats
-    relative_command_gain_upper_bounds: Floats
+    alone_low: Floats
+    alone_high: Floats
+    command_gains: Floats
+    command_gain_bounds: Floats
 
 
-def declared_error_sections(scenario: Any) -> dict[str, Any]:
+def error_sections(scenario: Any) -> dict[str, Any]:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     values = scenario.model_dump(mode="json", exclude_unset=True)
-    return {key: values[key] for key in _ERROR_DECLARING_SCENARIO_KEYS if key in values}
+    return {key: values[key] for key in _ERROR_KEYS if key in values}
 
 
-def log_column_names_of_each_input(aircraft: Any) -> tuple[list[str], ...]:
+def input_columns(aircraft: Any) -> tuple[list[str], ...]:
     """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
     attitude."""
     return (
@@ -61,11 +58,9 @@ def log_column_names_of_each_input(aircraft: Any) -> tuple[list[str], ...]:
     )
 
 
-def replay_samples(
-    diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: float
-) -> ReplayedVerdicts:
+def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: float) -> Replayed:
     """The verdicts of evenly spaced samples; arrays: as
-    `log_column_names_of_each_input`, (n, ...) each."""
+    `input_columns`, (n, ...) each."""
     verdicts: list[Verdict] = []
     nu = np.empty_like(arrays[0])
     eta = np.empty_like(arrays[0])
@@ -73,73 +68,40 @@ def replay_samples(
     for k, inputs in enumerate(zip(*map(np.ascontiguousarray, arrays), strict=True)):
         verdicts.append(diagnosis.step(*inputs))
         nu[k], eta[k], Z[k] = diagnosis.innovation()
-    theta = _bounds_of_explaining_losses(
-        nu[:, :, None], eta[:, :, None], Z
-    )
+    theta = _explaining_losses(nu[:, :, None], eta[:, :, None], Z)
     theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample ends no frame
-    n = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
+    n = max(round(BOUND_WINDOW_S * rate_hz), 1)
     low = 1.0 + _sliding_maximum(theta[0], n)
     high = 1.0 - _sliding_maximum(-theta[1], n)
     empty = low > high
-    return ReplayedVerdicts(
-        verdicts,
-        np.where(empty, 0.0, low),
-        np.where(empty, 1.0, high),
-        *_relative_command_gains_and_upper_bounds(nu, Z),
-    )
+    return Replayed(verdicts, np.where(empty, 0.0, low), np.where(empty, 1.0, high), *_command_gains(nu, Z))
 
 
-def _relative_command_gains_and_upper_bounds(
-    nu: Floats, Z: Floats
-) -> tuple[Floats, Floats]:
-    """The gains and their upper bounds (S,) of `ReplayedVerdicts`, from the nu of the rates (n, 3)
+def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
+    """The gains and their upper bounds (S,) of `Replayed`, from the nu of the rates (n, 3)
     and the expected effect of each surface (n, 3, S)."""
     S = Z.shape[2]
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
     if (parts := split_parts(rows)) is None:
         return np.ones(S), np.ones(S)
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
-    X = np.concatenate(
-        [
-            np.broadcast_to(np.eye(3), (len(Z), 3, 3)),
-            Z / sd[:, None],
-        ],
-        axis=2,
-    )
+    X = np.concatenate([np.broadcast_to(np.eye(3), (len(Z), 3, 3)), Z / sd[:, None]], axis=2)
     y = nu / sd
-    beta, *_ = np.linalg.lstsq(
-        X[rows].reshape(3 * len(rows), -1),
-        y[rows].ravel(),
-        rcond=None,
-    )
+    beta, *_ = np.linalg.lstsq(X[rows].reshape(3 * len(rows), -1), y[rows].ravel(), rcond=None)
     upper = np.full(S, -np.inf)
     for part in parts:
-        bounds, _ = bound_above(
-            X[part].reshape(3 * len(part), -1),
-            y[part].ravel(),
-            _EFFECTIVE_SAMPLE_SHARE,
-        )
+        bounds, _ = bound_above(X[part].reshape(3 * len(part), -1), y[part].ravel(), _EFFECTIVE_SAMPLE_SHARE)
         upper = np.maximum(upper, 1.0 + bounds[3:])
     return 1.0 + beta[3:], upper
 
 
-def _bounds_of_explaining_losses(
-    nu: Floats, eta: Floats, Z: Floats
-) -> tuple[Floats, Floats]:
+def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """Least and greatest theta (n, S) of a loss that explains each frame on every axis; least above greatest
     where none does."""
     eta = eta + _BOUND_ROUNDING_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
     Z1 = np.where(acts, Z, 1.0)
-    ends = np.sort(
-        np.stack(
-            [
-                (nu - eta) / Z1,
-                (nu + eta) / Z1,
-            ]
-        ),
-        axis=0,
-    )
+    ends = np.sort(np.stack([(nu - eta) / Z1, (nu + eta) / Z1]), axis=0)
     within = np.abs(nu) <= eta
     lo = np.where(acts, ends[0], np.where(within, -1.0, 1.0)).max(axis=1)
     hi = np.where(acts, ends[1], np.where(within, 0.0, -2.0)).min(axis=1)
@@ -151,41 +113,25 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
     from scipy.ndimage import maximum_filter1d
 
     padded = np.concatenate([np.full((n - 1, x.shape[1]), -np.inf), x])
-    top = maximum_filter1d(
-        padded, n, axis=0, origin=(n - 1) // 2
-    )
+    top = maximum_filter1d(padded, n, axis=0, origin=(n - 1) // 2)
     return np.asarray(top[n - 1 :])
 
 
-def diagnosis_rows_from_replay(
-    t_s: Floats, replay: ReplayedVerdicts, surfaces: Sequence[str], fdi: Any
-) -> DiagnosisRows:
+def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
     """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
-    e = np.ones_like(replay.single_fault_effectiveness_low)
-    low = np.zeros_like(replay.single_fault_effectiveness_low)
-    high = np.ones_like(replay.single_fault_effectiveness_low)
+    e = np.ones_like(replay.alone_low)
+    low = np.zeros_like(replay.alone_low)
+    high = np.ones_like(replay.alone_low)
     single = fdi.is_ours and not fdi.pairs
     for k, verdict in enumerate(replay.verdicts):
         if single:
-            _fill_row_effectiveness_bounds(
-                verdict,
-                surfaces,
-                (
-                    replay.single_fault_effectiveness_low[k],
-                    replay.single_fault_effectiveness_high[k],
-                ),
-                low[k],
-                high[k],
-            )
+            _fill_bounds(verdict, surfaces, (replay.alone_low[k], replay.alone_high[k]), low[k], high[k])
         if _is_loss_or_untyped(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
-            e[k, s] = min(
-                max(1.0 + float(verdict.estimate), low[k, s]),
-                high[k, s],
-            )
-    names = [_isolated_surface_unknown_or_empty(verdict, surfaces) for verdict in replay.verdicts]
-    return DiagnosisRows(
+            e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
+    names = [_isolated_name(verdict, surfaces) for verdict in replay.verdicts]
+    return LogRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
         isolated_surfaces=np.array(names, dtype=object),
@@ -196,24 +142,16 @@ def diagnosis_rows_from_replay(
     )
 
 
-def _fill_row_effectiveness_bounds(
-    verdict: Verdict,
-    surfaces: Sequence[str],
-    alone: tuple[Floats, Floats],
-    low: Floats,
-    high: Floats,
+def _fill_bounds(
+    verdict: Verdict, surfaces: Sequence[str], alone: tuple[Floats, Floats], low: Floats, high: Floats
 ) -> None:
     """Fill the bounds low and high (S,) of one row, which are given as 0 and 1.
-    alone: low and high (S,) of `ReplayedVerdicts`."""
+    alone: low and high (S,) of `Replayed`."""
     if not verdict.detected:
         low[:] = alone[0]
     elif verdict.isolated in surfaces:
         low[:], s = 1.0, surfaces.index(str(verdict.isolated))
-        low[s], high[s] = (
-            (alone[0][s], alone[1][s])
-            if verdict.type == LOSS_FAULT_TYPE
-            else (0.0, 1.0)
-        )
+        low[s], high[s] = (alone[0][s], alone[1][s]) if verdict.type == LOSS_FAULT_TYPE else (0.0, 1.0)
     elif verdict.isolated is None and verdict.candidates and set(verdict.candidates) <= set(surfaces):
         low[:] = 1.0
         for name in verdict.candidates:
@@ -224,7 +162,7 @@ def _is_loss_or_untyped(verdict: Verdict) -> bool:
     return verdict.type in (None, LOSS_FAULT_TYPE)
 
 
-def _isolated_surface_unknown_or_empty(verdict: Verdict, surfaces: Sequence[str]) -> str:
+def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:
     if not verdict.detected:
         return ""
     return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN_SURFACE

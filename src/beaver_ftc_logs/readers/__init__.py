@@ -19,9 +19,9 @@ SAMPLES_PER_PART = 400_000
 MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
 READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
-NAMES_OF_READERS_OF_WANTED_COLUMNS = ("ulog", "ardupilot")
+SELECTIVE_READERS = ("ulog", "ardupilot")
 """Of an autopilot's logs the columns that are wanted, the names alone where there are none of these."""
-_READER_NAME_BY_SUFFIX = {
+_READER_OF_SUFFIX = {
     ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
     ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
 }  # fmt: skip
@@ -30,7 +30,7 @@ _READER_NAME_BY_SUFFIX = {
 _BLACKBOX_PHRASE = (
     "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
 )
-_WAY_TO_TABLE_BY_SUFFIX = {
+_WAYS_TO_TABLE = {
     ".tlog": "a telemetry log (MAVLink messages that a ground station received), allowed: the autopilot's "
     "own log (.bin, .ulg), or a table of the telemetry, which pymavlink writes: `mavlogdump.py --format csv "
     "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
@@ -44,11 +44,7 @@ _LARGE_FILE_STORES = {
 }
 """How pointers begin: the name of the store, and the command that fetches the file."""
 
-_TIME_COLUMN_AND_UNIT_BY_READER = {
-    "alfa": ("%time", "ns"),
-    "ulog": ("timestamp", "us"),
-    "ardupilot": ("TimeUS", "us"),
-}
+_OWN_TIMES = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilot": ("TimeUS", "us")}
 """Time column and its unit in formats that define them."""
 
 
@@ -78,10 +74,7 @@ def read_parts(
 
 
 def _read_with_reader(
-    path: Path,
-    reader: str | None,
-    time: tuple[str, str] | None,
-    options: dict[str, Any],
+    path: Path, reader: str | None, time: tuple[str, str] | None, options: dict[str, Any]
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
     reader = reader or reader_name_for_path(path)
@@ -91,14 +84,10 @@ def _read_with_reader(
     if reader == "table":
         yield from module.read_parts(path, *(time or ()), **options)
         return
-    if time is not None and time != _TIME_COLUMN_AND_UNIT_BY_READER[reader]:
-        column, unit = _TIME_COLUMN_AND_UNIT_BY_READER[reader]
+    if time is not None and time != _OWN_TIMES[reader]:
+        column, unit = _OWN_TIMES[reader]
         raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    yield (
-        module.read(path, options["columns"])
-        if reader in NAMES_OF_READERS_OF_WANTED_COLUMNS
-        else module.read(path)
-    )
+    yield (module.read(path, options["columns"]) if reader in SELECTIVE_READERS else module.read(path))
 
 
 def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> Iterator[RecordedFlight]:
@@ -154,12 +143,12 @@ def reader_name_for_path(path: Path) -> str:
     """The reader that a path asks for by its form. Raises BadInput where none does."""
     if path.is_dir():
         return "alfa"
-    if path.suffix.lower() in _WAY_TO_TABLE_BY_SUFFIX:
-        raise BadInput(f"{path}: is {_WAY_TO_TABLE_BY_SUFFIX[path.suffix.lower()]}")
-    reader = _READER_NAME_BY_SUFFIX.get(path.suffix.lower())
+    if path.suffix.lower() in _WAYS_TO_TABLE:
+        raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
+    reader = _READER_OF_SUFFIX.get(path.suffix.lower())
     if reader is None:
         raise BadInput(
             f"{path}: what kind of log this is cannot be seen, allowed: "
-            f"{', '.join(sorted(_READER_NAME_BY_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
+            f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
         )
     return reader

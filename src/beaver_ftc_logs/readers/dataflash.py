@@ -14,7 +14,7 @@ from typing import Any
 
 from pymavlink.DFReader import FORMAT_TO_STRUCT, DFFormat, DFReader_binary, DFReader_text, null_term
 
-_BYTES_BETWEEN_RELEASES = 8_000_000
+_RELEASE_BYTES = 8_000_000
 """Bytes of a log that are read until their pages are released."""
 _HEADER, _HEADER_BYTES, _TYPE_OF_FORMATS = b"\xa3\x95", 3, 0x80
 
@@ -36,19 +36,19 @@ def read_messages(
     as_text = path.suffix.lower() == ".log"
 
     @cache
-    def numeric_fields_of_format(fmt: Any) -> list[str]:
+    def numeric_fields_of(fmt: Any) -> list[str]:
         return _numeric_fields(fmt, as_text)
 
     @cache
     def fields_of_format(fmt: Any) -> list[str]:
         if _is_format_of_parameter(fmt):
             return list(PARAMETER_FIELDS)
-        return fields_to_read(fmt.name, numeric_fields_of_format(fmt))
+        return fields_to_read(fmt.name, numeric_fields_of(fmt))
 
     log = (_TextLog if as_text else _BinaryLog)(str(path))
     try:
         for fmt, numbers in log.messages_with_numbers(fields_of_format):
-            yield fmt.name, numeric_fields_of_format(fmt), numbers
+            yield fmt.name, numeric_fields_of(fmt), numbers
     finally:
         log.data_map.close()
         log.filehandle.close()
@@ -92,11 +92,11 @@ class _MappedLog:
         """Of each message its format, and the numbers of the fields of that format."""
         while (message := self.recv_msg()) is not None:
             yield message.fmt, _numbers_of_message(message, fields_of)
-            self._release_pages_before(self.offset)
+            self._release_before(self.offset)
 
-    def _release_pages_before(self, offset: int) -> None:
+    def _release_before(self, offset: int) -> None:
         """From time to time, and where the system can."""
-        if abs(offset - self._released_offset) >= _BYTES_BETWEEN_RELEASES:
+        if abs(offset - self._released_offset) >= _RELEASE_BYTES:
             self._released_offset = offset
             if hasattr(mmap, "MADV_DONTNEED"):
                 self.data_map.madvise(mmap.MADV_DONTNEED)
@@ -119,12 +119,12 @@ class _TextLog(_MappedLog, DFReader_text):
     def _find_line_of_format(self, begin: int) -> int:
         """Where the next line with a format begins, -1 if there is none."""
         begin_of_line = b"\nFMT,"
-        for block in range(begin, self.data_len, _BYTES_BETWEEN_RELEASES):
-            end = block + _BYTES_BETWEEN_RELEASES + len(begin_of_line) - 1
+        for block in range(begin, self.data_len, _RELEASE_BYTES):
+            end = block + _RELEASE_BYTES + len(begin_of_line) - 1
             found = self.data_map.find(begin_of_line, block, end)
             if found >= 0:
                 return found + 1
-            self._release_pages_before(end)
+            self._release_before(end)
         return -1
 
 
@@ -138,7 +138,7 @@ class _BinaryLog(_MappedLog, DFReader_binary):
             if fmt and fmt.type == _TYPE_OF_FORMATS and end <= self.data_len:
                 self._read_format(self.data_map[offset + _HEADER_BYTES : end])
             offset = end
-            self._release_pages_before(offset)
+            self._release_before(offset)
         self.offset = 0
 
     def _read_format(self, body: bytes) -> None:
@@ -167,7 +167,7 @@ class _BinaryLog(_MappedLog, DFReader_binary):
                 yield message.fmt, _numbers_of_message(message, fields_of)
             else:
                 return
-            self._release_pages_before(self.offset)
+            self._release_before(self.offset)
 
 
 class _Layout:

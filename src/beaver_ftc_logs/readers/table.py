@@ -15,12 +15,12 @@ from beaver_ftc_logs.readers.text import (
     TableLayout,
     check_broken_lines,
     find_layout,
-    join_and_consume_blocks,
+    join_blocks,
     read_cells,
-    text_cell_and_layout_remarks,
+    table_remarks,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
-from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
+from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
 _BYTES_PER_NUMBER = 8
@@ -34,10 +34,7 @@ TablePart = tuple[TableCells, list[tuple[str, str]], bool]
 
 
 def read(
-    path: Path,
-    time_column: str | None = None,
-    time_unit: str = "s",
-    columns: Collection[str] | None = None,
+    path: Path, time_column: str | None = None, time_unit: str = "s", columns: Collection[str] | None = None
 ) -> RecordedFlight:
     """The flight in a table. Columns and cells that hold no number are nan.
 
@@ -57,49 +54,39 @@ def read_parts(
     """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
     numbered, each of which begins with the end of the one before: memory does not grow with the file."""
     time = given_time_column or TIME_COLUMN
-    names, parts = _column_names_and_parts(
-        path, None if columns is None else {time, *columns}, part_rows
-    )
+    names, parts = _names_and_parts(path, None if columns is None else {time, *columns}, part_rows)
     if time not in names:
         allowed = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         raise BadInput(
-            f"{path}: no column {time}, allowed: {allowed}; it has "
-            f"{nearest_names_text(time, names)}"
+            f"{path}: no column {time}, allowed: {allowed}; it has {nearest_names_text(time, names)}"
         )
     for part, (cells, remarks, has_more) in enumerate(parts, 1):
-        table = _with_unread_columns_as_nan(names, cells)
+        table = _whole_table(names, cells)
         notes: dict[str, str] = {}
         for column, remark in remarks:
-            notes[column] = (
-                f"{notes[column]}\n{remark}" if column in notes else remark
-            )
-        t_s = table.pop(time) * SECONDS_PER_TIME_UNIT[time_unit]
-        kept, left_out = _timed_row_mask_and_notes(path, time, t_s, cells)
+            notes[column] = f"{notes[column]}\n{remark}" if column in notes else remark
+        t_s = table.pop(time) * TIME_UNITS[time_unit]
+        kept, left_out = _timed_rows(path, time, t_s, cells)
         select = slice(None) if kept is None else kept
         t_s = t_s[select]
-        check_row_count_and_time(path, t_s, time, cells.n_rows_before)
+        check_time(path, t_s, time, cells.n_rows_before)
         flight_columns = {
-            name: Column(t_s, values[select], notes.get(name, ""))
-            for name, values in table.items()
+            name: Column(t_s, values[select], notes.get(name, "")) for name, values in table.items()
         }
         is_whole = part == 1 and not has_more
         table_notes = (*filter(None, notes.get("", "").split("\n")), *left_out)
         yield RecordedFlight(
-            path.stem if is_whole else f"{path.stem}-part-{part}",
-            flight_columns,
-            notes=table_notes,
+            path.stem if is_whole else f"{path.stem}-part-{part}", flight_columns, notes=table_notes
         )
 
 
-def _with_unread_columns_as_nan(names: Sequence[str], cells: TableCells) -> NumberTable:
+def _whole_table(names: Sequence[str], cells: TableCells) -> NumberTable:
     """All columns, those that were not read nan."""
     blank = np.broadcast_to(np.nan, cells.n_rows)
     return {name: cells.numbers.get(name, blank) for name in names}
 
 
-def _timed_row_mask_and_notes(
-    path: Path, time: str, t_s: Floats, cells: TableCells
-) -> tuple[Floats | None, list[str]]:
+def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
     n_bad = int(np.isnan(t_s).sum())
     if not n_bad:
@@ -107,12 +94,9 @@ def _timed_row_mask_and_notes(
     if n_bad > len(t_s) // 2:
         phrase = text_of_column_phrase(cells, time)
         raise BadInput(
-            f"{path}: {time}: {n_bad} of {len(t_s)} rows hold no number{phrase}, "
-            "allowed: increasing time"
+            f"{path}: {time}: {n_bad} of {len(t_s)} rows hold no number{phrase}, allowed: increasing time"
         )
-    return np.isfinite(t_s), [
-        f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"
-    ]
+    return np.isfinite(t_s), [f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"]
 
 
 def text_of_column_phrase(cells: TableCells, name: str) -> str:
@@ -127,19 +111,19 @@ def text_of_column_phrase(cells: TableCells, name: str) -> str:
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
     """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
     it is no table, or larger than any flight."""
-    names, parts = _column_names_and_parts(path, columns, None)
-    table = _with_unread_columns_as_nan(names, next(parts)[0])
+    names, parts = _names_and_parts(path, columns, None)
+    table = _whole_table(names, next(parts)[0])
     return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
 def column_names(path: Path) -> list[str]:
     """The names of a table's columns. Raises BadInput where it is no table."""
-    return _column_names_and_parts(path, [], None)[0]
+    return _names_and_parts(path, [], None)[0]
 
 
 def first_cells_of_column(path: Path, name: str) -> TableCells:
     """The first cells of a column."""
-    return next(_column_names_and_parts(path, [name], _BATCH_ROWS)[1])[0]
+    return next(_names_and_parts(path, [name], _BATCH_ROWS)[1])[0]
 
 
 def _text_table_layout(path: Path) -> TableLayout:
@@ -151,7 +135,7 @@ def _text_table_layout(path: Path) -> TableLayout:
 
 
 @contextmanager
-def _convert_read_errors_to_bad_input(path: Path) -> Iterator[None]:
+def _read_errors(path: Path) -> Iterator[None]:
     """Within this a table is read. Raises BadInput where it is none."""
     import pyarrow as pa
 
@@ -162,21 +146,17 @@ def _convert_read_errors_to_bad_input(path: Path) -> Iterator[None]:
         raise BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet") from None
 
 
-def check_row_count_and_time(
-    path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: int = 0
-) -> None:
+def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
     """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
     wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
     if wrong.size:
         row = n_rows_before + int(wrong[0]) + 1
-        raise BadInput(
-            f"{path}: {time}: row {row}: time does not increase, allowed: increasing seconds"
-        )
+        raise BadInput(f"{path}: {time}: row {row}: time does not increase, allowed: increasing seconds")
 
 
-def _column_names_and_parts(
+def _names_and_parts(
     path: Path, columns: Collection[str] | None, part_rows: int | None
 ) -> tuple[list[str], Iterator[TablePart]]:
     """The names of a table's columns, and its parts of so many rows; the whole where None.
@@ -184,9 +164,9 @@ def _column_names_and_parts(
     Raises BadInput for a wanted name that several columns have."""
     check_is_log_itself(path)
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
-    with _convert_read_errors_to_bad_input(path):
+    with _read_errors(path):
         names, readable = (
-            _check_size_and_list_parquet_columns(path, columns)
+            _parquet_columns(path, columns)
             if layout is None
             else (list(layout.column_names), list(layout.column_names))
         )
@@ -194,61 +174,45 @@ def _column_names_and_parts(
     ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
     if ambiguous:
         raise BadInput(f"{path}: has two columns {ambiguous[0]}, allowed: one of a name")
-    wanted = [
-        name
-        for name in readable
-        if name not in doubled and (columns is None or name in columns)
-    ]
-    blocks = (
-        _read_parquet_batches(path, wanted)
-        if layout is None
-        else read_cells(path, layout, wanted)
-    )
-    return names, _join_blocks_into_parts(path, layout, blocks, part_rows)
+    wanted = [name for name in readable if name not in doubled and (columns is None or name in columns)]
+    blocks = _read_parquet_batches(path, wanted) if layout is None else read_cells(path, layout, wanted)
+    return names, _join_blocks(path, layout, blocks, part_rows)
 
 
-def _join_blocks_into_parts(
+def _join_blocks(
     path: Path, layout: TableLayout | None, blocks: Iterator[TableCells], part_rows: int | None
 ) -> Iterator[TablePart]:
     held: list[TableCells] = []
-    with _convert_read_errors_to_bad_input(path):
+    with _read_errors(path):
         for block in blocks:
             held.append(block)
             n_held = sum(held_block.n_rows for held_block in held)
             if part_rows is None and n_held > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
             while part_rows is not None and n_held > MAX_LAST_PART_FACTOR * part_rows:
-                joined = join_and_consume_blocks(held)
+                joined = join_blocks(held)
                 done = joined.select_rows(0, part_rows)
-                rest = joined.select_rows(
-                    part_rows - round(PART_OVERLAP_SHARE * part_rows)
-                )
+                rest = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
                 done.text_cell_summaries, done.broken_line_beginnings = (
                     joined.text_cell_summaries,
                     joined.broken_line_beginnings,
                 )
                 held, n_held = [rest], rest.n_rows
-                yield (
-                    done,
-                    list(text_cell_and_layout_remarks(layout, done)) if layout else [],
-                    True,
-                )
-        joined = join_and_consume_blocks(held)
+                yield (done, list(table_remarks(layout, done)) if layout else [], True)
+        joined = join_blocks(held)
         if layout:
             check_broken_lines(path, layout, joined)
-        yield joined, list(text_cell_and_layout_remarks(layout, joined)) if layout else [], False
+        yield joined, list(table_remarks(layout, joined)) if layout else [], False
 
 
-def _check_size_and_list_parquet_columns(
-    path: Path, columns: Collection[str] | None
-) -> tuple[list[str], list[str]]:
+def _parquet_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
     """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
     cell may be any size."""
     from pyarrow import parquet
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        numeric = [field.name for field in schema if _is_integer_or_float_type(field.type)]
+        numeric = [field.name for field in schema if _is_numeric_type(field.type)]
         _check_parquet_size(
             path, file.metadata, [name for name in numeric if columns is None or name in columns]
         )
@@ -262,9 +226,7 @@ def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCel
     n_read = 0
     with parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
-            yield TableCells(
-                {name: _number_column_as_floats(batch[name]) for name in names}, batch.num_rows, n_read
-            )
+            yield TableCells({name: _as_floats(batch[name]) for name in names}, batch.num_rows, n_read)
             n_read += batch.num_rows
     yield TableCells({name: np.empty(0) for name in names}, 0, n_read)
 
@@ -278,14 +240,8 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
     if metadata.num_rows > _MAX_ROWS:
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
     groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    chunks = [
-        group.column(i) for group in groups for i in range(group.num_columns)
-    ]
-    total = sum(
-        chunk.total_uncompressed_size
-        for chunk in chunks
-        if chunk.path_in_schema in set(names)
-    )
+    chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
+    total = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in set(names))
     size = max(total, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
     if size > _MAX_NUMBER_BYTES:
         raise BadInput(
@@ -293,11 +249,11 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
         )
 
 
-def _is_integer_or_float_type(kind: Any) -> bool:
+def _is_numeric_type(kind: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
-def _number_column_as_floats(column: Any) -> Floats:
+def _as_floats(column: Any) -> Floats:
     return np.asarray(column.to_numpy(), dtype=float)

@@ -58,7 +58,7 @@ class TableCells:
         return TableCells(numbers, len(range(self.n_rows)[first:end_row]), self.n_rows_before + first)
 
 
-def join_and_consume_blocks(blocks: Sequence[TableCells]) -> TableCells:
+def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     """Blocks that follow one another as one; they are used up."""
     first = blocks[0]
     column_names = list(first.numbers)
@@ -99,33 +99,20 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
         if not below and line == 0 and len(header) > 1:
             return _layout_of_header(line, header, delimiter, ".")  # a table of no rows
         fits = [len(row) == len(header) for row in below]
-        if (
-            len(header) < 2
-            or any(_is_number_cell(name) for name in header)
-            or not any(fits)
-        ):
+        if len(header) < 2 or any(_is_number_cell(name) for name in header) or not any(fits):
             continue
-        numbers = [
-            cell
-            for row in below
-            if len(row) == len(header)
-            for cell in row
-            if _is_number_cell(cell)
-        ]
+        numbers = [cell for row in below if len(row) == len(header) for cell in row if _is_number_cell(cell)]
         if numbers:
             comma = delimiter != "," and any("," in cell for cell in numbers)
             return _layout_of_header(line, header, delimiter, "," if comma else ".")
     return None
 
 
-def _layout_of_header(
-    line: int, header: Sequence[str], delimiter: str, mark: str
-) -> TableLayout:
+def _layout_of_header(line: int, header: Sequence[str], delimiter: str, mark: str) -> TableLayout:
     names = [name.strip() for name in (header[0].lstrip("# "), *header[1:])]
     doubled = frozenset(name for name, n in Counter(names).items() if n > 1)
     unique = (
-        f"{name} (column {place})".strip() if name in doubled else name
-        for place, name in enumerate(names, 1)
+        f"{name} (column {place})".strip() if name in doubled else name for place, name in enumerate(names, 1)
     )
     return TableLayout(line, tuple(unique), delimiter, mark, doubled)
 
@@ -174,20 +161,13 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
         for block in blocks:
             cells = TableCells({}, block.num_rows, n_read)
             cells.numbers = {
-                name: _convert_column_and_record_text(
-                    block[name], layout.decimal_mark, name, cells, days[name]
-                )
+                name: _convert_column(block[name], layout.decimal_mark, name, cells, days[name])
                 for name in wanted
             }
             cells.broken_line_beginnings, broken[:] = broken[:], []
             n_read += block.num_rows
             yield cells
-    yield TableCells(
-        {name: np.empty(0) for name in wanted},
-        0,
-        n_read,
-        broken_line_beginnings=broken,
-    )
+    yield TableCells({name: np.empty(0) for name in wanted}, 0, n_read, broken_line_beginnings=broken)
 
 
 def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
@@ -220,9 +200,7 @@ def _all_text_conversion(column_names: Sequence[str], wanted: Sequence[str]) -> 
     )
 
 
-def _convert_column_and_record_text(
-    cells: Any, mark: str, name: str, table: TableCells, days: DayCount
-) -> Floats:
+def _convert_column(cells: Any, mark: str, name: str, table: TableCells, days: DayCount) -> Floats:
     """A block's column as numbers, a time in words as its seconds; other text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
@@ -240,36 +218,25 @@ def _convert_column_and_record_text(
         for row in rows:
             text = cells[row].as_py()
             values[row] = days.continued(seconds_of_text(text)) if is_clock(text) else seconds_of_text(text)
-        _record_text_cells(
-            name, cells, [row for row in rows if np.isnan(values[row])], table
-        )
+        _record_text_cells(name, cells, [row for row in rows if np.isnan(values[row])], table)
         return np.where(np.isfinite(values), values, np.nan)
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _record_text_cells(
-    name: str, cells: Any, bare: Sequence[int], table: TableCells
-) -> None:
+def _record_text_cells(name: str, cells: Any, bare: Sequence[int], table: TableCells) -> None:
     rows = [row for row in bare if cells[row].as_py()]
     if rows:
-        table.text_cell_summaries[name] = (
-            len(rows),
-            table.n_rows_before + rows[0] + 1,
-            str(cells[rows[0]]),
-        )
+        table.text_cell_summaries[name] = (len(rows), table.n_rows_before + rows[0] + 1, str(cells[rows[0]]))
 
 
-def text_cell_and_layout_remarks(layout: TableLayout, table: TableCells) -> Iterator[tuple[str, str]]:
+def table_remarks(layout: TableLayout, table: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
     for name, (n_texts, row, first_cell) in table.text_cell_summaries.items():
         if np.isfinite(table.numbers[name]).any():
             count_text = "1 cell holds" if n_texts == 1 else f"{n_texts} cells hold"
-            yield (
-                name,
-                f"{name}: {count_text} no number, the first in row {row}: {first_cell[:30]!r}",
-            )
+            yield (name, f"{name}: {count_text} no number, the first in row {row}: {first_cell[:30]!r}")
     if layout.header_line_index:
         yield "", f"names are in line {layout.header_line_index + 1}, what is above is left out"
     if layout.delimiter != ",":

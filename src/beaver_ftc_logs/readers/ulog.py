@@ -40,9 +40,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     if not fields:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
     if wanted is not None and not {*wanted} & {*column_names}:
-        return RecordedFlight(
-            path.stem, columns_without_numbers(fields, _TIME_FIELD), parameters=params
-        )
+        return RecordedFlight(path.stem, columns_without_numbers(fields, _TIME_FIELD), parameters=params)
     columns, origin_s = columns_and_time_origin(kept, _TIME_FIELD)
     return RecordedFlight(
         path.stem,
@@ -65,28 +63,25 @@ def _read_topics(
         import_module("pyulog")  # here, since the module below may have been imported before
         from beaver_ftc_logs.readers import ulog_blocks
 
-        topics = _check_formats_and_select_topics(path, wanted)
+        topics = _select_topics(path, wanted)
         any_wanted = wanted is None or bool(topics)
 
         def kept_fields(topic: str, fields: list[str]) -> list[str]:
             return [
                 field
                 for field in fields
-                if any_wanted
-                and (field == _TIME_FIELD or wanted is None or f"{topic}.{field}" in wanted)
+                if any_wanted and (field == _TIME_FIELD or wanted is None or f"{topic}.{field}" in wanted)
             ]
 
         fields_by_topic: dict[str, list[str]] = {}
         kept_by_topic: dict[str, dict[str, Floats]] = {}
-        for topic, fields, kept in ulog_blocks.read_topics(
-            path, topics or None, kept_fields, params
-        ):
+        for topic, fields, kept in ulog_blocks.read_topics(path, topics or None, kept_fields, params):
             if _TIME_FIELD in fields:
                 fields_by_topic[topic], kept_by_topic[topic] = fields, kept
     return fields_by_topic, kept_by_topic
 
 
-def _check_formats_and_select_topics(path: Path, wanted: Collection[str] | None) -> list[str]:
+def _select_topics(path: Path, wanted: Collection[str] | None) -> list[str]:
     """The topics in a log that a wanted column may be of. Raises ValueError for a message too large."""
     from pyulog import ULog
 

@@ -22,10 +22,7 @@ KeptFields = Callable[[str, list[str]], list[str]]
 
 
 def read_topics(
-    path: Path,
-    topics: list[str] | None,
-    kept: KeptFields,
-    params: dict[str, tuple[float, ...]],
+    path: Path, topics: list[str] | None, kept: KeptFields, params: dict[str, tuple[float, ...]]
 ) -> Iterator[tuple[str, list[str], dict[str, Floats]]]:
     """Of each topic with a message: its name in columns, all its fields, and the numbers of the kept ones.
 

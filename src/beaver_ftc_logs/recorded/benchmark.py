@@ -20,7 +20,7 @@ from beaver_ftc.studies.engine import poisson
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with_detector
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.fitting import (
     FitPart,
@@ -32,11 +32,11 @@ from beaver_ftc_logs.fitting import (
 )
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
-from beaver_ftc_logs.samples import Samples, read_columns_of_vehicle, resample
+from beaver_ftc_logs.samples import Samples, read_vehicle_columns, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
-LABEL_SCORE_TITLES = {
+LABEL_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
@@ -45,13 +45,13 @@ MAX_SHORT_DELAY_S = 5.0
 SURFACE_KINDS = ("aileron", "rudder", "elevator")
 _KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OUR_METHOD_TITLE = "bank of filters (ours)"
-FROZEN_OUTPUT_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
-METHOD_TITLE_BY_DETECTOR_NAME = {
+FREEZE_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
+METHOD_TITLES = {
     "bank-of-filters": OUR_METHOD_TITLE,
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
 }
-_MAX_SHOWN_DELAY_S = 30.0
+_SHOWN_DELAY_S = 30.0
 VEHICLE_FILE = "vehicle.yaml"
 _ALFA_GYRO_FILE_PATTERN = "*-mavros-imu-data_raw.csv"
 
@@ -70,9 +70,7 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
-    data_sets = [
-        data for path in (folder, *sorted(folder.iterdir())) if (data := _load_data_set(path))
-    ]
+    data_sets = [data for path in (folder, *sorted(folder.iterdir())) if (data := _load_data_set(path))]
     if not data_sets:
         raise BadInput(
             f"compare: --flights {folder}: holds no data set, allowed: folders with tables and a "
@@ -86,24 +84,16 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
         return None
     if (path / VEHICLE_FILE).is_file():
         paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
-        return (
-            _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
-        )
+        return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
     folders = sorted(
-        folder
-        for folder in path.iterdir()
-        if folder.is_dir() and any(folder.glob(_ALFA_GYRO_FILE_PATTERN))
+        folder for folder in path.iterdir() if folder.is_dir() and any(folder.glob(_ALFA_GYRO_FILE_PATTERN))
     )
-    return (
-        _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
-    )
+    return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
 
 
 def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
-    recordings = tuple(read_columns_of_vehicle(path, vehicle) for path in paths)
-    return FlightDataSet(
-        name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings)
-    )
+    recordings = tuple(read_vehicle_columns(path, vehicle) for path in paths)
+    return FlightDataSet(name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings))
 
 
 def run_benchmark(folder: Path) -> Document:
@@ -125,75 +115,57 @@ def _compare_methods(data: FlightDataSet) -> Document:
     is_single = len(data.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    settings = (
-        settings_of_whole_flight(usable, data) if is_single else None
-    )
+    settings = whole_settings(usable, data) if is_single else None
     entries: list[Document] = []
     for fitted, held_out, name in validation_folds(usable):
-        model = add_ranges_and_threshold(
-            fitted, fit_model(fitted, data.vehicle, settings)
-        )
-        log = next(
-            log for log in data.recordings if log.name == held_out.samples.name
-        )
+        model = add_ranges_and_threshold(fitted, fit_model(fitted, data.vehicle, settings))
+        log = next(log for log in data.recordings if log.name == held_out.samples.name)
         entries += [
             {"left_out": name, "method": title, **_score_against_log(held_out, rows, model)}
-            for title, rows in _diagnose_with_each_method(log, held_out, model)
+            for title, rows in _diagnose_each(log, held_out, model)
         ]
     by_labels = "classes" in entries[0]
-    summarize = summarize_label_scores if by_labels else summarize_failure_scores
+    summarize = summarize_labels if by_labels else summarize_failures
     titles = dict.fromkeys(entry["method"] for entry in entries)
-    by_method = {
-        title: [entry for entry in entries if entry["method"] == title]
-        for title in titles
-    }
+    by_method = {title: [entry for entry in entries if entry["method"] == title] for title in titles}
     return {
         "set": data.name,
         "vehicle": data.vehicle.name,
         "scored_by": "labels" if by_labels else "events",
         "left_out": "halves of the one flight in turn" if is_single else "each flight in turn",
-        "rows": [
-            {"method": title, **summarize(scores)}
-            for title, scores in by_method.items()
-        ],
+        "rows": [{"method": title, **summarize(scores)} for title, scores in by_method.items()],
         "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
         "flights": entries,
     }
 
 
-def _diagnose_with_each_method(
-    log: RecordedFlight, held_out: FitPart, model: Model
-) -> Iterator[tuple[str, DiagnosisRows]]:
+def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iterator[tuple[str, LogRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
         yield (
-            METHOD_TITLE_BY_DETECTOR_NAME.get(name, f"{name}, of the loop"),
+            METHOD_TITLES.get(name, f"{name}, of the loop"),
             diagnose_with_detector(name, held_out.samples, model),
         )
     frozen = diagnose_by_freeze_rule(log, held_out.samples, model)
     if frozen is not None:
-        yield FROZEN_OUTPUT_RULE_TITLE, frozen
+        yield FREEZE_RULE_TITLE, frozen
 
 
-def settings_of_whole_flight(
-    usable: list[FitPart], data: FlightDataSet
-) -> FilterSettings:
+def whole_settings(usable: list[FitPart], data: FlightDataSet) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
     model = fit_model(usable, data.vehicle)
     if len(usable) > 1:
         return model.settings
-    return model.settings.model_copy(
-        update={"credible_mass": score_folds(usable, model)[1]}
-    )
+    return model.settings.model_copy(update={"credible_mass": score_folds(usable, model)[1]})
 
 
-def _score_against_log(held_out: FitPart, rows: DiagnosisRows, model: Model) -> Document:
+def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Document:
     if np.isfinite(held_out.samples.labels).any():
-        return scoring.score_against_labels(rows, labels_nan_outside_usable_span(held_out))
+        return scoring.score_against_labels(rows, labels_in_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_nan_outside_usable_span(held_out: FitPart) -> np.ndarray:
+def labels_in_span(held_out: FitPart) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
     usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
@@ -203,7 +175,7 @@ def labels_nan_outside_usable_span(held_out: FitPart) -> np.ndarray:
     return labels
 
 
-def summarize_failure_scores(scores: Sequence[Document]) -> Document:
+def summarize_failures(scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
     failures = [score for score in scores if score["failure"]]
@@ -214,29 +186,20 @@ def summarize_failure_scores(scores: Sequence[Document]) -> Document:
     healthy = [score for score in scores if score["failure"] is None]
     quiet = [score for score in healthy if not score["false_alarms"]]
     hours = sum(score["healthy_s"] for score in scores) / 3600.0
-    rate = poisson(
-        sum(score["false_alarms"] for score in scores), hours
-    )
+    rate = poisson(sum(score["false_alarms"] for score in scores), hours)
     n_right = len(found) + len(quiet)
     return {
         "surface_failures": len(failed),
         "found": len(found),
-        "precision": len(found)
-        / max(len(found) + len(false), 1),
+        "precision": len(found) / max(len(found) + len(false), 1),
         "recall": len(found) / max(len(failed), 1),
         "accuracy": n_right / max(len(failed) + len(healthy), 1),
         "healthy_flights": len(healthy),
         "healthy_flights_with_an_alarm": len(healthy) - len(quiet),
-        "false_alarms_per_hour": {
-            "value": rate.value,
-            "low": rate.low,
-            "high": rate.high,
-        },
+        "false_alarms_per_hour": {"value": rate.value, "low": rate.low, "high": rate.high},
         "healthy_hours": hours,
         "wrong_group": sum(score["right_group"] is False for score in found),
-        "delay_s": {
-            kind: _summarize_delays(failed, kind) for kind in SURFACE_KINDS
-        },
+        "delay_s": {kind: _summarize_delays(failed, kind) for kind in SURFACE_KINDS},
         "engine_failures_with_an_alarm": sum(score["detected"] for score in engine),
     }
 
@@ -247,11 +210,7 @@ def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
     kin = [
         score
         for score in failed
-        if min(
-            _KIND_OF_SURFACE.get(surface, surface)
-            for surface in score["failure"].split("+")
-        )
-        == kind
+        if min(_KIND_OF_SURFACE.get(surface, surface) for surface in score["failure"].split("+")) == kind
     ]
     delays_s = [score["delay_s"] for score in kin if score["detected"]]
     return {
@@ -262,16 +221,13 @@ def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
     }
 
 
-def summarize_label_scores(parts: Sequence[Document]) -> Document:
+def summarize_labels(parts: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
     parts = [part for part in parts if part["rows"]]
     if not parts:
-        return {**dict.fromkeys(LABEL_SCORE_TITLES), "rows": 0}
+        return {**dict.fromkeys(LABEL_TITLES), "rows": 0}
     counts = np.array([part["rows"] for part in parts], dtype=float)
-    means = {
-        key: float(np.average([part[key] for part in parts], weights=counts))
-        for key in LABEL_SCORE_TITLES
-    }
+    means = {key: float(np.average([part[key] for part in parts], weights=counts)) for key in LABEL_TITLES}
     return means | {"rows": int(counts.sum())}
 
 
@@ -282,9 +238,9 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     tables = []
     for data in document["sets"]:
         head, cells_of = (
-            (LABEL_TABLE_HEADER, _label_score_cells)
+            (LABEL_HEADER, _label_score_cells)
             if data["scored_by"] == "labels"
-            else (FAILURE_TABLE_HEADER, _failure_score_cells)
+            else (FAILURE_HEADER, _failure_score_cells)
         )
         rows = [cells_of(row) for row in (*data["rows"], *data["published"])]
         tables.append((f"{data['set']}: left out, {data['left_out']}", (head, rows)))
@@ -293,34 +249,25 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    head = ["day", *LABEL_SCORE_TITLES.values(), "classes by sliding least squares"]
+    head = ["day", *LABEL_TITLES.values(), "classes by sliding least squares"]
     tables = []
     for data in document["sets"]:
-        rows = [
-            [day["day"], *_day_score_cells(day)]
-            for day in data["rows"]
-            if day["kind"] == "one change"
-        ]
+        rows = [[day["day"], *_day_score_cells(day)] for day in data["rows"] if day["kind"] == "one change"]
         for summary in data["summary"]:
             rows += [
                 [f"{summary['kind']}: {statistic}", *_day_score_cells(summary[statistic])]
                 for statistic in ("mean", "worst")
             ]
-        tables.append(
-            (
-                f"{data['set']}: other days made of it, halves left out in turn",
-                (head, rows),
-            )
-        )
+        tables.append((f"{data['set']}: other days made of it, halves left out in turn", (head, rows)))
     return tables
 
 
 def _day_score_cells(day: Document) -> list[str]:
-    return [f"{day[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
+    return [f"{day[key]:.3f}" for key in (*LABEL_TITLES, "beside")]
 
 
-LABEL_TABLE_HEADER = ["method", *LABEL_SCORE_TITLES.values()]
-FAILURE_TABLE_HEADER = [
+LABEL_HEADER = ["method", *LABEL_TITLES.values()]
+FAILURE_HEADER = [
     "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
     "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
     "wrong group",
@@ -328,22 +275,16 @@ FAILURE_TABLE_HEADER = [
 
 
 def _label_score_cells(row: Document) -> list[str]:
-    return [row["method"], *_score_texts_or_empty(row, LABEL_SCORE_TITLES)]
+    return [row["method"], *_score_texts_or_empty(row, LABEL_TITLES)]
 
 
 def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
     delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
-    cells = [
-        row["method"],
-        *_score_texts_or_empty(row, FAILURE_TABLE_HEADER[1:4]),
-        *map(_mean_delay_text, delays),
-    ]
+    cells = [row["method"], *_score_texts_or_empty(row, FAILURE_HEADER[1:4]), *map(_mean_delay_text, delays)]
     if "false_alarms_per_hour" not in row:
-        return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
-    n_soon, n_failed = (
-        sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures")
-    )
+        return cells + [""] * (len(FAILURE_HEADER) - len(cells))
+    n_soon, n_failed = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
     alarms = row["false_alarms_per_hour"]
     return [
         *cells,
@@ -361,9 +302,7 @@ def _score_texts_or_empty(row: Document, keys: Iterable[str]) -> list[str]:
 def _mean_delay_text(delay: Document) -> str:
     if delay.get("mean") is None:
         return "not found" if delay.get("failures") else ""
-    count_text = (
-        f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
-    )
+    count_text = f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
     return f"{delay['mean']:.1f}{count_text}"
 
 
@@ -375,9 +314,7 @@ def as_text(document: Document) -> str:
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
     tables = score_tables(document)
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables
-    )
+    return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables)
 
 
 def table_markers(document: Document) -> tuple[str, str]:
@@ -398,7 +335,7 @@ def draw_comparison_figure(document: Document) -> Any:
         len(data_sets), 1, 8.6, sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
     )
     for axis, data in zip(axes[:, 0], data_sets, strict=True):
-        draw = _draw_shares_of_right_rows if data["scored_by"] == "labels" else _draw_failure_delays
+        draw = _draw_shares if data["scored_by"] == "labels" else _draw_failure_delays
         draw(axis, data)
         axis.set_title(f"{data['set']}: left out, {data['left_out']}", fontsize=10, loc="left")
         axis.set_yticks(range(len(_method_titles(data))), _method_titles(data))
@@ -418,9 +355,7 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
     titles = _method_titles(data)
     failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
-    failures = [
-        failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure
-    ]
+    failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
     for i, surface_failure in enumerate(failures):
         entries = [
             entry
@@ -428,45 +363,33 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
             if entry["failure"] == surface_failure and entry["method"] in titles
         ]
         delays_s = [
-            _MAX_SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"]
-            for entry in entries
+            _SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"] for entry in entries
         ]
         heights = [
-            titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(failures) - 0.5)
-            for entry in entries
+            titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(failures) - 0.5) for entry in entries
         ]
         label = surface_failure.replace("_", " ").replace("+", " + ")
         axis.plot(
-            [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
+            [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s],
             heights,
             marker(i),
             color=SERIES[i],
             label=label,
         )
-    axis.axvspan(_MAX_SHOWN_DELAY_S, _MAX_SHOWN_DELAY_S + 2.0, color=GRID)
-    axis.set_xlim(-0.5, _MAX_SHOWN_DELAY_S + 2.0)
-    axis.set_xlabel(f"delay, s (grey: not found within {_MAX_SHOWN_DELAY_S:g} s)", fontsize=9)
+    axis.axvspan(_SHOWN_DELAY_S, _SHOWN_DELAY_S + 2.0, color=GRID)
+    axis.set_xlim(-0.5, _SHOWN_DELAY_S + 2.0)
+    axis.set_xlabel(f"delay, s (grey: not found within {_SHOWN_DELAY_S:g} s)", fontsize=9)
 
 
-def _draw_shares_of_right_rows(axis: Any, data: Document) -> None:
+def _draw_shares(axis: Any, data: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
-    labels = {
-        "classes": "class",
-        "healthy_or_faulty": "healthy or faulty",
-        "side": "side of the aircraft",
-    }
+    labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*data["rows"], *data["published"]]
     for i, (key, label) in enumerate(labels.items()):
-        scored = [
-            row_index for row_index, row in enumerate(rows) if row.get(key) is not None
-        ]
+        scored = [row_index for row_index, row in enumerate(rows) if row.get(key) is not None]
         heights = [row_index + 0.22 * (i - 1) for row_index in scored]
         axis.plot(
-            [rows[row_index][key] for row_index in scored],
-            heights,
-            marker(i),
-            color=SERIES[i],
-            label=label,
+            [rows[row_index][key] for row_index in scored], heights, marker(i), color=SERIES[i], label=label
         )
     axis.set_xlim(0, 1)
     axis.set_xlabel("share of the rows that are right", fontsize=9)

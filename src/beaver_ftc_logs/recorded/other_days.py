@@ -15,13 +15,8 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import BANK_OF_FILTERS_DETECTOR, diagnose_with_detector
-from beaver_ftc_logs.fitting import (
-    FitPart,
-    fit_model,
-    fit_parts,
-    validation_folds,
-)
+from beaver_ftc_logs.detectors import OUR_DETECTOR, diagnose_with_detector
+from beaver_ftc_logs.fitting import FitPart, fit_model, fit_parts, validation_folds
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
@@ -29,8 +24,8 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS, TEST_SEEDS = range(8), range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
-_WORST_FUNCTION_BY_SCORE = {"mean_error": max}
-_TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
+_WORST_OF_SCORE = {"mean_error": max}
+_TRIM_MEAN_S = 30.0  # of the mean that is called slow
 
 
 @dataclass(frozen=True)
@@ -62,18 +57,14 @@ def unchanged_day(n: int) -> DayChanges:
     return DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
 
 
-def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
+def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
     """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
     unchanged = unchanged_day(len(mixer_shares))
     days = [unchanged]
     for command, shares in zip(command_names, mixer_shares.T, strict=True):
         for shift in (-0.04, 0.04):
             days.append(
-                replace(
-                    unchanged,
-                    name=f"trim of {command} {shift:+.2f}",
-                    trim_shift_commands=shift * shares,
-                )
+                replace(unchanged, name=f"trim of {command} {shift:+.2f}", trim_shift_commands=shift * shares)
             )
             days.append(
                 replace(
@@ -87,9 +78,7 @@ def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]
         replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
         for delay_s in (-0.04, 0.04)
     ]
-    days += [
-        replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)
-    ]
+    days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
     days += [
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
@@ -97,9 +86,7 @@ def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]
     for i, unit in enumerate(np.eye(len(mixer_shares))):
         for gain in (0.94, 1.06):
             gains = np.where(unit, gain, 1.0)
-            days.append(
-                replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains)
-            )
+            days.append(replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains))
     return days
 
 
@@ -123,41 +110,27 @@ def _random_day(n: int, seed: int) -> DayChanges:
     )
 
 
-def apply_day_changes(
-    day: DayChanges, samples: Samples, A: Floats, Q: Floats
-) -> Samples:
+def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:
     """The flight as it might have been on that day. A (3 h, 3) and Q
     (3, 3) of its model."""
     rng = np.random.default_rng(20)
     e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
-    trim = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
-    commands = trim + day.motion_scale * (commands - trim) / (
-        day.common_gain * day.surface_gains
-    )
-    drift = day.trim_drift_sd_commands * _coloured_noise(
-        rng, commands.shape, 300.0 / samples.dt_s
-    )
-    commands = (
-        commands
-        + day.neutral_shift_commands
-        + (day.trim_shift_commands + drift) / e
-    )
-    trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
+    trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
+    commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
+    drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + drift) / e
+    trim_rates = _running_mean(samples.rates, round(_TRIM_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
     extra = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
-    rates = rates + extra * _rate_response_to_noise(
-        rng, A, Q, len(rates)
-    )
+    rates = rates + extra * _response_to_noise(rng, A, Q, len(rates))
     return replace(samples, commands=commands, rates=rates)
 
 
 def _shift_values_earlier(values: Floats, n: float) -> Floats:
     """Values that act `n` samples later than these: logged earlier by as much, (n, S)."""
     rows = np.arange(len(values)) + n
-    return np.column_stack(
-        [np.interp(rows, np.arange(len(values)), column) for column in values.T]
-    )
+    return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
 
 
 def _running_mean(values: Floats, n: int) -> Floats:
@@ -176,26 +149,20 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) 
     return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
 
 
-def _rate_response_to_noise(
-    rng: np.random.Generator, A: Floats, Q: Floats, n: int
-) -> Floats:
+def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:
     """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
     noise = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
     n_lags = len(A) // 3
     rates = np.zeros((n + n_lags, 3))
     for k in range(n):
-        rates[k + n_lags] = (
-            rates[k : k + n_lags][::-1].ravel() @ A[: 3 * n_lags] + noise[k]
-        )
+        rates[k + n_lags] = rates[k : k + n_lags][::-1].ravel() @ A[: 3 * n_lags] + noise[k]
     return rates[n_lags:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
     labelled = [
-        data
-        for data in benchmark.load_data_sets(folder)
-        if np.isfinite(data.flights[0].labels).any()
+        data for data in benchmark.load_data_sets(folder) if np.isfinite(data.flights[0].labels).any()
     ]
     if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
@@ -204,7 +171,7 @@ def run_other_days(folder: Path) -> Document:
 
 def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
     usable = fit_parts(data.flights)
-    settings = benchmark.settings_of_whole_flight(usable, data)
+    settings = benchmark.whole_settings(usable, data)
     folds = [
         (fit_model(fitted, data.vehicle, settings), held_out)
         for fitted, held_out, _ in validation_folds(usable)
@@ -212,72 +179,43 @@ def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
     model = fit_model(usable, data.vehicle, settings)
     n = len(data.vehicle.surfaces)
     days_by_kind = {
-        "one change": unchanged_and_one_change_days(
-            mixer_matrix(data.vehicle), data.vehicle.command_column_names
-        ),
+        "one change": one_change_days(mixer_matrix(data.vehicle), data.vehicle.command_columns),
         "drawn, settings chosen on these": random_days(n, TUNING_SEEDS),
         "drawn, not looked at": random_days(n, TEST_SEEDS),
     }
-    scores = [
-        day
-        for kind, days in days_by_kind.items()
-        for day in _score_days(kind, days, folds, model)
-    ]
-    summary = [
-        _summarize_days(
-            kind, [day for day in scores if day["kind"] == kind]
-        )
-        for kind in days_by_kind
-    ]
+    scores = [day for kind, days in days_by_kind.items() for day in _score_days(kind, days, folds, model)]
+    summary = [_summarize_days(kind, [day for day in scores if day["kind"] == kind]) for kind in days_by_kind]
     return {"set": data.name, "rows": scores, "summary": summary}
 
 
 def _score_days(
-    kind: str,
-    days: Sequence[DayChanges],
-    folds: Sequence[tuple[Model, FitPart]],
-    all_flights_model: Model,
+    kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], all_flights_model: Model
 ) -> Iterator[Document]:
-    _, A, _, Q = all_flights_model.intercept_past_response_noise()
+    _, A, _, Q = all_flights_model.as_arrays()
     for day in days:
-        scores: dict[str, list[Document]] = {
-            BANK_OF_FILTERS_DETECTOR: [],
-            _RIVAL_DETECTOR: [],
-        }
+        scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in folds:
-            altered = apply_day_changes(
-                day, held_out.samples, A, Q
-            )
-            labels = benchmark.labels_nan_outside_usable_span(held_out)
+            altered = apply_day_changes(day, held_out.samples, A, Q)
+            labels = benchmark.labels_in_span(held_out)
             for detector, parts in scores.items():
                 parts.append(
-                    scoring.score_against_labels(
-                        diagnose_with_detector(detector, altered, model), labels
-                    )
+                    scoring.score_against_labels(diagnose_with_detector(detector, altered, model), labels)
                 )
-        rival = benchmark.summarize_label_scores(scores[_RIVAL_DETECTOR])[
-            "classes"
-        ]
+        rival = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_label_scores(scores[BANK_OF_FILTERS_DETECTOR]),
+            **benchmark.summarize_labels(scores[OUR_DETECTOR]),
             "beside": rival,
         }
 
 
 def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values = {
-        key: [day[key] for day in scores_of_days]
-        for key in (*benchmark.LABEL_SCORE_TITLES, "beside")
-    }
+    values = {key: [day[key] for day in scores_of_days] for key in (*benchmark.LABEL_TITLES, "beside")}
     mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values.items()}
     return {
         "kind": kind,
         "mean": mean_by_score,
-        "worst": {
-            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(score_values)
-            for k, score_values in values.items()
-        },
+        "worst": {k: _WORST_OF_SCORE.get(k, min)(score_values) for k, score_values in values.items()},
     }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import LoggedFailure
 from beaver_ftc_logs.regression import group_surfaces
@@ -82,7 +82,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     labels = labels if its.labels else np.full_like(labels, np.nan)
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
-        "stretch_number": run, "dt_s": step, "mean_age_s_by_held_column": {}, "logged_failures": (),
+        "stretch_number": run, "dt_s": step, "held_age_s": {}, "logged_failures": (),
         "log_stamps_s": t_s,
     }  # fmt: skip
     return Samples(**(given | changes))
@@ -95,7 +95,7 @@ def rows(parts, surfaces=2, step_s=0.5):
     faulty = np.array([int(bool(name)) for name in named], dtype=np.int64)
     t_s = 10.0 + step_s * np.arange(len(named))
     probability = np.where(faulty, 0.9, 0.1) + 0.001 * np.arange(len(named))
-    return DiagnosisRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
+    return LogRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
 
 
 FAILURE = (

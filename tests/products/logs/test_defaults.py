@@ -7,8 +7,8 @@ import pytest
 import small
 
 from beaver_ftc_logs.diagnose import (
-    _add_unknown_effect_surfaces_widening_bounds,
-    _would_name_all_named_before,
+    _add_unknown_surfaces,
+    _names_all_again,
 )
 from beaver_ftc_logs.filtering import recent_scale
 from beaver_ftc_logs.identification import assume_law_and_air
@@ -105,10 +105,10 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_unknown_effect_surfaces_widening_bounds(still, model, rows).isolated_surfaces[20:]) == {
+    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {
         "left"
     }
-    found = _add_unknown_effect_surfaces_widening_bounds(flown, model, rows)
+    found = _add_unknown_surfaces(flown, model, rows)
     assert set(found.isolated_surfaces[20:]) == {"right+left"}
     assert (found.effectiveness_high[20:] == 1.0).all()
     assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])
@@ -119,5 +119,5 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
 )
 def test_a_surface_that_was_excluded_stays_so(now, said, wide):
-    assert _would_name_all_named_before(now, said, small.model(settings={"one_group": True})) is wide
-    assert not _would_name_all_named_before(now, said, small.model())
+    assert _names_all_again(now, said, small.model(settings={"one_group": True})) is wide
+    assert not _names_all_again(now, said, small.model())

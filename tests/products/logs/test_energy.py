@@ -12,7 +12,7 @@ from beaver_ftc_logs import energy
 from beaver_ftc_logs.readers import alfa
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import resample
-from beaver_ftc_logs.scoring import _is_most_frequent_name_right
+from beaver_ftc_logs.scoring import _is_main_name_right
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 T_S = np.arange(0.0, 20.0, 0.1)
@@ -138,9 +138,9 @@ def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
 
 def test_an_engine_is_no_surface_that_was_named():
     groups = [["left"], ["right"]]
-    assert _is_most_frequent_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
-    assert _is_most_frequent_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
-    assert _is_most_frequent_name_right({"engine": 1.0}, ["engine"], groups) is None
+    assert _is_main_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
+    assert _is_main_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
+    assert _is_main_name_right({"engine": 1.0}, ["engine"], groups) is None
 
 
 def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_nothing_rises():

@@ -7,7 +7,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes, fitting
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import fault_evidence, page_cusum
-from beaver_ftc_logs.vehicle import with_false_alarm_rate
+from beaver_ftc_logs.vehicle import with_alarm_rate
 from products.logs import small
 
 PER_HOUR = 300.0
@@ -114,7 +114,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
 @pytest.mark.parametrize("rate", [0.0, -1.0, 1001.0, float("nan")])
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(BadInput, match="allowed: more than 0, up to 1000 an hour"):
-        with_false_alarm_rate(small.vehicle(), rate)
+        with_alarm_rate(small.vehicle(), rate)
 
 
 @pytest.mark.parametrize("threshold", [2.0, 3.0])

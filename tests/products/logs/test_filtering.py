@@ -61,7 +61,7 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
 def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
     settings = wing_model.settings
-    _, _, response, noise = wing_model.intercept_past_response_noise()
+    _, _, response, noise = wing_model.as_arrays()
     rng = np.random.default_rng(4)
     shifts = settings.trim_command_shift_sd * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
@@ -78,7 +78,7 @@ def test_gains_return_in_their_time(wing_model):
     for _ in range(200_000):
         variance = own.deviation_retention**2 * variance + own.random_walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
-    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.group_gain_offset_sd, rel=1e-3)
+    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_spread, rel=1e-3)
 
 
 def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
@@ -100,7 +100,7 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = build_states(with_settings(wing_model, trim_walk_sd_per_sample=walk))
+    own = build_states(with_settings(wing_model, trim_step_sd=walk))
     noise_sd = np.sqrt(np.diag(np.array(wing_model.residual_covariance)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
     np.testing.assert_allclose(np.sqrt(900 * own.random_walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
@@ -122,8 +122,8 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     for walk in (1e-6, 2e-2):
         model = with_settings(
             wing_model,
-            trim_walk_sd_per_sample=[walk] * 3,
-            max_trim_deviation_in_sd=40.0,
+            trim_step_sd=[walk] * 3,
+            max_trim_sd=40.0,
             command_delays_s=[0.0],
         )
         one, other = (
@@ -178,7 +178,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         settings=settings,
         whitened_intercept=lambda average: sum(average) * constant,
         usual_quick_power=lambda average: usual,
-        covariance_of_noise_model=lambda average: sum(average) ** 2 * noise,
+        covariance_of_noise=lambda average: sum(average) ** 2 * noise,
         rate_hz=8.0,
     )
     found, answers_by_hand = [], rng.normal(0.0, 0.05, (40, 2, 3))

@@ -209,7 +209,7 @@ def test_a_model_is_what_was_fitted(changed, fitted, usable_flights):
     assert fitted.past_coefficients == fit.coefficients[1:past].tolist()
     for field, values in (
         ("command_response", fit.coefficients),
-        ("command_response_standard_error", fit.standard_errors),
+        ("response_error", fit.standard_errors),
     ):
         for group in range(2):
             begin = past + group * fitted.n_command_lags
@@ -234,7 +234,7 @@ def test_settings_by_hand(fitted):
     stuck = fitting.estimate_filter_settings(fitting.fit_parts([small.flight(TAIL, 400)]), TAIL)
     assert stuck.likely_levels == {}
     assert 0.0 < stuck.effective_sample_share <= 0.9
-    given = settings.model_copy(update={"fault_probability_for_alarm": 0.7})
+    given = settings.model_copy(update={"alarm_probability": 0.7})
     usable_flights = fitting.fit_parts([small.flight(MODEL, 300)])
     assert fitting.fit_model(usable_flights, MODEL.vehicle, given).settings == given
     assert fitting.refit(usable_flights, fitted).settings == settings

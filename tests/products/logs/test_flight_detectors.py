@@ -201,7 +201,7 @@ VERDICTS = {
 def test_a_verdict_of_the_loop_becomes_a_row(name):
     verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
     samples = small.flight(BARE, 3)
-    rows = detectors.diagnosis_rows_from_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
+    rows = detectors.rows_of_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
     assert (rows.isolated_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
     np.testing.assert_allclose(rows.effectiveness, [[1, 1], estimate, [1, 1]])
     np.testing.assert_allclose(rows.effectiveness_low, [[1, 1], low, [1, 1]])
@@ -211,7 +211,7 @@ def test_a_verdict_of_the_loop_becomes_a_row(name):
 
 def test_surfaces_that_move_together_share_a_verdict():
     both = LOSS._replace(isolated="aileron")
-    rows = detectors.diagnosis_rows_from_verdicts([both], small.flight(TAIL, 1), TAIL)
+    rows = detectors.rows_of_verdicts([both], small.flight(TAIL, 1), TAIL)
     assert rows.isolated_surfaces.tolist() == ["left_aileron+right_aileron"]
     assert rows.effectiveness.tolist() == [[0.6, 1.0, 0.6]]
     assert rows.effectiveness_low.tolist() == [[0.0, 1.0, 0.0]]
@@ -252,7 +252,7 @@ def test_each_detector_gets_what_it_takes_and_its_rows_stand_at_the_stamps_of_th
         "diagnose": lambda of, by: ("ours", of, by),
         "run_loop_detector": lambda by, of, model: ("loop", by, of, model),
         "made": lambda kind, name: (kind, name),
-        "finalize_rows_at_log_stamps": lambda of, by, rows: ("at its stamps", of, by, rows),
+        "finish_rows": lambda of, by, rows: ("at its stamps", of, by, rows),
     }
     for name, stub in stubs.items():
         monkeypatch.setattr(detectors, name, stub)

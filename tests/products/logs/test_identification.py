@@ -20,7 +20,7 @@ from beaver_ftc_logs.identification import (
     scale_if_better,
 )
 from beaver_ftc_logs.pages import load_template
-from beaver_ftc_logs.samples import Samples, with_airspeed_scaling_and_products
+from beaver_ftc_logs.samples import Samples, scale_by_airspeed
 from products.logs import small
 
 MODEL = small.model()
@@ -82,7 +82,7 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
     asked = []
     monkeypatch.setattr(
         identification,
-        "with_airspeed_scaling_and_products",
+        "scale_by_airspeed",
         lambda one, mps, powers: asked.append(mps) or one,
     )
     monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
@@ -93,10 +93,10 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
 
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
-    found = with_airspeed_scaling_and_products(flight, 20.0)
+    found = scale_by_airspeed(flight, 20.0)
     assert found.commands[:50] == pytest.approx(flight.commands[:50])
     assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
-    stopped = with_airspeed_scaling_and_products(replace(flight, airspeed=np.zeros(100)), 20.0)
+    stopped = scale_by_airspeed(replace(flight, airspeed=np.zeros(100)), 20.0)
     assert stopped.commands == pytest.approx(0.1 * flight.commands)
     assert (found.signals[:50] == 0.0).all()
     assert found.signals[50:] == pytest.approx(-0.5 * flight.rates[50:])

@@ -15,7 +15,7 @@ from products.logs import synthetic
 def test_the_responses_are_those_of_the_vehicle(wing_model):
     true = np.array([synthetic.RIGHT, synthetic.LEFT])
     found = np.array(wing_model.command_response)[:, :3]
-    error = np.abs(found - true) / np.array(wing_model.command_response_standard_error)[:, :3]
+    error = np.abs(found - true) / np.array(wing_model.response_error)[:, :3]
     assert error.max() < 4.5
     assert np.abs(found - true).max() < 0.06
 

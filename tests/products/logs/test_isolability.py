@@ -107,7 +107,7 @@ def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
         change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(
             np.log(
-                settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm) / change
+                settings.alarm_probability / (1.0 - settings.alarm_probability) / change
             ),
             rel=1e-9,
         )

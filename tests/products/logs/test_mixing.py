@@ -343,7 +343,7 @@ def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
     log = write_px4(tmp_path / "a.ulg", PX4_ELEVONS, topics)
     first, second = "actuator_servos.control[0]", "actuator_servos.control[1]"
     vehicle, lines = load_vehicle_for_logs(vehicle_file(tmp_path / "bare.yaml"), [log])
-    assert vehicle.command_column_names == [first, second]
+    assert vehicle.command_columns == [first, second]
     assert vehicle.surfaces == {"left_elevon": {first: 1.0}, "right_elevon": {second: 1.0}}
     assert lines == [
         f"{log}: surface {i} is the {side} elevon: CA_SV_CS{i}_TYPE {5 + i}"
@@ -359,7 +359,7 @@ def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
     vehicle, _ = load_vehicle_for_logs(
         vehicle_file(tmp_path / "own.yaml", surfaces={"mine": {first: 0.3, second: -0.2}}), [log]
     )
-    assert (vehicle.command_column_names, vehicle.surfaces) == (
+    assert (vehicle.command_columns, vehicle.surfaces) == (
         [first, second],
         {"mine": {first: 0.3, second: -0.2}},
     )

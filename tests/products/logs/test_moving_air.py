@@ -104,10 +104,10 @@ def test_bounds_lean_on_no_prior_where_laws_differ():
     model = small.model(small.WING | {"other_laws": True})
     bank, samples = build_bank(model), small.flight(model, 50)
     nothing = np.tile(bank.prior_probability, (50, 1))
-    rows = diagnose.diagnosis_rows_from_posterior(samples, model, bank, nothing)
+    rows = diagnose.rows_of_posterior(samples, model, bank, nothing)
     assert (rows.effectiveness_high - rows.effectiveness_low >= 0.9).all()
     plain = small.model()
-    rows = diagnose.diagnosis_rows_from_posterior(
+    rows = diagnose.rows_of_posterior(
         samples,
         plain,
         build_bank(plain),
@@ -285,7 +285,7 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     predictor of w[k] has the coefficients -(-g1 / S)^j."""
     model, gyro = small.model(history=1, past=(a * np.eye(3)).tolist()), 0.05
     process = np.diag([1.0, 4.0, 9.0]) * 1e-4
-    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, process, gyro, 40)
+    before, noise = gyro_noise.yule_walker_predictor(model, process, gyro, 40)
     g0, g1 = np.diag(process) + gyro**2 * (1.0 + a**2), -a * gyro**2
     innovation = 0.5 * (g0 + np.sqrt(g0**2 - 4.0 * g1**2))
     np.testing.assert_allclose(noise, np.diag(innovation), rtol=1e-6, atol=1e-12)
@@ -307,7 +307,7 @@ def test_of_coupled_axes_and_two_lags_the_colour_of_gyro_noise_is_that_of_its_co
         for lag, share in enumerate(past, 1):
             of_noise[rows, 3 * (k + lag) : 3 * (k + lag) + 3] = -share.T
     covariance = gyro**2 * of_noise @ of_noise.T + np.kron(np.eye(lags + 1), process)
-    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, process, gyro, lags)
+    before, noise = gyro_noise.yule_walker_predictor(model, process, gyro, lags)
     expected = np.linalg.solve(covariance[3:, 3:], covariance[3:, :3])
     np.testing.assert_allclose(before, expected, atol=1e-9)
     np.testing.assert_allclose(noise, covariance[:3, :3] - covariance[:3, 3:] @ expected, atol=1e-12)
@@ -327,7 +327,7 @@ def test_noisier_gyros_are_added_to_the_quietest_noise_and_as_wide_as_the_widest
     assert found[:3] == known
     assert len(found) == 3 + 7
     for one, gyro in zip(found[3:], np.geomspace(1e-5, 1e-2, 7), strict=True):
-        before, noise = gyro_noise.residual_predictor_by_yule_walker(model, quiet, gyro, 20)
+        before, noise = gyro_noise.yule_walker_predictor(model, quiet, gyro, 20)
         assert (one.ma_coefficients, one.covariance_inflation) == ([1.0], 2.5)
         assert one.usual_quick_power == 5.0  # of the noise whose responses are slowest
         np.testing.assert_allclose(one.ar_coefficients, before, atol=1e-12)
@@ -478,10 +478,10 @@ def test_the_colour_of_gyro_noise_by_every_pair_of_residuals():
             added[3 * k : 3 * k + 3, 3 * (k + j) : 3 * (k + j) + 3] = -a[j - 1].T
     covariance = moved @ moved.T + gyro**2 * added @ added.T
     by = np.linalg.solve(covariance[3:, 3:], covariance[3:, :3])
-    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, root @ root.T, gyro, 3)
+    before, noise = gyro_noise.yule_walker_predictor(model, root @ root.T, gyro, 3)
     np.testing.assert_allclose(before, by, rtol=1e-9)
     np.testing.assert_allclose(noise, covariance[:3, :3] - covariance[:3, 3:] @ by, rtol=1e-9)
-    one, rest = gyro_noise.residual_predictor_by_yule_walker(model, root @ root.T, gyro, 1)
+    one, rest = gyro_noise.yule_walker_predictor(model, root @ root.T, gyro, 1)
     by = np.linalg.solve(covariance[3:6, 3:6], covariance[3:6, :3])
     np.testing.assert_allclose(one, by, rtol=1e-9)
     np.testing.assert_allclose(rest, covariance[:3, :3] - covariance[:3, 3:6] @ by, rtol=1e-9)
@@ -496,11 +496,11 @@ def test_bounds_by_healthy_flights_of_other_laws_keep_health_and_a_loss_of_which
     settings = fitting.estimate_filter_settings(quiet, plain)
     model = plain.model_copy(update={"settings": settings})
     bank = build_bank(model)
-    levels, prior = diagnose._group_level_distribution(bank, bank.prior_probability[None, :-1], 0)
+    levels, prior = diagnose._group_levels(bank, bank.prior_probability[None, :-1], 0)
     health, lost = prior[0, np.isclose(levels, 1.0)], prior[0, np.isclose(levels, 0.1)]
     posterior = np.zeros((1, len(bank.hypothesis_kind)))
     posterior[0, 0] = odds * health[0]
     posterior[0, np.isclose(bank.effectiveness[:, 0], 0.1).argmax()] = lost[0]
     posterior /= posterior.sum()
-    _, found, high = diagnose._group_effectiveness_and_bounds(bank, posterior[:, :-1], 0, model)
+    _, found, high = diagnose._group_bounds(bank, posterior[:, :-1], 0, model)
     assert (found, high) == (pytest.approx([low]), pytest.approx([1.0]))

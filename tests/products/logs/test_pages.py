@@ -88,7 +88,7 @@ def test_the_page_of_a_flight(changed, monkeypatch, flown, name):
 def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypatch):
     monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     ages = {"roll": 0.126, "pitch": 0.05}
-    samples = small.flight(TAIL, gap=100, mean_age_s_by_held_column=ages, notes=("a < remark",), name="a & b")
+    samples = small.flight(TAIL, gap=100, held_age_s=ages, notes=("a < remark",), name="a & b")
     rows = small.rows([(20, "", [1.0] * 3), (20, "left_aileron+right_aileron", [0.5, 1.0, 0.5])], 3)
     assert not changed(
         page(pages.render_diagnosis(samples, TAIL, rows, verdict_document(samples, TAIL, rows)))
@@ -155,21 +155,21 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):
     path = tmp_path / "page.html"
-    pages.refuse_to_replace_foreign_file(path)  # there is none
+    pages.refuse_foreign_file(path)  # there is none
     head = "<html>"
     for before, ours in (
         (0, True),
-        (2000 - len(pages.IDENTIFICATION_PAGE_MARK), True),
-        (2001 - len(pages.IDENTIFICATION_PAGE_MARK), False),
+        (2000 - len(pages.PAGE_MARK), True),
+        (2001 - len(pages.PAGE_MARK), False),
     ):
-        path.write_text((head + " " * before)[:before] + pages.IDENTIFICATION_PAGE_MARK + " " * 5000)
+        path.write_text((head + " " * before)[:before] + pages.PAGE_MARK + " " * 5000)
         if ours:
-            pages.refuse_to_replace_foreign_file(path)
+            pages.refuse_foreign_file(path)
         else:
             with pytest.raises(BadInput, match="it is no page of `identify`, allowed: another --out"):
-                pages.refuse_to_replace_foreign_file(path)
+                pages.refuse_foreign_file(path)
     with pytest.raises(BadInput, match="will not replace"):
-        pages.refuse_to_replace_foreign_file(tmp_path)
+        pages.refuse_foreign_file(tmp_path)
 
 
 IDENTIFIED = {
@@ -219,7 +219,7 @@ def test_the_pictures_of_an_identification(changed):
     assert not changed(picture(spectrum), part="spectrum")
     fit = fit_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
     names = ["constant", *regressor_names(model)]
-    correlation = pages._coefficient_correlation_figure(fit, names)
+    correlation = pages._correlation_figure(fit, names)
     assert not changed(picture(correlation), part="correlation")
 
 
@@ -258,12 +258,12 @@ def test_the_liveliest_window():
     rates[[2, 3, 8, 9]] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
     rates[6] = np.nan
     known = np.array([0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11])
-    assert pages._first_row_of_liveliest_window(rates, known, 2) == 8
-    assert pages._first_row_of_liveliest_window(rates, known[:6], 2) == 2
-    assert pages._first_row_of_liveliest_window(rates, known, 3) == 7
-    assert pages._first_row_of_liveliest_window(rates, known, 11) == 0
-    assert pages._first_row_of_liveliest_window(rates, known, 12) == 0
-    assert pages._first_row_of_liveliest_window(rates[1:], known[:-1] - 0, 10) == 0
+    assert pages._liveliest_row(rates, known, 2) == 8
+    assert pages._liveliest_row(rates, known[:6], 2) == 2
+    assert pages._liveliest_row(rates, known, 3) == 7
+    assert pages._liveliest_row(rates, known, 11) == 0
+    assert pages._liveliest_row(rates, known, 12) == 0
+    assert pages._liveliest_row(rates[1:], known[:-1] - 0, 10) == 0
 
 
 def test_a_prediction_is_shown_over_forty_seconds():

@@ -380,7 +380,7 @@ def test_the_drift_of_a_trim_from_means_that_follow_one_another(monkeypatch):
     # 2 c / n + 2 n w / 3 of both, less one another
     walk = 1.5 * (80 * variance[80] - 20 * variance[20]) / (80**2 - 20**2)
     usual = [1e-4, 3e-4, 2e-4]
-    monkeypatch.setattr(fitting, "FilterSettings", lambda: SimpleNamespace(trim_walk_sd_per_sample=usual))
+    monkeypatch.setattr(fitting, "FilterSettings", lambda: SimpleNamespace(trim_step_sd=usual))
     expected = np.maximum(np.sqrt(np.maximum(walk, 0.0)), usual)
     assert (expected[[0, 2]] > [1e-2, 1e-2]).all()
     assert expected[1] == 3e-4
@@ -459,7 +459,7 @@ def test_a_flight_weighs_in_a_fit_by_its_weight_and_time_is_that_of_most_flights
     model = fitting._model_of_order(flights, MODEL.vehicle, 2, 3)
     assert model.rate_hz == 8.0
     errors = fit_ols(x, y, run, 16).standard_errors[7:]  # over two seconds of them
-    assert model.command_response_standard_error == errors.reshape(2, 3, 3).tolist()
+    assert model.response_error == errors.reshape(2, 3, 3).tolist()
 
 
 @pytest.mark.parametrize("laws", [False, True])

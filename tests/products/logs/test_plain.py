@@ -29,4 +29,4 @@ def test_a_forgetting_memory_keeps_one_over_e_of_what_was_20_s_ago(values):
 
 
 def test_bounds_hold_nine_in_ten():
-    assert pytest.approx(NormalDist().inv_cdf(0.95), abs=1e-3) == detectors._STANDARD_ERRORS_OF_90_PERCENT
+    assert pytest.approx(NormalDist().inv_cdf(0.95), abs=1e-3) == detectors._SD_OF_90_PERCENT

@@ -31,7 +31,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (topic, field, _) in enumerate(alfa._load_column_sources_and_failure_names()["columns"].values()):
+    for i, (topic, field, _) in enumerate(alfa._alfa_names()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])
@@ -364,7 +364,7 @@ def test_what_counts_as_a_number():
         pa.bool_(): False,
         pa.list_(pa.int8()): False,
     }
-    assert {kind: table._is_integer_or_float_type(kind) for kind in kinds} == kinds
+    assert {kind: table._is_numeric_type(kind) for kind in kinds} == kinds
 
 
 def test_columns_of_topics_count_from_the_first_stamp_of_all():
@@ -431,7 +431,7 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     assert {name: found for one in reversed(blocks) for name, found in one.text_cell_summaries.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
-    whole = text.join_and_consume_blocks(blocks)
+    whole = text.join_blocks(blocks)
     assert whole.text_cell_summaries == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
         400,
@@ -455,7 +455,7 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     parquet.write_table(pa.table(columns), path)
     monkeypatch.setattr(table, "_check_parquet_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._check_size_and_list_parquet_columns(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._parquet_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
 
 

@@ -64,7 +64,7 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     kept = next(one for one in flights if one.name == ALFA)
     others = fit_parts([one for one in flights if one is not kept])
     model = add_ranges_and_threshold(others, fit_model(others, vehicle))
-    read = {*model.vehicle.command_column_names, *model.vehicle.signal_column_names}
+    read = {*model.vehicle.command_columns, *model.vehicle.signal_columns}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)
     assert found["false_alarms"] == 0
@@ -78,7 +78,7 @@ def test_another_day_of_the_wing_is_read_whole_and_its_columns_are_not_doubted(e
     model = fit_model(fit_parts([trained]), vehicle)
     other = load_flights_for_fit([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
     rows = diagnose(other, model)
-    assert all("nothing answers the commands" in reason for reason in rows.not_credible_rows_by_reason)
+    assert all("nothing answers the commands" in reason for reason in rows.doubtful_rows)
     assert score_against_labels(rows, other.labels)["classes"] > 0.93
     mistakes = {
         "exchanged": replace(other, commands=other.commands[:, ::-1]),

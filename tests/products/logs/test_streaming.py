@@ -8,9 +8,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
     detector_names,
     diagnose_with_detector,
-    diagnosis_rows_from_verdicts,
     loop_detector_context,
     loop_detector_inputs,
+    rows_of_verdicts,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
@@ -82,7 +82,7 @@ def test_every_detector_gives_rows(flown, wing_model):
 def test_verdicts_become_rows(flown, wing_model):
     said = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
     unknown = Verdict(True, None, "unanticipated", statistic=3.0)
-    rows = diagnosis_rows_from_verdicts(
+    rows = rows_of_verdicts(
         [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
     )
     assert rows.faulty.tolist() == [0, 1, 1, 0]

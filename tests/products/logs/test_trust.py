@@ -10,7 +10,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
 from beaver_ftc_logs.bank import build_states
 from beaver_ftc_logs.column_mistakes import CorrectedLog
-from beaver_ftc_logs.diagnose import diagnose, finalize_rows_at_log_stamps
+from beaver_ftc_logs.diagnose import diagnose, finish_rows
 from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
 from beaver_ftc_logs.model import FittedRanges, NoiseModel
 from products.logs import small
@@ -44,7 +44,7 @@ def silent(rows):
 def test_a_flight_like_those_fitted_is_credible(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
     assert rows.credible.mean() == 1.0
-    assert rows.not_credible_rows_by_reason == {}
+    assert rows.doubtful_rows == {}
     assert "left" in set(rows.isolated_surfaces[450:])
 
 
@@ -61,7 +61,7 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
     out = rows.credible == 0
     assert out[-50:].all()
     assert silent(rows)[out].all()
-    assert any(says in reason for reason in rows.not_credible_rows_by_reason)
+    assert any(says in reason for reason in rows.doubtful_rows)
     verdict = verdict_document(flown, model, rows) | {"score": {}}
     assert verdict["credible"]["share"] == pytest.approx(1.0 - out.mean())
     assert says in as_text(verdict)
@@ -84,7 +84,7 @@ def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     flown = small.flight(model, n=600, seed=4, unchanged_s={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
-    assert list(rows.not_credible_rows_by_reason) == ["q_rad_s stands still, for longer than 1.5 s"]
+    assert list(rows.doubtful_rows) == ["q_rad_s stands still, for longer than 1.5 s"]
 
 
 @pytest.mark.parametrize(("usual", "most"), [(0.0, 0.5), (0.25, 0.75)])
@@ -234,7 +234,7 @@ def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
         given = model.model_copy(update={"fitted_ranges": known})
         return np.diag(build_states(given).initial_covariance)[4:]
 
-    step, own = model.settings.effectiveness_level_step, model.settings.group_gain_offset_sd
+    step, own = model.settings.effectiveness_level_step, model.settings.own_gain_spread
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
     assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
     noise = {"average": [1.0, 0.5], "noise": model.residual_covariance, "misreads": [0.3, 0.1]}
@@ -262,10 +262,10 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
 def test_commands_that_nothing_follows_are_not_credible(model):
     flown = small.flight(model, n=600, seed=4)
     still = np.arange(600) >= 400
-    rows = finalize_rows_at_log_stamps(flown, model, diagnose(flown, model), silent=still)
+    rows = finish_rows(flown, model, diagnose(flown, model), silent=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
-    assert [reason.split(":")[0] for reason in rows.not_credible_rows_by_reason] == [
+    assert [reason.split(":")[0] for reason in rows.doubtful_rows] == [
         "nothing answers the commands"
     ]
 
@@ -274,7 +274,7 @@ def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
     clipped = np.arange(600) == 100
     rows = diagnose(small.flight(model, n=600, seed=4, is_rate_clipped=clipped), model)
     assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
-    assert list(rows.not_credible_rows_by_reason) == ["a rate was clipped in the last 30 s"]
+    assert list(rows.doubtful_rows) == ["a rate was clipped in the last 30 s"]
 
 
 def test_a_model_that_claims_nothing_says_nothing(model):
@@ -284,7 +284,7 @@ def test_a_model_that_claims_nothing_says_nothing(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
     assert not rows.credible.any()
-    assert list(rows.not_credible_rows_by_reason) == [
+    assert list(rows.doubtful_rows) == [
         "of no surface is the effect known from the flights fitted"
     ]
 
@@ -424,7 +424,7 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
     read = [CorrectedLog(*one) for one in (("A", "short"), ("B", "other", 0.1))]
     monkeypatch.setattr(trust, "_likelihoods_and_size", lambda samples, _: parts[samples])
-    monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: read)
+    monkeypatch.setattr(trust, "corrected_logs", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
     model = (
         small.model(fitted={"commands": [], "rates": [], "misread": misread}) if misread else small.model()
@@ -460,7 +460,7 @@ def test_with_no_signal_the_whole_flight_is_compared(monkeypatch, without, gain)
     parts = {"as it is": [0.0, 0.0, 0.0, 0.0], "mended": [0.5, 0.3, 0.5, 0.7], "without": without}
     monkeypatch.setattr(trust, "_likelihoods_and_size", lambda samples, _: (np.array(parts[samples]), 9.0))
     mended = CorrectedLog("mended", "mended", scaled_signal="airspeed_m_s")
-    monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: [mended])
+    monkeypatch.setattr(trust, "corrected_logs", lambda *_: [mended])
     monkeypatch.setattr(trust, "log_without_signal", lambda *_: "without")
     found, _ = trust.mistake_gains("as it is", small.model(small.TAIL))
     assert found["mended"] == pytest.approx(gain)

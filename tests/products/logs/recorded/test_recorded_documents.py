@@ -43,7 +43,7 @@ EVENTS = {
     "rows": [
         {
             "method": method,
-            **benchmark.summarize_failure_scores([of for of in FLIGHTS if of["method"] == method]),
+            **benchmark.summarize_failures([of for of in FLIGHTS if of["method"] == method]),
         }
         for method in DELAYS
     ],
@@ -157,7 +157,7 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
     whole = fitting.fit_model(usable_flights, MODEL.vehicle)
     bounds = fitting.score_folds(usable_flights, whole)[1]
     expected = whole.settings.model_copy(update={"credible_mass": bounds})
-    assert benchmark.settings_of_whole_flight(usable_flights, data) == expected
+    assert benchmark.whole_settings(usable_flights, data) == expected
 
 
 def test_flights_with_a_failure_are_left_out_in_turn(changed, monkeypatch, two_methods):
@@ -182,7 +182,7 @@ def test_settings_of_several_flights_are_those_of_the_fit():
         small.flight(MODEL, 500, seed=seed, name=str(seed), lost=((1, 100, 200, 0.5),)) for seed in (1, 2)
     ]
     usable_flights = fitting.fit_parts(flights)
-    settings = benchmark.settings_of_whole_flight(usable_flights, data_set(MODEL, flights))
+    settings = benchmark.whole_settings(usable_flights, data_set(MODEL, flights))
     assert settings == fitting.fit_model(usable_flights, MODEL.vehicle).settings
 
 
@@ -190,7 +190,7 @@ def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
     monkeypatch.setattr(benchmark, "diagnose_with_detector", lambda name, samples, model: name)
     usable_flight = FitPart(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._diagnose_with_each_method(recording(usable_flight.samples), usable_flight, MODEL))
+    found = list(benchmark._diagnose_each(recording(usable_flight.samples), usable_flight, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip
@@ -200,11 +200,11 @@ def test_labels_count_in_the_span_of_what_is_kept():
     samples = small.flight(MODEL, 10)
     use = np.zeros(10, dtype=bool)
     use[[2, 3, 7]] = True
-    labels = benchmark.labels_nan_outside_usable_span(FitPart(samples, use))
+    labels = benchmark.labels_in_span(FitPart(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
     assert np.isnan(
-        benchmark.labels_nan_outside_usable_span(FitPart(samples, np.zeros(10, dtype=bool)))
+        benchmark.labels_in_span(FitPart(samples, np.zeros(10, dtype=bool)))
     ).all()
 
 

@@ -1,4 +1,8 @@
-"""The whole of an identification: the fit, its tests on what it did not see, and what is said about both."""
+"""The whole of an identification: the fit, its tests on what it did not see, and what is said about both.
+
+Letters as in `fitting` and `regression`: Z and y regressors and rates of a fit, e and R its residual and the
+covariance, ma and ar the colour of the noise. V0 is the airspeed at which the commands count once, m/s.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -18,8 +22,8 @@ from beaver_ftc_logs.samples import (
     UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S,
     UNFITTED_NOISE_MA_CANDIDATES,
     Samples,
+    scale_by_airspeed,
     whiten_samples,
-    with_airspeed_scaling_and_products,
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -49,7 +53,15 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     folds, mass = fitting.score_folds(parts, model)
     results = {
         "assumed": lines,
-        "flights": [_flight_entry(part) for part in parts],
+        "flights": [
+            {
+                "name": part.samples.name,
+                "samples": int(part.is_usable.sum()),
+                "of": len(part.is_usable),
+                "notes": list(part.samples.notes),
+            }
+            for part in parts
+        ],
         "tests": folds,
         "another_day": expect_another_day(folds, model),
         "collinear": collinear_names(parts, model),
@@ -68,32 +80,22 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     if not model.noise_models:
         return model
     known = [tuple(noise.ma_coefficients) for noise in model.noise_models]
-    inflation = max(noise.covariance_inflation for noise in model.noise_models)
     quietest = min((np.array(noise.residual_covariance) for noise in model.noise_models), key=np.linalg.det)
-    hidden = [model.hidden_gain_error_sd(one) for one in known]
-    misreads = np.max(hidden, axis=0).tolist()
-    quick = min(
-        (noise.usual_quick_power for noise in model.noise_models if noise.usual_quick_power is not None),
-        default=None,
-    )
+    powers = [noise.usual_quick_power for noise in model.noise_models if noise.usual_quick_power is not None]
+    same: dict[str, Any] = {
+        "wider": max(noise.covariance_inflation for noise in model.noise_models),
+        "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
+        "quick": min(powers, default=None),
+    }
     models = list(model.noise_models)
     for ma in UNFITTED_NOISE_MA_CANDIDATES:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
             e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
-            models.append(
-                NoiseModel(
-                    average=list(ma),
-                    noise=np.cov(e.T).tolist(),
-                    wider=inflation,
-                    misreads=misreads,
-                    quick=quick,
-                )
-            )
+            models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
     for gyro_sd in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
-        ar, R = gyro_noise.residual_predictor_by_yule_walker(model, quietest, gyro_sd, fitting.AR_ORDER)
-        colour = {"before": ar.tolist(), "noise": R.tolist()}
-        models.append(NoiseModel(average=[1.0], wider=inflation, misreads=misreads, quick=quick, **colour))
+        ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
+        models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
     return model.model_copy(update={"noise_models": models})
 
 
@@ -111,9 +113,8 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
     for key, text in texts.items():
         if getattr(vehicle, key) is None:
             vehicle = vehicle.model_copy(update={key: not labelled})
-            lines.append(
-                f"{key}: {str(not labelled).lower()}, {text if not labelled else 'as fitted'} ({reason})"
-            )
+            assumed = "as fitted" if labelled else text
+            lines.append(f"{key}: {str(not labelled).lower()}, {assumed} ({reason})")
         else:
             lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
@@ -130,11 +131,10 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
     for what the surface does [Ljung1999, section 13.4].
     """
-    most = max(fitting.RATE_LAGS)
-    # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
-    order = most, most
     if not vehicle.moving_air:
         return list(flights)
+    # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
+    order = max(fitting.RATE_LAGS), max(fitting.RATE_LAGS)
     colours = [_choose_ma(flight, vehicle, order) for flight in flights]
     whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, colours, strict=True)]
     for _ in range(_MAX_ROUNDS):
@@ -159,9 +159,8 @@ def _choose_ma(flight: Samples, vehicle: Vehicle, order: tuple[int, int]) -> tup
     def log_det(ma: tuple[float, ...]) -> float:
         Z, y, _ = fitting.stack_data(fitting.fit_parts([whiten_samples(flight, ma)]), vehicle, *order)
         if len(y) < 2:
-            raise BadInput(
-                f"identify: {flight.name}: {len(y)} samples known to be healthy, allowed: at least 2"
-            )
+            known = f"{len(y)} samples known to be healthy"
+            raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
         e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
         return float(np.linalg.slogdet(np.cov(e.T))[1]) - 6.0 * float(np.log(sum(ma)))
 
@@ -171,14 +170,13 @@ def _choose_ma(flight: Samples, vehicle: Vehicle, order: tuple[int, int]) -> tup
 def _best_ma(
     parts: list[fitting.FitPart], vehicle: Vehicle, order: tuple[int, int], C: Floats
 ) -> tuple[float, tuple[float, ...]]:
-    """The colour of a flight, and the log determinant of the residual that it leaves."""
+    """The colour of a flight, and the log determinant of the residual y - Z C that it leaves."""
     from scipy.signal import lfilter
 
     Z, y, _ = fitting.stack_data(parts, vehicle, *order)
     e = y - Z @ C
-    log_dets = {
-        ma: np.linalg.slogdet(np.cov(lfilter([1.0], ma, e, axis=0).T))[1] for ma in NOISE_MA_CANDIDATES
-    }
+    white = {ma: lfilter([1.0], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES}
+    log_dets = {ma: np.linalg.slogdet(np.cov(g.T))[1] for ma, g in white.items()}
     best = min(log_dets, key=lambda ma: float(log_dets[ma]))
     return float(log_dets[best]) + 6.0 * float(np.log(sum(best))), best
 
@@ -192,17 +190,15 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    ranges, settings = model.fitted_ranges, model.settings
-    if ranges is None or ranges.alarm_peak_tail is None or settings.alarm_threshold is None:
+    tail = model.fitted_ranges.alarm_peak_tail if model.fitted_ranges is not None else None
+    threshold = model.settings.alarm_threshold
+    if tail is None or threshold is None:
         return expected
-    target = settings.false_alarms_per_hour or 0.0
+    target = model.settings.false_alarms_per_hour or 0.0
     return expected | {
-        "false_alarms_per_hour": {
-            "asked": target,
-            **asdict(extremes.false_alarm_rate(ranges.alarm_peak_tail, settings.alarm_threshold)),
-        },
-        "minutes_left_out": ranges.alarm_peak_tail.healthy_minutes,
-        "minutes_missing": extremes.missing_healthy_minutes(ranges.alarm_peak_tail, target),
+        "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
+        "minutes_left_out": tail.healthy_minutes,
+        "minutes_missing": extremes.missing_healthy_minutes(tail, target),
         **model.identification_results,
     }
 
@@ -216,20 +212,24 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
 
 
 def _scale_flights(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
-    known = [
-        flight.airspeed[np.isfinite(flight.airspeed)] for flight in flights if flight.airspeed is not None
-    ]
-    V = np.concatenate(known) if known else np.empty(0)
+    known = [flight.airspeed for flight in flights if flight.airspeed is not None]
+    V = np.concatenate([np.empty(0), *known])
+    V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
     if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:
         return flights, vehicle
-    scaled = [
-        with_airspeed_scaling_and_products(flight, V0, vehicle.surface_airspeed_powers) for flight in flights
-    ]
     other = vehicle.model_copy(update={"reference_airspeed_mps": V0})
+    scaled = _scaled(flights, other)
     if _min_bic(flights, vehicle) - _min_bic(scaled, other) < _DECISIVE_BIC:
         return flights, vehicle
     return _scale_powers(flights, other) if vehicle.other_laws else (scaled, other)
+
+
+def _scaled(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
+    """Flights with commands times the airspeed over V0 to the power of each surface."""
+    V0 = vehicle.reference_airspeed_mps or 0.0
+    powers = vehicle.surface_airspeed_powers
+    return [scale_by_airspeed(flight, V0, powers) for flight in flights]
 
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
@@ -240,40 +240,27 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
 def _scale_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
     """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
     linkages change the square. Another than that must explain decisively more."""
+    # a criterion believes each sample, as only white noise lets it
+    whitened = whiten_flights(_scaled(flights, vehicle), vehicle)
 
-    scaled = [
-        with_airspeed_scaling_and_products(
-            flight, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
-        )
-        for flight in flights
-    ]
-    whitened = whiten_flights(
-        scaled, vehicle
-    )  # a criterion believes each sample, as only white noise lets it
+    def bic_of(other: Vehicle) -> float:
+        scaled = _scaled(flights, other)
+        if vehicle.moving_air:
+            scaled = [
+                whiten_samples(flight, white.noise_ma_coefficients, white.fit_weight)
+                for flight, white in zip(scaled, whitened, strict=True)
+            ]
+        return _min_bic(scaled, other)
 
-    def scale(other: Vehicle, whiten: bool = True) -> list[Samples]:
-        rescaled = [
-            with_airspeed_scaling_and_products(
-                flight, other.reference_airspeed_mps or 0.0, other.surface_airspeed_powers
-            )
-            for flight in flights
-        ]
-        if not (whiten and vehicle.moving_air):
-            return rescaled
-        return [
-            whiten_samples(one, white.noise_ma_coefficients, white.fit_weight)
-            for one, white in zip(rescaled, whitened, strict=True)
-        ]
-
-    least = _min_bic(scale(vehicle), vehicle) - _DECISIVE_BIC
+    least = bic_of(vehicle) - _DECISIVE_BIC
     names = list(vehicle.surfaces)
     for group in regression.group_surfaces(vehicle):
         for power in _AIRSPEED_POWERS:
             powers = vehicle.airspeed_powers | {names[i]: power for i in group}
             candidate = vehicle.model_copy(update={"airspeed_powers": powers})
-            if (bic := _min_bic(scale(candidate), candidate)) < least:
+            if (bic := bic_of(candidate)) < least:
                 least, vehicle = bic, candidate
-    return scale(vehicle, whiten=False), vehicle
+    return _scaled(flights, vehicle), vehicle
 
 
 def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], model: Model) -> None:
@@ -286,12 +273,9 @@ def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], mod
         minutes = sum(int(part.is_usable.sum()) * part.samples.dt_s for part in parts) / 60.0
         stillest = min(_command_sds(parts, model).items(), key=lambda pair: pair[1])
         raise BadInput(
-            "identify: on parts it was not fitted on the model explains less of "
-            f"{', '.join(unexplained)} than the "
-            f"mean does ({_axis_text(unexplained)}), allowed: a model that "
-            "explains more; what would "
-            f"help: more than these {minutes:.1f} min, commands that move more "
-            f"({stillest[0]} has a standard "
+            f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
+            f"than the mean does ({_axis_text(unexplained)}), allowed: a model that explains more; what "
+            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest[0]} has a standard "
             f"deviation of {stillest[1]:.2g}), or the commands that this vehicle follows"
             f"{_mistakes_text(parts, model)}"
         )
@@ -299,9 +283,8 @@ def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], mod
 
 def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     """Raise BadInput where a flight's command is in another unit than that of the first."""
-    first = FittedRanges(
-        commands=trust.central_ranges(flights[0].commands), rates=trust.central_ranges(flights[0].rates)
-    )
+    commands, rates = trust.central_ranges(flights[0].commands), trust.central_ranges(flights[0].rates)
+    first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
         trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
@@ -319,35 +302,26 @@ def _command_sds(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, fl
     return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
-def _flight_entry(part: fitting.FitPart) -> Document:
-    samples, usable = part.samples, part.is_usable
-    return {
-        "name": samples.name,
-        "samples": int(usable.sum()),
-        "of": len(usable),
-        "notes": list(samples.notes),
-    }
-
-
 def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
     Z, _, _ = fitting.stack_data(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
     factors = variance_inflation(Z[:, 1:])
     pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
-    collinear = [
-        (name, factor if isfinite(factor) else None) for name, factor in pairs if factor > _MIN_COLLINEAR
+    return [
+        {"regressor": name, "inflation": factor if isfinite(factor) else None}
+        for name, factor in pairs
+        if factor > _MIN_COLLINEAR
     ]
-    return [{"regressor": name, "inflation": factor} for name, factor in collinear]
 
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
     lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
-    signals = [f"{name}[-{k}]" for k in lags for name in model.vehicle.signal_regressor_names]
-    command_lags, groups = range(1, model.n_command_lags + 1), map("+".join, model.groups)
-    return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in command_lags]
+    signals = [f"{name}[-{k}]" for k in lags for name in model.vehicle.regressor_columns]
+    lags = range(1, model.n_command_lags + 1)
+    return rates + signals + [f"command of {'+'.join(group)}[-{k}]" for group in model.groups for k in lags]
 
 
 def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
@@ -382,12 +356,7 @@ def identification_text(model: Model) -> str:
         *(f"  {line}" for line in results.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_pressure_lines(model),
-        *dict.fromkeys(
-            f"  noise of the colour {_ma_text(noise)}: "
-            f"{noise.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
-            "differ, and other laws may"
-            for noise in model.noise_models
-        ),
+        *dict.fromkeys(map(_noise_text, model.noise_models)),
         *(f"  {line}" for line in trust.unknown_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
@@ -396,34 +365,33 @@ def identification_text(model: Model) -> str:
     ]
     output = results["output_error"]
     if "delay_s" in output:
-        lines.append(
-            f"  output error: servo lag {_servo_text(output)}, delay "
-            f"{output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f}), explains "
-            "of 2 s free runs not fitted "
-            f"{_axis_text(output['explained_of_windows_not_fitted'])}"
-        )
+        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
+        explained = _axis_text(output["explained_of_windows_not_fitted"])
+        lag = f"servo lag {_servo_text(output)}"
+        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
     if results["collinear"]:
         most, n = results["collinear"][0], len(results["collinear"])
-        lines.append(
-            f"  {n} {'regressors are' if n > 1 else 'regressor is'} "
-            "collinear (variance inflated over "
-            f"{_MIN_COLLINEAR:g} times), most {most['regressor']} "
-            f"({_inflation_text(most['inflation'])})"
-        )
+        are = "regressors are" if n > 1 else "regressor is"
+        factor = most["inflation"]
+        times = "made up by the others" if factor is None else f"{factor:.0f} times"
+        inflated = f"variance inflated over {_MIN_COLLINEAR:g} times"
+        lines.append(f"  {n} {are} collinear ({inflated}), most {most['regressor']} ({times})")
     return "\n".join(lines)
 
 
-def _ma_text(noise: NoiseModel) -> str:
-    return ", ".join(f"{c:.3g}" for c in noise.ma_coefficients)
+def _noise_text(noise: NoiseModel) -> str:
+    colour = ", ".join(f"{c:.3g}" for c in noise.ma_coefficients)
+    return (
+        f"  noise of the colour {colour}: {noise.covariance_inflation:.2g} times as wide, in squares, as "
+        "gains of 10 s left out differ, and other laws may"
+    )
 
 
 def _day_lines(expected: Document, n_flights: int) -> list[str]:
     """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
-    unit = (
-        "another day, each left out in turn"
-        if n_flights > 1
-        else "another half of this day, not of another day"
-    )
+    unit = "another half of this day, not of another day"
+    if n_flights > 1:
+        unit = "another day, each left out in turn"
     lines = []
     if "classes" in expected:
         scores = [
@@ -477,17 +445,16 @@ def _servo_text(fit: Document) -> str:
     return f"{fit['servo_lag_s']:.3f} s (sd {fit['servo_lag_sd_s']:.3f})"
 
 
-def _inflation_text(factor: float | None) -> str:
-    return "made up by the others" if factor is None else f"{factor:.0f} times"
-
-
 def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
 def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance explained over free-running windows not fitted, an axis."""
+    and the share of the rates' variance explained over free-running windows not fitted, an axis.
+
+    th: parameters, as in `_simulate`; P: inverse of their information.
+    """
     from scipy.optimize import least_squares
 
     dt_s = float(np.median([part.samples.dt_s for part in parts]))
@@ -499,8 +466,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
     guess, lower, upper = _guess_and_bounds(len(groups), dt_s)
 
     def error(th: Floats, rows: slice) -> Floats:
-        simulated = _simulate(th, u[rows], y[rows], dt_s)
-        return ((simulated - y[rows]) / sd).ravel()
+        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
 
     found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
     P = np.linalg.pinv(found.jac.T @ found.jac)
@@ -521,8 +487,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
 def _cut_windows(
     parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
 ) -> tuple[Floats, Floats]:
-    """Commands (W, past + n, G) with their past, scaled by labels, and rates (W,
-    n, 3)."""
+    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
     u, y = [], []
     for part in parts:
         samples = part.samples
@@ -549,7 +514,13 @@ def _guess_and_bounds(n: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
-    """Free runs of all windows at once, (W, m, 3)."""
+    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
+
+        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
+
+    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
+    delay, both s, A (3, 3), B (n, 3), c (3,).
+    """
     n = u.shape[2]
     lag_s, delay_s = th[:2]
     A = th[2:11].reshape(3, 3)
@@ -559,13 +530,13 @@ def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
     past = u.shape[1] - m
     whole, f = divmod(delay_s / dt_s, 1.0)
     a = np.exp(-dt_s / lag_s)
-    x, s = y[:, 0].copy(), u[:, 0].copy()
+    x = y[:, 0].copy()
+    s = u[:, 0].copy()
     X = np.empty_like(y)
     for k in range(u.shape[1]):
         if k >= past:
             X[:, k - past] = x
             x = x @ A.T + s @ B + c
-        rows = (max(k - int(whole), 0), max(k - int(whole) - 1, 0))
-        v = (1.0 - f) * u[:, rows[0]] + f * u[:, rows[1]]
+        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
         s = a * s + (1.0 - a) * v
     return X

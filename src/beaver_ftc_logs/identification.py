@@ -28,10 +28,7 @@ from beaver_ftc_logs.samples import (
 from beaver_ftc_logs.vehicle import Vehicle
 
 _MIN_COLLINEAR = 10.0
-_SCORE_TITLES = {
-    "classes": "classes", "healthy_or_faulty": "healthy or faulty", "mean_error": "mean error",
-    "held_by_bounds": "held by bounds",
-}  # fmt: skip
+_SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 _DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
@@ -185,7 +182,7 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
     """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
     merit, false alarms an hour and how sure that is, and how many minutes would show it."""
     scores = [fold["score"] for fold in folds if "score" in fold]
-    values = {key: [score[key] for score in scores] for key in _SCORE_TITLES if scores}
+    values = {key: [score[key] for score in scores] for key in _SCORES if scores}
     expected: Document = {
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
@@ -275,8 +272,8 @@ def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], mod
         raise BadInput(
             f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
             f"than the mean does ({_axis_text(unexplained)}), allowed: a model that explains more; what "
-            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest[0]} has a standard "
-            f"deviation of {stillest[1]:.2g}), or the commands that this vehicle follows"
+            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest[0]} has a "
+            f"standard deviation of {stillest[1]:.2g}), or the commands that this vehicle follows"
             f"{_mistakes_text(parts, model)}"
         )
 
@@ -395,8 +392,8 @@ def _day_lines(expected: Document, n_flights: int) -> list[str]:
     lines = []
     if "classes" in expected:
         scores = [
-            f"{title} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
-            for key, title in _SCORE_TITLES.items()
+            f"{key.replace('_', ' ')} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
+            for key in _SCORES
         ]
         lines.append(f"  expect of {unit}, mean (worst): {', '.join(scores)}")
     if "false_alarms_per_hour" in expected:

@@ -118,14 +118,14 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     is_labelled = np.isin(levels, np.round(labelled, 6))
     if not is_labelled.any() or is_labelled.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
-    share = settings.share_of_faults_at_likely_levels
+    share = settings.likely_share
     return levels, np.where(is_labelled, share / is_labelled.sum(), (1.0 - share) / (~is_labelled).sum())
 
 
 def _offset_variances(model: Model, g: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, B, R = model.intercept_past_response_noise()
+    _, _, B, R = model.as_arrays()
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
     variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_rate_offset_sd * ratio) ** 2}
@@ -170,13 +170,13 @@ def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
     retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
     settings = model.settings
     n = len(model.groups)
-    _, _, B, R = model.intercept_past_response_noise()
+    _, _, B, R = model.as_arrays()
     r = np.diag(R)
     shift = B.sum(axis=1) * settings.trim_command_shift_sd
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2
-    drift = settings.group_gain_offset_sd**2 + _extra_variance(model)
+    drift = settings.own_gain_spread**2 + _extra_variance(model)
     hidden = model.hidden_gain_error_sd(ma) ** 2
     P[range(4, 4 + n), range(4, 4 + n)] = drift + hidden
     # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
@@ -184,8 +184,8 @@ def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
     return_s = np.array([np.inf] * 3 + [settings.gain_return_time_s, *own_s])
     a = np.exp(-1.0 / (model.rate_hz * return_s))
     walk = (1.0 - a**2) * np.diag(P)
-    walk[:3] = r * np.array(settings.trim_walk_sd_per_sample) ** 2
-    bound = np.array([settings.max_trim_deviation_in_sd] * 3 + [settings.max_gain_deviation_in_sd] * (1 + n))
+    walk[:3] = r * np.array(settings.trim_step_sd) ** 2
+    bound = np.array([settings.max_trim_sd] * 3 + [settings.max_gain_sd] * (1 + n))
     x = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n)
     return StateModel(x, P, np.sqrt(np.diag(P)) * bound, a, walk)
 
@@ -224,7 +224,7 @@ def build_noise(model: Model, ma: Sequence[float] = ()) -> ResidualNoise:
     settings = model.settings
     return ResidualNoise(
         intercept_rad_s=model.whitened_intercept(ma),
-        covariance=model.intercept_past_response_noise()[3],
+        covariance=model.as_arrays()[3],
         effective_sample_share=settings.effective_sample_share,
         t_degrees_of_freedom=settings.t_degrees_of_freedom,
         scale_memory_samples=settings.noise_scale_memory_s * model.rate_hz,

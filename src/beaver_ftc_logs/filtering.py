@@ -76,7 +76,7 @@ def _average_noises(samples: Samples, model: Model, bank: HypothesisBank) -> tup
     """The average over the noise models. The bank is run with each up to the last sample at which its weight
     is not negligible: within a second most become far less likely than another, and stay so."""
     pairs = [
-        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise_model(noise))
+        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
         for noise in model.noise_models
     ]
     ll = [_noise_likelihood(flight, one, one.noise_models[0]) for flight, one in pairs]
@@ -191,7 +191,7 @@ def quick_scale(F: Floats, model: Model, ma: Sequence[float]) -> Floats:
     Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
     noise: it has the same sign in many samples.
     """
-    power = quick_power(F, model.covariance_of_noise_model(ma), model.rate_hz)
+    power = quick_power(F, model.covariance_of_noise(ma), model.rate_hz)
     excess = np.maximum(power - model.usual_quick_power(ma), 0.0)
     return np.asarray(1.0 + model.settings.quick_error_share**2 * excess)
 

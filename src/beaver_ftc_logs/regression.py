@@ -102,7 +102,7 @@ def unexplained_rates(
     h, L = model.n_rate_lags, model.n_command_lags
     f = model.vehicle.n_signal_lags(h)
     X, U, ok = build_regressors(samples, group_indices(model), h, L, labelled, f)
-    _, A, B, _ = model.intercept_past_response_noise()
+    _, A, B, _ = model.as_arrays()
     y = samples.rates - np.einsum("nm,mr->nr", X, A)
     return ok, y, np.einsum("ngl,glr->ngr", U, B)
 

@@ -4,6 +4,9 @@ and the mean of the specific force is 1 g.
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))        [SL03, eq. 1.4-4]
     theta' = q cos(phi) - r sin(phi)
     psi' = (q sin(phi) + r cos(phi)) / cos(theta)
+
+t (n,) s are the stamps of the rates; p, q, r (n,) and the angles have the unit of the log; phi and theta (n,)
+are in rad. gyros: the columns of p, q and r.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,7 +51,7 @@ class AngleFit:
 def fit_roll(gyros: list[Column], roll: Column, pitch: Column | None) -> AngleFit | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
-    gyros: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
+    Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
     t = gyros[0].t_s
     p, q, r = (_interpolate(gyro, t) for gyro in gyros)
@@ -72,8 +75,8 @@ def fit_pitch(gyros: list[Column], roll: Column, pitch: Column) -> AngleFit | No
 
 
 def fit_yaw(gyros: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> AngleFit | None:
-    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a
-    turn changes both alike."""
+    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a turn changes both
+    alike."""
     t = gyros[0].t_s
     _, q, r = (_interpolate(gyro, t) for gyro in gyros)
     phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
@@ -90,17 +93,20 @@ def _pitch_rad(roll: Column, pitch: Column, t: Floats) -> Floats:
 def _fit_angle(
     t: Floats, angle: Floats, terms: list[Floats], circle: float | None = None, theta: Floats | None = None
 ) -> AngleFit | None:
-    """How an angle follows the first term of its rate of change, window by window, the others in whatever
-    unit they are; circle: a circle, where it may go round; theta: the pitch angle, where
-    windows in which it is steep say nothing."""
+    """How an angle follows the first term of its rate of change, the others in whatever unit they are.
+
+        y = X beta + error,   y = angle(b) - angle(a),   X = S(b) - S(a),   S: integral of the terms
+
+    y (w,), X (w, m): changes from the begin a to the end b of w windows. circle: a circle, where the angle
+    may go round. theta: windows in which the pitch angle is steep say nothing.
+    """
     h = np.diff(t)
-    w = np.where(h < _ANGLE_WINDOW_S, h, 0.0)
-    S = np.vstack(
-        [np.zeros(len(terms)), np.cumsum([w * _means_of_neighbours(term) for term in terms], axis=1).T]
-    )
+    means = [np.nan_to_num(0.5 * (term[1:] + term[:-1])) for term in terms]
+    S = np.cumsum(np.where(h < _ANGLE_WINDOW_S, h, 0.0) * means, axis=1).T
+    S = np.vstack([np.zeros(len(terms)), S])
     n = max(round(_ANGLE_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
     a = np.arange(0, len(t) - n, n)
-    b = np.arange(n, len(t), n)
+    b = a + n
     ok = (t[b] - t[a]) < 2.0 * _ANGLE_WINDOW_S
     if theta is not None:
         steep = np.cumsum(np.abs(theta) > _STEEP_PITCH_RAD)
@@ -111,28 +117,21 @@ def _fit_angle(
         y = (y + 0.5 * circle) % circle - 0.5 * circle
     known = np.isfinite(y) & np.isfinite(X).all(axis=1)
     y, X = y[known], X[known]
-    least = len(y) * (_MIN_RMS_RAD_S * _ANGLE_WINDOW_S) ** 2
-    if len(y) < _MIN_WINDOWS or y @ y < least:
+    if len(y) < _MIN_WINDOWS or y @ y < len(y) * (_MIN_RMS_RAD_S * _ANGLE_WINDOW_S) ** 2:
         return None
     beta = np.linalg.lstsq(X, y, rcond=None)[0]
     y = y - X[:, 1:] @ beta[1:]
-    X = X[:, 0]
-    xx = float(X @ X)
-    yy = float(y @ y)
+    x = X[:, 0]
+    xx, xy, yy = float(x @ x), float(x @ y), float(y @ y)
     if not xx * yy > 0.0:
         return None
-    xy = float(X @ y)
     return AngleFit(
         slope=np.sign(xy) * np.sqrt(yy / xx),
         correlation=xy / np.sqrt(xx * yy),
-        n_windows=len(X),
+        n_windows=len(x),
         max_angle_magnitude=float(np.nanmax(np.abs(angle))),
         max_rate_magnitude=float(np.nanmax(np.abs(terms[0]))),
     )
-
-
-def _means_of_neighbours(x: Floats) -> Floats:
-    return np.nan_to_num(0.5 * (x[1:] + x[:-1]))
 
 
 def _interpolate(column: Column, t: Floats) -> Floats:
@@ -158,8 +157,8 @@ def attitude_mistake(
     named: Mapping[str, Column], angles: Sequence[NamedColumn | None], others: Mapping[str, Column]
 ) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
-    is not known. The first that is wrong; None where nothing is. others: what may
-    have taken the place of a rate."""
+    is not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
+    rate."""
     gyros = list(named.values())
     for axis, (rate, angle) in enumerate(zip(named, angles, strict=True)):
         if angle is None:
@@ -172,10 +171,12 @@ def attitude_mistake(
         for name, column in {**named, **others}.items():
             trial = _fit_axis([*gyros[:axis], column, *gyros[axis + 1 :]], angles, axis)
             if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
-                return _exchanged_column_text(angle[0], (rate, fit), (name, trial), _RATE_TITLES[axis])
-        if remark := factor_remark(fit, rate, angle[0]) or _exact_factor_remark(
-            fit, gyros, angles, axis, rate
-        ):
+                return (
+                    f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
+                    f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
+                )
+        remark = factor_remark(fit, rate, angle[0]) or _exact_factor_remark(fit, gyros, angles, axis, rate)
+        if remark:
             return remark
     return None
 
@@ -227,16 +228,6 @@ def _fit_axis(gyros: list[Column], angles: Sequence[NamedColumn | None], axis: i
     if axis == 2:
         return fit_yaw(gyros, roll, pitch, angle)
     return fit_pitch(gyros, roll, angle) if axis else fit_roll(gyros, roll, pitch)
-
-
-def _exchanged_column_text(
-    angle: str, named: tuple[str, AngleFit], better: tuple[str, AngleFit], title: str
-) -> str:
-    (rate, fit), (other, trial) = named, better
-    return (
-        f"{angle} does not follow {rate} (correlation {fit.correlation:.2f}) "
-        f"but {other} ({trial.correlation:.2f}): {other} is the {title}"
-    )
 
 
 def factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:

@@ -8,6 +8,8 @@ covariance Q and gyros of variance s2 the residual is
 a moving average whose autocovariance is known. The predictor of w[k] from earlier residuals solves the
 Yule-Walker equations; a white residual is left, which no command of the past is correlated with, whatever the
 law feeds back [Ljung1999, section 13.4].
+
+Q (3, 3) (rad/s)2, s rad/s: standard deviation of a gyro, A (h, 3, 3), M = (1, -A1', ..., -Ah').
 """
 
 import numpy as np
@@ -18,9 +20,13 @@ from beaver_ftc_logs.recording import Floats
 
 
 def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Floats, Floats]:
-    """Coefficients (3 L, 3), latest lag first, that predict the residual from earlier ones, and the
-    covariance (3, 3) of the rest. Q: Q (3, 3), (rad/s)2; s: standard
-    deviation of a gyro."""
+    """Coefficients B (3 L, 3), latest lag first, that predict the residual from L earlier ones, and the
+    covariance (3, 3) of the rest, (rad/s)2:
+
+        P B = S,   rest = R[0] - S' B
+
+    P (3 L, 3 L): covariance of the earlier residuals. S (3 L, 3): covariance of these with the residual.
+    """
     R = _autocovariance(model, Q, s, L)
     lags = np.arange(L)
     blocks = np.array([[_at_lag(R, int(j - i)) for j in lags] for i in lags])
@@ -31,7 +37,7 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
 
 
 def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> NDArray[np.float64]:
-    """E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3)."""
+    """R[t] = E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3): s2 sum_j M[t+j] M[j]', and Q at t = 0."""
     A = np.array(model.past_coefficients)[: 3 * model.n_rate_lags].reshape(model.n_rate_lags, 3, 3)
     M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])
     R = np.zeros((max(L, model.n_rate_lags) + 1, 3, 3))

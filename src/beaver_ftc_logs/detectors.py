@@ -53,7 +53,12 @@ OUR_DETECTOR = "bank-of-filters"
 
 
 def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
-    """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
+    """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened, by the last samples k:
+
+        theta = (M0 + sum X' X)^-1 sum X' y,   e_g - 1 = theta[3 + g]
+
+    X (n, 3, 3 + G), y (n, 3): of `_whitened_regression`. M0: information before. P: covariance of theta.
+    """
     X, y = _whitened_regression(samples, model)
     M = _fading_or_sliding_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
     b = _fading_or_sliding_sums(np.einsum("nai,na->ni", X, y), samples.dt_s, fades)
@@ -65,7 +70,8 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
 
 def _whitened_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
-    """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
+    """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3),
+    both times W with W R W' = 1, R the covariance of the residual."""
     known, y, F = unexplained_rates(samples, model)
     R = model.as_arrays()[3]
     W = np.linalg.inv(np.linalg.cholesky(R))
@@ -87,9 +93,9 @@ def _fading_or_sliding_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
 
 
 def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> LogRows:
-    """Rows of a least-squares estimate. With labelled levels, the e is the nearest of them, and
-    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_SD
-    standard deviations."""
+    """Rows of an estimate e of the effectiveness with standard deviation sd, (n, G) each. With labelled
+    levels, the nearest of them is taken, and below 1 it is a fault; without, it is a fault where it is below
+    1 by more than _MIN_LOSS_SD standard deviations."""
     bank = build_bank(model)
     low, high = (np.clip(e + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(e, 0.0, 1.0)
@@ -100,39 +106,34 @@ def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> 
             levels = np.array([*labelled, 1.0]) if labelled else np.unique(bank.effectiveness[:, g])
             nearest[:, g] = levels[np.abs(nearest[:, g, None] - levels).argmin(axis=1)]
         lost = nearest < 1.0
-    group_bounds = {"low": np.minimum(low, nearest), "high": np.maximum(high, nearest)}
-    bounds = {end: expand_groups(bound, model) for end, bound in group_bounds.items()}
+    low = expand_groups(np.minimum(low, nearest), model)
+    high = expand_groups(np.maximum(high, nearest), model)
     names = join_names(lost, ["+".join(group) for group in model.groups])
-    return _plain_rows(samples, names, expand_groups(nearest, model), **bounds)
+    return _plain_rows(samples, names, expand_groups(nearest, model), low=low, high=high)
 
 
 def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, **given: Floats) -> LogRows:
-    """Rows of a detector: faulty where it names a surface. Of low, high and probability those that are not
-    in given: the bounds are the estimate, the probability is 0 or 1."""
+    """Rows of a detector with estimate e (n, S): faulty where it names a surface. Of low, high and
+    probability those that are not given: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
-    all_of = {"low": e, "high": e, "probability": faulty.astype(float), **given}
-    low = all_of["low"]
-    high = all_of["high"]
-    probability = all_of["probability"]
-    return LogRows(samples.t_s, faulty, names, e, low, high, probability)
+    given = {"low": e, "high": e, "probability": faulty.astype(float), **given}
+    return LogRows(samples.t_s, faulty, names, e, given["low"], given["high"], given["probability"])
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surfaces = list(model.vehicle.surfaces)
-    all_outputs = model.vehicle.outputs
-    outputs = {name: output.column for name, output in all_outputs.items() if output.column in log.columns}
+    named = {name: output.column for name, output in model.vehicle.outputs.items()}
+    outputs = {name: log.columns[column] for name, column in named.items() if column in log.columns}
     if not outputs:
         return None
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)
-    for name in outputs:
-        column = log.columns[outputs[name]]
+    for name, column in outputs.items():
         last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         changed = np.concatenate([[True], np.diff(column.values) != 0.0])
         since_s = column.t_s[np.maximum.accumulate(np.where(changed, np.arange(len(changed)), 0))]
-        frozen[:, surfaces.index(name)] = (
-            samples.t_s - since_s[np.maximum(last, 0)] > MIN_FROZEN_OUTPUT_S
-        ) & (last >= 0)
+        still_s = np.where(last >= 0, samples.t_s - since_s[np.maximum(last, 0)], 0.0)
+        frozen[:, surfaces.index(name)] = still_s > MIN_FROZEN_OUTPUT_S
     return _plain_rows(samples, join_names(frozen, surfaces), 1.0 - frozen)
 
 
@@ -152,9 +153,10 @@ class LinearRateModel:
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
-    """Return the inputs of a detector at each row: measurements, and the command (4,) as shares of travel.
+    """Return the inputs of a detector at each row: measurements, and the command u (4,) as shares of travel.
 
-    Where the model cannot predict (a gap, a lost sample) the innovation is 0.
+    Z (n, 3, 4) rad/s2: contribution of each surface. Where the model cannot predict (a gap, a lost sample)
+    the innovation is 0.
     """
     members = group_indices(model)
     if len(members) > len(LOOP_SURFACES):
@@ -168,18 +170,16 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     before = np.vstack([rates[:1], rates[:-1]])
     predicted = rates - np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
     expected = (predicted - before) / dt_s
-    parts = np.zeros((len(rates), 3, _N_LOOP))
-    commands = np.zeros((len(rates), _N_LOOP))
-    F0 = np.where(known[:, None, None], F, 0.0)
+    Z = np.zeros((len(rates), 3, _N_LOOP))
+    u = np.zeros((len(rates), _N_LOOP))
     for g, places in enumerate(members):
-        parts[:, :, g] = F0[:, g] / dt_s
-        commands[:, g] = np.nan_to_num(samples.commands[:, places].sum(axis=1))
-    frames = zip(samples.t_s.tolist(), rates, expected, parts, commands, strict=True)
-    sd = _model_error_sd_rad_s2(model)
-    return [
-        (Measured(t_s, x, np.zeros(N_Y), acceleration, part, sd.copy()), u)
-        for t_s, x, acceleration, part, u in frames
+        Z[:, :, g] = np.where(known[:, None], F[:, g], 0.0) / dt_s
+        u[:, g] = np.nan_to_num(samples.commands[:, places].sum(axis=1))
+    sd, t_s = _model_error_sd_rad_s2(model), samples.t_s.tolist()
+    frames = [
+        Measured(t_s[k], rates[k], np.zeros(N_Y), expected[k], Z[k], sd.copy()) for k in range(len(t_s))
     ]
+    return list(zip(frames, u, strict=True))
 
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
@@ -221,7 +221,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
             names[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
         g = LOOP_SURFACES.index(str(verdicts[k].isolated))
-        names[k], low[k, members[g]] = ("+".join(model.groups[g]), 0.0)
+        names[k], low[k, members[g]] = "+".join(model.groups[g]), 0.0
         e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     p = np.where(np.isfinite(p), p, faulty)

@@ -4,6 +4,9 @@ each surface.
 A loss theta in [-1, 0] explains a frame if |nu_i - theta Z_i| <= eta_bar_i on every axis, as in
 diagnosis/isolation.py. If one surface alone is at fault and its effectiveness is constant for a second, its
 theta is in the intersection of the sets of that second's frames.
+
+nu (n, 3) rad/s2: innovation of the rates. eta (n, 3) rad/s2: its bound. Z (n, 3, S) rad/s2: expected effect
+of each healthy surface. e (n, S): effectiveness, 1 + theta, with bounds low and high. S surfaces, n samples.
 """
 
 from collections.abc import Sequence
@@ -29,10 +32,10 @@ _ERROR_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has 
 class Replayed:
     """The verdicts of a stretch, one for each sample.
 
-    alone_low and alone_high (n, S): bounds on the effectiveness of
-    each surface if it alone is at fault. command_gains (S,): measured effect of each command over
-    the expected one, in all of the stretch. command_gain_bounds (S,): its upper bound, the
-    largest of all parts of the stretch. Both are 1 if the stretch is too short."""
+    alone_low and alone_high (n, S): bounds on the effectiveness of each surface if it alone is at fault.
+    command_gains (S,): measured effect of each command over the expected one, in all of the stretch.
+    command_gain_bounds (S,): its upper bound, the largest of all parts of the stretch. Both are 1 if the
+    stretch is too short."""
 
     verdicts: list[Verdict]
     alone_low: Floats
@@ -59,11 +62,9 @@ def input_columns(aircraft: Any) -> tuple[list[str], ...]:
 
 
 def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: float) -> Replayed:
-    """The verdicts of evenly spaced samples; arrays: as
-    `input_columns`, (n, ...) each."""
+    """The verdicts of evenly spaced samples; arrays: as `input_columns`, (n, ...) each."""
     verdicts: list[Verdict] = []
-    nu = np.empty_like(arrays[0])
-    eta = np.empty_like(arrays[0])
+    nu, eta = np.empty((2, *arrays[0].shape))
     Z = np.empty((*nu.shape, arrays[2].shape[1]))
     for k, inputs in enumerate(zip(*map(np.ascontiguousarray, arrays), strict=True)):
         verdicts.append(diagnosis.step(*inputs))
@@ -78,8 +79,8 @@ def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: floa
 
 
 def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
-    """The gains and their upper bounds (S,) of `Replayed`, from the nu of the rates (n, 3)
-    and the expected effect of each surface (n, 3, S)."""
+    """The gains and their upper bounds (S,) of `Replayed`: 1 + beta of nu = constant + Z beta, each axis in
+    standard deviations of nu."""
     S = Z.shape[2]
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
     if (parts := split_parts(rows)) is None:
@@ -96,8 +97,8 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
 
 
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest theta (n, S) of a loss that explains each frame on every axis; least above greatest
-    where none does."""
+    """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame;
+    least above greatest where none does."""
     eta = eta + _BOUND_ROUNDING_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
     Z1 = np.where(acts, Z, 1.0)
@@ -120,14 +121,14 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
     """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
-    e = np.ones_like(replay.alone_low)
     low = np.zeros_like(replay.alone_low)
-    high = np.ones_like(replay.alone_low)
+    e, high = np.ones((2, *low.shape))
     single = fdi.is_ours and not fdi.pairs
     for k, verdict in enumerate(replay.verdicts):
         if single:
             _fill_bounds(verdict, surfaces, (replay.alone_low[k], replay.alone_high[k]), low[k], high[k])
-        if _is_loss_or_untyped(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
+        is_loss = verdict.type in (None, LOSS_FAULT_TYPE)
+        if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
             e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
     names = [_isolated_name(verdict, surfaces) for verdict in replay.verdicts]
@@ -145,8 +146,8 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
 def _fill_bounds(
     verdict: Verdict, surfaces: Sequence[str], alone: tuple[Floats, Floats], low: Floats, high: Floats
 ) -> None:
-    """Fill the bounds low and high (S,) of one row, which are given as 0 and 1.
-    alone: low and high (S,) of `Replayed`."""
+    """Fill the bounds low and high (S,) of one row, which are given as 0 and 1. alone: low and high (S,) of
+    `Replayed`."""
     if not verdict.detected:
         low[:] = alone[0]
     elif verdict.isolated in surfaces:
@@ -156,10 +157,6 @@ def _fill_bounds(
         low[:] = 1.0
         for name in verdict.candidates:
             low[surfaces.index(name)] = alone[0][surfaces.index(name)]
-
-
-def _is_loss_or_untyped(verdict: Verdict) -> bool:
-    return verdict.type in (None, LOSS_FAULT_TYPE)
 
 
 def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:

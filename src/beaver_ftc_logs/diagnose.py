@@ -1,6 +1,12 @@
 """Filter a recorded flight with a model: what broke, by how much, and how sure that is, sample by sample.
 
 Everything a row says comes from samples up to its own time.
+
+P (n, H) is the probability of each hypothesis of the bank, p (n, L) that of each level of one group, e (n, G)
+the effectiveness of each group with bounds low and high. y (n, 3) rad/s are the rates that the past does not
+explain, F (n, G, 3) rad/s the responses to the commands, c (3,) the intercept, R (3, 3) the covariance of the
+residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whether it is enough for a name;
+calm (n,): whether health, or no response at all, is the likelier.
 """
 
 from collections.abc import Mapping, Sequence
@@ -113,8 +119,7 @@ def diagnose(samples: Samples, model: Model) -> LogRows:
 
 
 def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
-    """The error for a log that raises an alarm, and none if the command of surface has the other
-    sign."""
+    """The error for a log that raises an alarm, and none if the command of a surface has the other sign."""
     return BadInput(
         f"{flight}: if the command of {surface} has the other sign, there is no alarm, allowed: "
         f"signs as {allowed}; does `scale: -1` fit?"
@@ -141,9 +146,8 @@ def finish_rows(
     if silent is not None and silent.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
     if not any(trust.known_effects(model)):
-        reasons["of no surface is the effect known from the flights fitted"] = np.ones(
-            len(rows.t_s), dtype=bool
-        )
+        always = np.ones(len(rows.t_s), dtype=bool)
+        reasons["of no surface is the effect known from the flights fitted"] = always
     rows = _add_unknown_surfaces(samples, model, _withdraw_by_engine(samples, model, rows))
     gain_known = np.array(trust.known_gains(model), dtype=float)[None]
     unknown = np.broadcast_to(expand_groups(gain_known, model) == 0.0, rows.effectiveness_low.shape)
@@ -169,16 +173,10 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
             continue
         in_name = np.array([surface in named or bool(addable[k, i]) for i, surface in enumerate(surfaces)])
         names[k] = "+".join(compress(surfaces, in_name))
-        if in_name.sum() > len(named) or (
-            model.settings.one_faulty_group and not _are_in_one_group(named, model)
-        ):
+        of_one_group = any(named <= set(group) for group in model.groups)
+        if in_name.sum() > len(named) or (model.settings.one_faulty_group and not of_one_group):
             high[k, in_name] = 1.0
     return replace(rows, isolated_surfaces=names, effectiveness_high=high)
-
-
-def _are_in_one_group(named: set[str], model: Model) -> bool:
-    """Whether these surfaces belong to one group of the model, which has one effectiveness."""
-    return any(named <= set(group) for group in model.groups)
 
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
@@ -198,8 +196,12 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
 
     A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
     turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
-    residual better by least, whatever the course of time along it. Not used in moving air,
-    since gusts have directions too.
+    residual better by the log likelihood `least`, whatever the course of time along it. Not used in moving
+    air, since gusts have directions too.
+
+        gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
+
+    r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
     """
     r = healthy_residual(model, *unexplained_rates(samples, model))
     _, _, F, R = model.as_arrays()
@@ -212,24 +214,18 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
     best = gain.max(axis=1)
     wrong = np.zeros(len(r), dtype=bool)
     for g, group in enumerate(model.groups):
-        wrong |= _names_any(rows.isolated_surfaces, set(group)) & (best - gain[:, g] > least)
-    return replace(
-        rows.without_estimate(wrong),
-        isolated_surfaces=np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces),
-    )
+        names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
+        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
+    names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
+    return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
 def healthy_residual(model: Model, known: NDArray[np.bool_], y: Floats, F: Floats) -> Floats:
-    """Residual of a healthy vehicle by `unexplained_rates`, in standard deviations of the
+    """Residual y - c - sum_g F_g of a healthy vehicle by `unexplained_rates`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
     c, _, _, R = model.as_arrays()
     r = np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
     return np.asarray(r @ np.linalg.inv(np.linalg.cholesky(R)).T)
-
-
-def _names_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
-    """Which rows (n,) name at least one of these surfaces."""
-    return np.array([bool(surfaces & set(name.split("+"))) for name in named], dtype=bool)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:
@@ -263,7 +259,7 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
     per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
     e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
-    (e[silent], low[silent], high[silent]) = 1.0, 0.0, 1.0
+    e[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
         high[faulty == 0] = 1.0
     return LogRows(
@@ -294,7 +290,7 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
 
 
 def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
-    """Return the rows at which a holds holds and has held for long enough, (n,)."""
+    """Return the rows at which a condition holds and has held for long enough, (n,)."""
     n = round(model.settings.confirmation_s * model.rate_hz)
     held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
     return np.asarray(holds & (held > n))
@@ -340,19 +336,16 @@ def _surfaces_at_fault(
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
-    nameable (n,): where the evidence is enough for a name. Where one group is at fault
-    (`one_group`), each that may be instead is named with it; `unknown` where none that the bank has is left
-    out.
+    Where one group is at fault (`one_group`), each that may be instead is named with it; `unknown` where none
+    that the bank has is left out.
     """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    columns = [P[:, bank.is_fault_of_group(g)].sum(axis=1) / p_fault for g in range(len(model.groups))]
-    share = np.column_stack(columns)
+    faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
+    share = np.column_stack([P[:, of_group].sum(axis=1) / p_fault for of_group in faults])
     likely = (share > _NAME_SHARE) & nameable[:, None]
     if model.settings.one_faulty_group:
         is_loss = bank.hypothesis_kind == GROUP_LOSS
-        p_loss = np.column_stack(
-            [P[:, bank.is_fault_of_group(g) & is_loss].sum(axis=1) for g in range(len(model.groups))]
-        )
+        p_loss = np.column_stack([P[:, of_group & is_loss].sum(axis=1) for of_group in faults])
         likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
         can_lose = p_loss.max(axis=0) > 0.0
         likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]

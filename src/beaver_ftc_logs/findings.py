@@ -4,6 +4,9 @@ What can be separated follows from the model, the mixer and how much the command
 effectiveness d of group g the rates of a sample shift by -d s F_g. Its information is F_g' R^-1 F_g a sample;
 what trim, gain and the other groups could explain as well is taken off (the Schur complement). A loss shows
 once d^2 / 2 times the information gathered passes the odds against it before.
+
+F (n, G, 3): response of each group at each sample in standard deviations of the noise, so that R = 1. J 1/s:
+information a second about one group. m axes, G groups, n samples.
 """
 
 from itertools import combinations
@@ -71,13 +74,12 @@ def _join_runs(rows: LogRows, runs: list[tuple[int, int]]) -> list[tuple[int, in
     joined: list[tuple[int, int]] = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
-        joins = (
-            _is_brief(rows, begin, end)
-            or _is_brief_and_unnamed(rows, *before)
-            or _are_alike(rows, before[0], begin)
-        )
-        if before[0] < begin and rows.faulty[before[0]] and rows.faulty[begin] and joins:
-            joined[-1] = (before[0], end)
+        first, names, e = before[0], rows.isolated_surfaces, rows.effectiveness
+        unnamed = first < begin and names[first] == UNKNOWN_SURFACE and _is_brief(rows, *before)
+        alike = names[first] == names[begin] and (e[first] == e[begin]).all()
+        joins = _is_brief(rows, begin, end) or unnamed or alike
+        if first < begin and rows.faulty[first] and rows.faulty[begin] and joins:
+            joined[-1] = (first, end)
         else:
             joined.append((begin, end))
     return joined
@@ -85,16 +87,6 @@ def _join_runs(rows: LogRows, runs: list[tuple[int, int]]) -> list[tuple[int, in
 
 def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
     return bool(rows.t_s[end - 1] - rows.t_s[begin] < MAX_BRIEF_EVENT_S)
-
-
-def _is_brief_and_unnamed(rows: LogRows, begin: int, end: int) -> bool:
-    return rows.isolated_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
-
-
-def _are_alike(rows: LogRows, first: int, second: int) -> bool:
-    return rows.isolated_surfaces[first] == rows.isolated_surfaces[second] and bool(
-        (rows.effectiveness[first] == rows.effectiveness[second]).all()
-    )
 
 
 def _fault_event_entry(rows: LogRows, begin: int, end: int, surfaces: list[str]) -> Document:
@@ -129,10 +121,8 @@ def as_text(verdict: Document) -> str:
     summary = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
     lines = [f"{verdict['flight']}: {summary} in {duration_text(verdict)}", *map(_event_text, shown)]
     lines += credibility_lines(verdict)
-    if brief_n := n_events - len(shown):
-        lines.append(
-            f"  and {brief_n} brief alarm{'s' if brief_n > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s"
-        )
+    if n := n_events - len(shown):
+        lines.append(f"  and {n} brief alarm{'s' if n > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s")
     lines += [f"  {text}" for text in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
@@ -152,11 +142,9 @@ def credibility_lines(verdict: Document) -> list[str]:
     credible = verdict["credible"]
     if credible["share"] >= 1.0:
         return []
-    lines = [f"  {reason['says']}: {reason['share']:.1%} of the rows" for reason in credible["reasons"]]
-    return [
-        f"  credible in {credible['share']:.1%} of the rows; in the others nothing is said, because",
-        *lines,
-    ]
+    head = f"  credible in {credible['share']:.1%} of the rows; in the others nothing is said, because"
+    reasons = credible["reasons"]
+    return [head, *(f"  {reason['says']}: {reason['share']:.1%} of the rows" for reason in reasons)]
 
 
 def duration_text(verdict: Document) -> str:
@@ -219,13 +207,12 @@ def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: fl
 
 
 def _own_information(F: Floats, g: int) -> float:
-    """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
+    """Information a sample about one group that trim (a constant an axis) and other groups cannot explain:
+    r' r / n, where r is what is left of f = F_g by a fit with the regressors N."""
     n, G, m = F.shape
-    trim = np.tile(np.eye(m), (n, 1))
-    others = [F[:, i].reshape(-1, 1) for i in range(G) if i != g]
-    N = np.column_stack([trim, *others])
-    f = F[:, g].reshape(-1)
-    r = f - N @ np.linalg.lstsq(N, f, rcond=None)[0]
+    f = F.transpose(1, 0, 2).reshape(G, -1)
+    N = np.column_stack([np.tile(np.eye(m), (n, 1)), *np.delete(f, g, axis=0)])
+    r = f[g] - N @ np.linalg.lstsq(N, f[g], rcond=None)[0]
     return float(r @ r) / n
 
 
@@ -240,22 +227,21 @@ def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> floa
 
 
 def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
-    """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {f"{h_s:g}": J * h_s for h_s in DETECTION_HORIZONS_S}
-    losses = {
-        horizon: np.sqrt(2.0 * odds / gain) if gain > 0.0 else np.inf for horizon, gain in gathered.items()
-    }
-    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in losses.items()}
+    """By horizon T in s the loss d whose mean log likelihood d^2 J T / 2 passes the odds; None where none
+    does."""
+    losses: dict[str, float | None] = {}
+    for T in DETECTION_HORIZONS_S:
+        d = np.sqrt(2.0 * odds / (J * T)) if J * T > 0.0 else np.inf
+        losses[f"{T:g}"] = float(d) if d <= 1.0 else None
+    return losses
 
 
 def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
-        f = F[:, g].ravel()
-        f_h = F[:, h].ravel()
-        norm = float(np.sqrt((f @ f) * (f_h @ f_h)))
-        cosine = float(f @ f_h) / max(norm, MIN_DIVISOR)
+        f_g, f_h = F[:, g].ravel(), F[:, h].ravel()
+        cosine = float(f_g @ f_h) / max(float(np.sqrt((f_g @ f_g) * (f_h @ f_h))), MIN_DIVISOR)
         surfaces = [model.groups[g], model.groups[h]]
         pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE_COSINE})
     return pairs
@@ -276,16 +262,9 @@ def isolability_sentences(isolable: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _smallest_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
-    loss_texts = [
-        f"{loss:.0%} within {horizon} s"
-        for horizon, loss in smallest_loss_by_horizon.items()
-        if loss is not None
-    ]
-    if not loss_texts:
-        longest_horizon_text = f"{DETECTION_HORIZONS_S[-1]:g} s"
-        return (
-            f"not even a complete loss would show within {longest_horizon_text} by the mean of this flight's "
-            "commands."
-        )
-    return f"the smallest loss that shows on average is {', '.join(loss_texts)}."
+def _smallest_loss_text(losses: dict[str, float | None]) -> str:
+    texts = [f"{loss:.0%} within {horizon} s" for horizon, loss in losses.items() if loss is not None]
+    if not texts:
+        within = f"within {DETECTION_HORIZONS_S[-1]:g} s by the mean of this flight's commands"
+        return f"not even a complete loss would show {within}."
+    return f"the smallest loss that shows on average is {', '.join(texts)}."

@@ -98,9 +98,8 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
     from beaver_ftc.loop import Diagnosis
 
     _check_inputs(log, vehicle, given.aircraft)
-    samples = resample(
-        log, vehicle.model_copy(update={"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None})
-    )
+    changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
+    samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
     diagnosis = Diagnosis(given.aircraft, rate_hz, **given.declared_errors)
     tilted = diagnosis.declared.air.moves
@@ -116,16 +115,8 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
         )
     places = _surface_places(vehicle, given.aircraft)
     samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
-    return LogInputs(
-        samples,
-        diagnosis,
-        rate_hz,
-        arrays,
-        ages,
-        missing,
-        stretches,
-        _full_deflection_rad(vehicle, given.aircraft),
-    )
+    full_rad = _full_deflection_rad(vehicle, given.aircraft)
+    return LogInputs(samples, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
 
 
 def diagnose_aircraft(
@@ -153,23 +144,19 @@ def _replay_flight(inputs: LogInputs, aircraft: Aircraft) -> Replayed:
     replays = []
     for begin, end in inputs.gap_free_stretches:
         diagnosis.reset()
-        replays.append(
-            replay_samples(diagnosis, [array[begin:end] for array in inputs.input_arrays], inputs.rate_hz)
-        )
+        arrays = [array[begin:end] for array in inputs.input_arrays]
+        replays.append(replay_samples(diagnosis, arrays, inputs.rate_hz))
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_command_signs(inputs.samples.name, aircraft, replays)
-    return _join_stretch_verdicts(
-        len(inputs.samples.t_s), len(aircraft.surfaces), inputs.gap_free_stretches, replays
-    )
+    return _join_stretch_verdicts(len(inputs.samples.t_s), inputs.gap_free_stretches, replays)
 
 
 def _replayed_rows(inputs: LogInputs, aircraft: Aircraft, replay: Replayed) -> LogRows:
     """The rows, without a verdict where the log is not credible."""
     t_s, stretches = inputs.samples.t_s, inputs.gap_free_stretches
     rows = rows_of_replay(t_s, replay, aircraft.surfaces, inputs.diagnosis.config)
-    reasons = _doubtful_rows_of(
-        inputs.input_arrays[1], aircraft, inputs.has_missing_value, stretches
-    ) | _unexplained_starts(t_s, stretches, replay)
+    reasons = _doubtful_rows_of(inputs.input_arrays[1], aircraft, inputs.has_missing_value, stretches)
+    reasons |= _unexplained_starts(t_s, stretches, replay)
     return rows.without_verdict(_complete_reasons(stretches, rows, reasons))
 
 
@@ -177,9 +164,8 @@ def _refuse_reversed(inputs: LogInputs, aircraft: Aircraft, replay: Replayed, ro
     """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
     for s in np.flatnonzero(replay.command_gains < 0.0):
-        rates, signals, commands, attitude = inputs.input_arrays
-        signs = np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
-        corrected = replace(inputs, input_arrays=[rates, signals, commands * signs, attitude])
+        commands = inputs.input_arrays[2] * np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
+        corrected = _with_commands(inputs, commands)
         rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
         if rows_then.clears_alarm(rows):
             raise reversed_command_error(inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}")
@@ -187,12 +173,10 @@ def _refuse_reversed(inputs: LogInputs, aircraft: Aircraft, replay: Replayed, ro
 
 def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> None:
     """Raise BadInput if the log has no alarm once two commands are exchanged."""
-    rates, signals, _, attitude = inputs.input_arrays
     for first, second in combinations(range(len(aircraft.surfaces)), 2):
         order = np.arange(len(aircraft.surfaces))
         order[[first, second]] = second, first
-        commands = inputs.samples.commands[:, order] * inputs.full_deflection_rad
-        corrected = replace(inputs, input_arrays=[rates, signals, commands, attitude])
+        corrected = _with_commands(inputs, inputs.samples.commands[:, order] * inputs.full_deflection_rad)
         if _raises_any_alarm(corrected):
             continue
         rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
@@ -202,6 +186,12 @@ def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> N
                 f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
                 f"{aircraft.name}"
             )
+
+
+def _with_commands(inputs: LogInputs, commands: Floats) -> LogInputs:
+    """The inputs with other commands, rad."""
+    rates, signals, _, attitude = inputs.input_arrays
+    return replace(inputs, input_arrays=[rates, signals, commands, attitude])
 
 
 def _raises_any_alarm(inputs: LogInputs) -> bool:
@@ -216,9 +206,8 @@ def _raises_any_alarm(inputs: LogInputs) -> bool:
 
 def _check_command_signs(flight: str, aircraft: Aircraft, replays: list[Replayed]) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
-    for surface, upper in zip(
-        aircraft.surfaces, np.min([replayed.command_gain_bounds for replayed in replays], axis=0), strict=True
-    ):
+    gains = np.min([replay.command_gain_bounds for replay in replays], axis=0)
+    for surface, upper in zip(aircraft.surfaces, gains, strict=True):
         if upper < trust.MAX_REVERSED_GAIN:
             reason = f"the rates answer the command of {surface} the other way round in all of it"
             raise BadInput(f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
@@ -228,10 +217,8 @@ def _check_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> 
     """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
-        reason = (
-            f"surfaces: no {missing[0]}, allowed: what the commands make of {', '.join(aircraft.surfaces)}"
-        )
-        raise BadInput(f"vehicle {vehicle.name}: {reason}")
+        allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
+        raise BadInput(f"vehicle {vehicle.name}: surfaces: no {missing[0]}, allowed: {allowed}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
     flow = _flow_input_names(aircraft)
@@ -261,8 +248,7 @@ def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
-    first_s = samples.t_s[:_MIN_SAMPLES]
-    steps_s = np.diff(first_s)
+    steps_s = np.diff(samples.t_s[:_MIN_SAMPLES])
     even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")
     if not _MIN_HZ <= rate_hz <= _MAX_HZ:
@@ -274,8 +260,8 @@ def _log_rate_hz(samples: Samples) -> float:
 def _read_sample_inputs(
     samples: Samples, log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, tilted: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.input_columns`, and
-    the mean age of the values of each held column, s. tilted: if false, the attitude is zeros."""
+    """Rates, signals, commands and attitude at each sample, as `stepped.input_columns`, and the mean age of
+    the values of each held column, s. tilted: if false, the attitude is zeros."""
     columns = convert_to_si(log, vehicle).columns
     ages = dict(samples.held_age_s)
 
@@ -285,11 +271,9 @@ def _read_sample_inputs(
             ages[quantity.column] = age_s
         return values
 
-    alpha, beta_rad, qdyn_pa, *others = (
-        sampled_at(vehicle.flow[name]) for name in _flow_input_names(aircraft)
-    )
     assert vehicle.airspeed is not None  # as `_check_inputs` has seen
-    signals = [alpha, beta_rad, sampled_at(vehicle.airspeed), qdyn_pa, *others]
+    flow = [vehicle.flow[name] for name in _flow_input_names(aircraft)]
+    signals = [sampled_at(quantity) for quantity in (*flow[:2], vehicle.airspeed, *flow[2:])]
     places = _surface_places(vehicle, aircraft)
     full_rad = _full_deflection_rad(vehicle, aircraft)
     attitude = np.zeros_like(samples.rates)
@@ -311,10 +295,9 @@ def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> N
         if median > 0.5 * pi:
             raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
     flies = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
-    rho = 2.0 * signals[flies, 3] / signals[flies, 2] ** 2
-    median_density_kg_m3 = _median_without_nan(rho)
-    if rho.size and not _DENSITIES_KG_M3[0] < median_density_kg_m3 < _DENSITIES_KG_M3[1]:
-        reason = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
+    rho = _median_without_nan(2.0 * signals[flies, 3] / signals[flies, 2] ** 2)
+    if flies.any() and not _DENSITIES_KG_M3[0] < rho < _DENSITIES_KG_M3[1]:
+        reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
         allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
     for s, surface in enumerate(aircraft.surfaces):
@@ -322,10 +305,9 @@ def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> N
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
         max_rad = np.nanmax(np.abs(commands[:, s]), initial=0.0)
         if max_rad > _STOP_RATIO * stop_rad:
-            reason = (
-                f"the command of {surface} reaches {max_rad:.3g} rad, allowed: its stop, {stop_rad:.3g} rad"
-            )
-            raise BadInput(f"{flight}: {reason}; full_deflection_rad says what 1 is")
+            reason = f"the command of {surface} reaches {max_rad:.3g} rad"
+            allowed = f"its stop, {stop_rad:.3g} rad"
+            raise BadInput(f"{flight}: {reason}, allowed: {allowed}; full_deflection_rad says what 1 is")
 
 
 def _median_without_nan(values: Floats) -> float:
@@ -337,31 +319,22 @@ def _median_without_nan(values: Floats) -> float:
 def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
     uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
-    is_known = ~missing
-    joins = is_known[1:] & is_known[:-1] & ~uneven
+    joins = ~(missing[1:] | missing[:-1] | uneven)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], joins, [False]]).astype(int)))
     ends = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(first, last + 1) for first, last in ends if last + 1 - first >= _MIN_SAMPLES]
 
 
-def _join_stretch_verdicts(
-    n: int, n_s: int, stretches: list[tuple[int, int]], replays: list[Replayed]
-) -> Replayed:
+def _join_stretch_verdicts(n: int, stretches: list[tuple[int, int]], replays: list[Replayed]) -> Replayed:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
     verdicts = [Verdict()] * n
-    low = np.zeros((n, n_s))
-    high = np.ones((n, n_s))
-    gains, upper = (
-        np.min([getattr(replayed, name) for replayed in replays], axis=0)
-        for name in ("command_gains", "command_gain_bounds")
-    )
-    for (begin, end), replayed in zip(stretches, replays, strict=True):
-        verdicts[begin:end], low[begin:end], high[begin:end] = (
-            replayed.verdicts,
-            replayed.alone_low,
-            replayed.alone_high,
-        )
+    gains = np.min([replay.command_gains for replay in replays], axis=0)
+    upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
+    low, high = np.zeros((n, len(gains))), np.ones((n, len(gains)))
+    for (begin, end), replay in zip(stretches, replays, strict=True):
+        verdicts[begin:end] = replay.verdicts
+        low[begin:end], high[begin:end] = replay.alone_low, replay.alone_high
     return Replayed(verdicts, low, high, gains, upper)
 
 
@@ -370,7 +343,7 @@ def _doubtful_rows_of(
 ) -> dict[str, Mask]:
     """For each reason the rows (n,) for which there is no verdict."""
     low_mps, high_mps = aircraft.envelope.airspeed_mps
-    alpha_min, alpha_max = aircraft.alpha_rad
+    low, high = aircraft.alpha_rad
     outside = np.ones(len(signals), dtype=bool)
     for begin, end in stretches:
         outside[begin:end] = False
@@ -379,8 +352,7 @@ def _doubtful_rows_of(
         "a number is missing": missing,
         "samples are not evenly spaced": outside & ~missing,
         f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (airspeed < low_mps) | (airspeed > high_mps),
-        f"angle of attack is outside {alpha_min:.3g} to {alpha_max:.3g} rad": (alpha < alpha_min)
-        | (alpha > alpha_max),
+        f"angle of attack is outside {low:.3g} to {high:.3g} rad": (alpha < low) | (alpha > high),
     }
 
 
@@ -393,10 +365,8 @@ def _unexplained_starts(t_s: Floats, stretches: list[tuple[int, int]], replay: R
         if any(verdict.isolated == "unanticipated" for verdict in replay.verdicts[begin:stop]):
             first = next(k for k in range(begin, stop) if replay.verdicts[k].detected)
             after[first:end] = True
-    reason = (
-        "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
-    )
-    return {reason: after}
+    cause = "another aircraft or loading, or undeclared errors"
+    return {f"no fault explains it from the first second on: {cause}": after}
 
 
 def _complete_reasons(

@@ -100,7 +100,7 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     held = {name: sample_column(log.columns[name], t_s, step_s) for name in used}
     for name in rate_names:
         values, age_s = held[name]
-        held[name] = (np.where(_is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values), age_s)
+        held[name] = np.where(_is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values), age_s
 
     def stacked_columns(names: list[str]) -> Floats:
         return np.column_stack([held[name][0] for name in names]) if names else np.empty((len(t_s), 0))
@@ -129,9 +129,9 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
 
 
 def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float] = (2.0,)) -> Samples:
-    """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
-    surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
-    and stability grow with it; as at the reference where the airspeed is unknown."""
+    """The flight with what the airspeed V does of its own: commands times (V / V0)^n, n the power of each
+    surface, (S,) or one, and, as further signals, rates and signals times V / V0 - 1, since damping and
+    stability grow with it; V = V0 m/s where the airspeed is unknown."""
     V = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
     ratio = np.clip(np.nan_to_num(V / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
     products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(ratio) - 1.0)
@@ -153,17 +153,9 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     for a, b in pairwise([0, *edges.tolist(), len(x)]):
         x0 = x[a]
         x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
-    rates, commands, whitened_signals = np.split(
-        x, np.cumsum([array.shape[1] for array in arrays])[:2], axis=1
-    )
-    return replace(
-        samples,
-        rates=rates,
-        commands=commands,
-        signals=whitened_signals,
-        noise_ma_coefficients=tuple(C),
-        fit_weight=fit_weight,
-    )
+    names, ends = ("rates", "commands", "signals"), np.cumsum([array.shape[1] for array in arrays])[:2]
+    white: dict[str, Any] = dict(zip(names, np.split(x, ends, axis=1), strict=True))
+    return replace(samples, noise_ma_coefficients=tuple(C), fit_weight=fit_weight, **white)
 
 
 def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Iterator[str]:
@@ -171,20 +163,16 @@ def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Ite
     for name in used:
         yield from signals.column_defect_texts(name, log.columns[name], is_rate=name in rate_names)
         if name in rate_names and (sd := float(np.nanstd(log.columns[name].values))) > _MAX_RATE_SD_RAD_S:
-            yield (
-                f"{name}: spreads {sd:.3g} rad/s, as hardly an aircraft does: is it "
-                "in deg/s? a factor "
-                "of 0.01745 fits (`unit: deg/s`)"
-            )
+            hint = "is it in deg/s? a factor of 0.01745 fits (`unit: deg/s`)"
+            yield f"{name}: spreads {sd:.3g} rad/s, as hardly an aircraft does: {hint}"
 
 
 def _unchanged_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
     column = _finite_rows(column)
-    return np.nan_to_num(
-        _latest_values(t_s, column.t_s, signals.time_since_change_s(column)) + _held_age_s(column, t_s)
-    )
+    since_s = _latest_values(t_s, column.t_s, signals.time_since_change_s(column))
+    return np.nan_to_num(since_s + _held_age_s(column, t_s))
 
 
 def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
@@ -196,10 +184,9 @@ def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[
 
 def _is_rate_clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
     """Whether a rate is clipped at each sample."""
-    clipped = [
-        _latest_values(t_s, rate.t_s, signals.find_clipped_rows(rate.values).astype(float)) for rate in rates
-    ]
-    return np.asarray(np.nan_to_num(clipped).any(axis=0))
+    clipped = [signals.find_clipped_rows(rate.values).astype(float) for rate in rates]
+    held = [_latest_values(t_s, rate.t_s, rows) for rate, rows in zip(rates, clipped, strict=True)]
+    return np.asarray(np.nan_to_num(held).any(axis=0))
 
 
 def _sampled_airspeed(log: RecordedFlight, vehicle: Vehicle, t_s: Floats, step_s: float) -> Floats | None:
@@ -211,7 +198,7 @@ def _sampled_airspeed(log: RecordedFlight, vehicle: Vehicle, t_s: Floats, step_s
 def _sampled_height_rate(
     log: RecordedFlight, vehicle: Vehicle, grid: tuple[Floats, NDArray[np.int64], float]
 ) -> Floats | None:
-    """As in Samples; grid: of the samples."""
+    """As in Samples; grid: times, stretches and step of the samples."""
     quantities = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
     columns = [log.columns[quantity.column] for quantity in quantities if quantity.column in log.columns]
     if len(columns) < 2 or not all(len(column.t_s) > 1 for column in columns):
@@ -312,45 +299,36 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
 
 def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
-    if len(stamps) < _LEAST_SAMPLES:
-        raise BadInput(
-            f"{flight}: has {len(stamps)} samples of the rates, allowed: at least {_LEAST_SAMPLES}"
-        )
+    if (n := len(stamps)) < _LEAST_SAMPLES:
+        raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_LEAST_SAMPLES}")
     step_s = _median_step_s(stamps)
     rate_hz = 1.0 / step_s
+    logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
-        raise BadInput(
-            f"{flight}: rates are logged at {rate_hz:.2g} Hz, allowed: at least "
-            f"{MIN_HZ:g} Hz to tell "
-            f"a surface's effect from the vehicle's own motion{_other_time_unit_hint(rate_hz)}"
-        )
+        reason = f"to tell a surface's effect from the vehicle's own motion{_other_time_unit_hint(rate_hz)}"
+        raise BadInput(f"{logged}, allowed: at least {MIN_HZ:g} Hz {reason}")
     if rate_hz > _MAX_HZ:
-        raise BadInput(
-            f"{flight}: rates are logged at {rate_hz:.2g} Hz, allowed: up to {_MAX_HZ:g} Hz, time in seconds"
-        )
+        raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
     if rate_hz <= 1.05 * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
     even = _even_time_base(stamps, 1.0 / max_hz)
     if len(even[0]) < _LEAST_SAMPLES:
-        raise BadInput(
-            f"{flight}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are "
-            f"{len(even[0])} samples at "
-            f"{max_hz:g} Hz, allowed: at least {_LEAST_SAMPLES}; is time in another unit?"
-        )
+        reason = f"{n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(even[0])} samples at {max_hz:g} Hz"
+        allowed = f"at least {_LEAST_SAMPLES}; is time in another unit?"
+        raise BadInput(f"{flight}: {reason}, allowed: {allowed}")
     return even
 
 
 def _other_time_unit_hint(rate_hz: float) -> str:
     """The units of time in which a log too slow would be one of 10 to 1000 Hz."""
-    units = [
-        unit for unit, seconds in TIME_UNITS.items() if unit != "s" and 10.0 <= rate_hz / seconds <= 1000.0
-    ]
-    return f" (time in {units[0]} would be {rate_hz / TIME_UNITS[units[0]]:.3g} Hz)" if units else ""
+    for unit, seconds in TIME_UNITS.items():
+        if unit != "s" and 10.0 <= rate_hz / seconds <= 1000.0:
+            return f" (time in {unit} would be {rate_hz / seconds:.3g} Hz)"
+    return ""
 
 
 def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
-    """Samples a step apart over each stretch of the log, from its first stamp on: as
-    `_time_base`."""
+    """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1
     counts = np.ceil((stamps[last] - stamps[begin]) / step_s + 0.5).astype(np.int64)
@@ -368,11 +346,9 @@ def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, f
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None
-    return (
-        _means_and_age(column, t_s, step_s)
-        if _median_step_s(column.t_s) < 0.6 * step_s
-        else _latest_and_age(column, t_s)
-    )
+    if _median_step_s(column.t_s) < 0.6 * step_s:
+        return _means_and_age(column, t_s, step_s)
+    return _latest_and_age(column, t_s)
 
 
 def _latest_and_age(column: Column, t_s: Floats) -> tuple[Floats, float]:
@@ -401,7 +377,7 @@ def _latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 
 
 def _means_and_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
-    """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
+    """The mean over the interval of h s that ends at each time t, and h / 2: the delay it adds, s."""
     column = _finite_rows(column)
     ts, total = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
     eps = 1e-6 * h  # of stamps that are meant to fall on the edge
@@ -458,9 +434,9 @@ def _reader_arguments(
 def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
     """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
     that cannot be used."""
-    flights = [
-        flight if flight.n_log_parts == 1 else None for flight in load_flights_for_fit(paths, vehicle, reader)
-    ]
+    loaded = load_flights_for_fit(paths, vehicle, reader)
+    flights = [flight if flight.n_log_parts == 1 else None for flight in loaded]
+    del loaded
     for path, samples in zip(paths, flights, strict=True):
         if samples is not None:
             yield samples
@@ -475,9 +451,8 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
     every, n_seen, until_s = 1, 0, -np.inf
     for part, log in enumerate(read_vehicle_parts(path, vehicle, reader), 1):
         samples = resample(log, vehicle)
-        for begin in range(
-            int(np.searchsorted(samples.t_s, until_s, side="right")), len(samples.t_s), _FIT_SAMPLES
-        ):
+        first = int(np.searchsorted(samples.t_s, until_s, side="right"))
+        for begin in range(first, len(samples.t_s), _FIT_SAMPLES):
             if n_seen % every == 0:
                 kept.append(_select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
             n_seen += 1
@@ -492,14 +467,11 @@ def first_samples(samples: Samples, n: int) -> Samples:
     return samples if n >= len(samples.t_s) else _select_rows(samples, slice(n))
 
 
-def _select_rows(samples: Samples, row_slice: slice) -> Samples:
+def _select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
-    chosen = {
-        name: values[row_slice].copy()
-        for name in _PER_SAMPLE_FIELDS
-        if (values := getattr(samples, name)) is not None
-    }
-    unchanged = {name: values[row_slice].copy() for name, values in samples.unchanged_s.items()}
+    fields = {name: getattr(samples, name) for name in _PER_SAMPLE_FIELDS}
+    chosen = {name: values[rows].copy() for name, values in fields.items() if values is not None}
+    unchanged = {name: values[rows].copy() for name, values in samples.unchanged_s.items()}
     return replace(samples, log_stamps_s=chosen["t_s"], unchanged_s=unchanged, **chosen)
 
 
@@ -516,10 +488,11 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
         name: np.concatenate([stretch.unchanged_s[name] for stretch in stretches])
         for name in stretches[0].unchanged_s
     }
-    long_log_note = (
-        f"a long log, read in {n_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked at"
+    kept = f"{len(is_begin)} samples of it, spread evenly, are looked at"
+    notes = (
+        f"a long log, read in {n_parts} parts: {kept}",
+        *dict.fromkeys(note for stretch in stretches for note in stretch.notes),
     )
-    notes = (long_log_note, *dict.fromkeys(note for stretch in stretches for note in stretch.notes))
     return replace(
         stretches[0],
         name=name,

@@ -42,9 +42,8 @@ def find_clipped_rows(values: Floats) -> Mask:
         at_top = (v == np.maximum.accumulate(known)) & (v > 0.0)
         row = np.arange(len(v))
         since = np.maximum.accumulate(np.where(_changed_rows(v) | ~at_top, row, 0))
-        ordinal = np.cumsum(
-            _changed_rows(np.maximum.accumulate(known)).astype(np.int64)
-        )  # a larger value begins the count again
+        # a larger value begins the count again
+        ordinal = np.cumsum(_changed_rows(np.maximum.accumulate(known)).astype(np.int64))
         count = np.cumsum(at_top) - _count_at_previous(at_top, ordinal)
         clipped |= at_top & (row - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
     return clipped
@@ -73,8 +72,7 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
 
 
 def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
-    """Return a line for each mistake in a column over the whole flight. is_rate: a rate, not a
-    command."""
+    """Return a line for each mistake in a column over the whole flight. is_rate: a rate, not a command."""
     values, texts = column.values, [column.note] if column.note else []
     n = int((~np.isfinite(values)).sum())
     if n:

@@ -20,47 +20,38 @@ _MAX_FILE_BYTES = 20_000_000
 _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
-_KEYS_WITHOUT_EFFECT = (
-    "correlation",
-    "scale",
-    "minutes",
-    "column_sd",
-)  # of `fitted`, in files of release 1.0.0
+# keys of `fitted` in files of release 1.0.0
+_KEYS_WITHOUT_EFFECT = ("correlation", "scale", "minutes", "column_sd")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
 CoefRows = list[CoefRow]
 ShareBelowOne = Annotated[Number, Field(ge=0, lt=1)]
+OpenShare = Annotated[Number, Field(gt=0, lt=1)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+Positive = Annotated[Number, Field(gt=0, le=_MAX_COEF)]
+NonNegative = Annotated[Number, Field(ge=0, le=_MAX_COEF)]
+AtLeastOne = Annotated[Number, Field(ge=1, le=_MAX_COEF)]
 
 
 class FilterSettings(Section):
     """Prior settings of the filter."""
 
-    effectiveness_changes_per_hour: Number = Field(
-        12.0,
-        gt=0,
-        le=_MAX_COEF,
-        description="how often a surface changes its effectiveness",
-        alias="changes_per_hour",
+    effectiveness_changes_per_hour: Positive = Field(
+        12.0, description="how often a surface changes its effectiveness", alias="changes_per_hour"
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
     likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field(
         default={}, description="likelier levels of effectiveness, by group", alias="levels"
     )
-    likely_share: Number = Field(
-        0.9, ge=0, le=1, description="share of faults at the likelier levels", alias="level_share"
+    likely_share: Share = Field(
+        0.9, description="share of faults at the likelier levels", alias="level_share"
     )
-    trim_sd: Number = Field(
-        0.5, gt=0, le=_MAX_COEF, description="free spread of the trim between flights, in residual sd"
+    trim_sd: Positive = Field(0.5, description="free spread of the trim between flights, in residual sd")
+    trim_command_shift_sd: NonNegative = Field(
+        0.0, description="spread of the trim as a shift of each group's command", alias="trim_shift"
     )
-    trim_command_shift_sd: Number = Field(
-        0.0,
-        ge=0,
-        le=_MAX_COEF,
-        description="spread of the trim as a shift of each group's command",
-        alias="trim_shift",
-    )
-    trim_step_sd: list[Annotated[Number, Field(ge=0, le=_MAX_COEF)]] = Field(
+    trim_step_sd: list[NonNegative] = Field(
         [3e-4] * 3,
         min_length=3,
         max_length=3,
@@ -68,35 +59,25 @@ class FilterSettings(Section):
         alias="trim_walk",
     )
     gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain")
-    gain_return_time_s: Number = Field(
-        5e4,
-        gt=0,
-        le=_MAX_COEF,
-        description="in which the control gain returns to the model's, s",
-        alias="gain_time_s",
+    gain_return_time_s: Positive = Field(
+        5e4, description="in which the control gain returns to the model's, s", alias="gain_time_s"
     )
     own_gain_spread: Number = Field(
         0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
     )
-    own_gain_return_s: Number = Field(
-        2000.0,
-        gt=0,
-        le=_MAX_COEF,
-        description="in which that returns to the common gain, s",
-        alias="own_gain_time_s",
+    own_gain_return_s: Positive = Field(
+        2000.0, description="in which that returns to the common gain, s", alias="own_gain_time_s"
     )
-    quick_error_share: Number = Field(
+    quick_error_share: Share = Field(
         1.0,
-        ge=0,
-        le=1,
         description="error of responses quicker than the fitted flights have, as a share of them",
         alias="quick_error",
     )
-    max_trim_sd: Number = Field(
-        4.0, gt=0, le=_MAX_COEF, description="farthest the trim is adapted, in its spread", alias="trim_bound"
+    max_trim_sd: Positive = Field(
+        4.0, description="farthest the trim is adapted, in its spread", alias="trim_bound"
     )
-    max_gain_sd: Number = Field(
-        3.0, gt=0, le=_MAX_COEF, description="farthest the gain is adapted, in its spread", alias="gain_bound"
+    max_gain_sd: Positive = Field(
+        3.0, description="farthest the gain is adapted, in its spread", alias="gain_bound"
     )
     command_delays_s: CoefRow = Field(
         [0.0],
@@ -105,12 +86,8 @@ class FilterSettings(Section):
         description="delays tried beside the model's, each under a sample",
         alias="delays_s",
     )
-    jam_rate_offset_sd: Number = Field(
-        2.0,
-        gt=0,
-        le=_MAX_COEF,
-        description="offset of the rates a sample by a stuck surface, in sd",
-        alias="jam_sd",
+    jam_rate_offset_sd: Positive = Field(
+        2.0, description="offset of the rates a sample by a stuck surface, in sd", alias="jam_sd"
     )
     effective_sample_share: Number = Field(
         1.0, gt=0, le=1, description="share of a white residual's information in this one", alias="power"
@@ -122,18 +99,14 @@ class FilterSettings(Section):
         description="degrees of freedom of the residual's t distribution",
         alias="tail",
     )
-    noise_scale_memory_s: Number = Field(
-        60.0,
-        gt=0,
-        le=_MAX_COEF,
-        description="memory of the running scale of the residual, s",
-        alias="noise_memory_s",
+    noise_scale_memory_s: Positive = Field(
+        60.0, description="memory of the running scale of the residual, s", alias="noise_memory_s"
     )
-    alarm_probability: Number = Field(
-        0.5, gt=0, lt=1, description="probability of a fault that raises the alarm", alias="alarm"
+    alarm_probability: OpenShare = Field(
+        0.5, description="probability of a fault that raises the alarm", alias="alarm"
     )
-    confirmation_s: Number = Field(
-        0.0, ge=0, le=_MAX_COEF, description="for how long the probability must stand, s", alias="hold_s"
+    confirmation_s: NonNegative = Field(
+        0.0, description="for how long the probability must stand, s", alias="hold_s"
     )
     false_alarms_per_hour: Number | None = Field(
         None, gt=0, le=_MAX_COEF, description="the rate that was asked for"
@@ -145,19 +118,11 @@ class FilterSettings(Section):
         description="evidence for a fault that raises the alarm, instead of both: for that rate",
         alias="threshold",
     )
-    name_evidence_ratio: Number = Field(
-        1.0,
-        ge=1,
-        le=_MAX_COEF,
-        description="evidence for a name, over that for an alarm",
-        alias="name_evidence",
+    name_evidence_ratio: AtLeastOne = Field(
+        1.0, description="evidence for a name, over that for an alarm", alias="name_evidence"
     )
-    rename_hold_s: Number = Field(
-        0.0,
-        ge=0,
-        le=_MAX_COEF,
-        description="for how long another name stands before it counts, s",
-        alias="rename_s",
+    rename_hold_s: NonNegative = Field(
+        0.0, description="for how long another name stands before it counts, s", alias="rename_s"
     )
     one_faulty_group: bool = Field(
         False,
@@ -167,9 +132,7 @@ class FilterSettings(Section):
     effectiveness_level_step: Number = Field(
         0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness", alias="level_step"
     )
-    credible_mass: Number = Field(
-        0.9, gt=0, lt=1, description="posterior mass inside the bounds", alias="bounds"
-    )
+    credible_mass: OpenShare = Field(0.9, description="posterior mass inside the bounds", alias="bounds")
 
 
 class FittedRanges(Section):
@@ -197,10 +160,8 @@ class FittedRanges(Section):
     longest_still_s: dict[str, Number] = Field(
         default={}, description="longest time each column stood still, s", alias="still_s"
     )
-    misread_gain: Number = Field(
+    misread_gain: NonNegative = Field(
         0.0,
-        ge=0,
-        le=_MAX_COEF,
         description="how much likelier at most a sample of a part not fitted was with its columns read "
         "wrongly, in natural logarithms",
         alias="misread",
@@ -238,14 +199,12 @@ class NoiseModel(Section):
         description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
         alias="before",
     )
-    covariance_inflation: Number = Field(
+    covariance_inflation: AtLeastOne = Field(
         1.0,
-        ge=1,
-        le=_MAX_COEF,
         description="how many times as far, in squares, gains left out and other laws' differ",
         alias="wider",
     )
-    misread_shares: list[Annotated[Number, Field(ge=0, lt=1)]] = Field(
+    misread_shares: list[ShareBelowOne] = Field(
         default=[],
         description="share of its effect by which the fit may misread each group in this noise",
         alias="misreads",
@@ -296,15 +255,11 @@ class Model(Section):
 
     @model_validator(mode="after")
     def _check_arrays(self) -> "Model":
-        n_past = 3 * self.n_rate_lags + len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(
-            self.n_rate_lags
-        )
-        reason = (
-            f"has {len(self.past_coefficients)} rows, "
-            f"allowed: {n_past}, as `identify` writes them: identify it again"
-        )
-        conflicts: list[Conflict] = [(("past",), reason)] * (len(self.past_coefficients) != n_past)
-        conflicts += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
+        n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.n_rate_lags)
+        n, n_past = len(self.past_coefficients), 3 * self.n_rate_lags + n_signals
+        reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
+        conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
+        conflicts += [*self._group_mistakes(), *self._shape_mistakes(n)]
         refuse(conflicts)  # before any of it is computed with
         refuse(self._covariance_mistakes())
         return self
@@ -321,8 +276,8 @@ class Model(Section):
         names = ["+".join(group) for group in self.groups]
         for name in self.settings.likely_levels:
             if name not in names:
-                unknown_group_reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
-                yield ("settings", "levels", name), unknown_group_reason
+                reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
+                yield ("settings", "levels", name), reason
         for k, delay_s in enumerate(self.settings.command_delays_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
@@ -359,8 +314,8 @@ class Model(Section):
             expected += [(("fitted", key), array, shape) for key, array, shape in fitted if array]
         for key_path, array, shape in expected:
             if not _has_shape(array, shape):
-                shape_text = " x ".join(map(str, shape))
-                yield key_path, f"has another shape, allowed: {shape_text} numbers"
+                sizes = " x ".join(map(str, shape))
+                yield key_path, f"has another shape, allowed: {sizes} numbers"
 
     def _covariance_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
@@ -375,17 +330,12 @@ class Model(Section):
                 continue
             smallest, *_, largest = np.linalg.eigvalsh(R)
             if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
-                yield (
-                    key_path,
-                    "is singular or nearly so, allowed: a covariance, conditioned to "
-                    f"{_MAX_CONDITION_NUMBER:g}",
-                )
+                allowed = f"a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}"
+                yield key_path, f"is singular or nearly so, allowed: {allowed}"
         if np.min(self.response_error) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
         ranges = self.fitted_ranges
-        if ranges is not None and any(
-            value < 0.0 for value in (*ranges.group_gain_sd, *ranges.rate_sd_rad_s)
-        ):
+        if ranges is not None and min((*ranges.group_gain_sd, *ranges.rate_sd_rad_s), default=0.0) < 0.0:
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
     def with_single_noise(self, noise: NoiseModel) -> "Model":
@@ -393,12 +343,12 @@ class Model(Section):
         return self.model_copy(update={"noise_models": [noise]})
 
     def with_noise_of(self, average: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its
-        `inflation_of`; the model itself where none was fitted.
+        """The model with the noise fitted for flights of this moving average, times its `inflation_of`; the
+        model itself where none was fitted.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        if not self._noises_of(average):
+        if self._noise_of(average) is None:
             return self
         R = self.inflation_of(average) * self.covariance_of_noise(average)
         return self.model_copy(update={"residual_covariance": R.tolist()})
@@ -406,16 +356,18 @@ class Model(Section):
     def covariance_of_noise(self, average: Sequence[float]) -> Floats:
         """Covariance (3, 3) of the noise fitted for flights of this moving average, (rad/s)2; that of all
         flights where none was fitted."""
-        noises = self._noises_of(average)
-        return np.array(noises[0].residual_covariance if noises else self.residual_covariance)
+        return np.array((self._noise_of(average) or self).residual_covariance)
 
     def _noises_of(self, average: Sequence[float]) -> list[NoiseModel]:
         return [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
 
+    def _noise_of(self, average: Sequence[float]) -> NoiseModel | None:
+        return next(iter(self._noises_of(average)), None)
+
     def inflation_of(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        noises = self._noises_of(average)
-        return float(noises[0].covariance_inflation) if noises else 1.0
+        noise = self._noise_of(average)
+        return float(noise.covariance_inflation) if noise else 1.0
 
     def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);

@@ -279,15 +279,13 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
-        reason = (
-            "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
-        )
+        # the name of a surface is part of a column's
+        reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
         for surface, weights in self.surfaces.items():
-            mistakes += _unknown_name_conflicts(
-                ("surfaces", surface), weights, "command", self.command_columns
-            )
+            at = ("surfaces", surface)
+            mistakes += _unknown_name_conflicts(at, weights, "command", self.command_columns)
         tables: dict[str, Collection[str]] = {
             "labels": self.labels,
             "outputs": self.outputs,
@@ -306,40 +304,30 @@ class Vehicle(Section):
 
     def typed_quantities(self) -> list[tuple[Location, str, QuantityColumn]]:
         """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        found: list[tuple[Location, str, QuantityColumn]] = [
-            (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
+        kinds: list[tuple[str, str, Any]] = [
+            *((f"rates {axis}", RATE, getattr(self.rates, axis)) for axis in "pqr"),
+            *(
+                (f"attitude {axis}", ANGLE, getattr(self.attitude, axis, None))
+                for axis in ("roll", "pitch", "yaw")
+            ),
+            ("acceleration", ACCELERATION, self.acceleration),
+            ("airspeed", SPEED, self.airspeed),
+            ("energy altitude", LENGTH, getattr(self.energy, "altitude", None)),
+            ("energy airspeed", SPEED, getattr(self.energy, "airspeed", None)),
+            *((f"flow {name}", ANGLE, self.flow.get(name)) for name in ("alpha_rad", "beta_rad")),
         ]
-        if self.attitude is not None:
-            found.append((("attitude", "roll"), ANGLE, self.attitude.roll))
-            for angle_name in ("pitch", "yaw"):
-                if (angle := getattr(self.attitude, angle_name)) is not None:
-                    found.append((("attitude", angle_name), ANGLE, angle))
-        if self.acceleration is not None:
-            found.append((("acceleration",), ACCELERATION, self.acceleration))
-        if self.airspeed is not None:
-            found.append((("airspeed",), SPEED, self.airspeed))
-        if self.energy is not None:
-            found.append((("energy", "altitude"), LENGTH, self.energy.altitude))
-            found.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
-        for name in ("alpha_rad", "beta_rad"):
-            if name in self.flow:
-                found.append((("flow", name), ANGLE, self.flow[name]))
-        return found
+        return [
+            (tuple(keys.split()), kind, quantity) for keys, kind, quantity in kinds if quantity is not None
+        ]
 
     def _column_reading_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
         first: dict[str, QuantityColumn] = {}
-        for location, quantity in [
-            *self.located_model_quantities(),
-            *((location, quantity) for location, _, quantity in self.typed_quantities()),
-        ]:
+        typed = [(location, quantity) for location, _, quantity in self.typed_quantities()]
+        for location, quantity in [*self.located_model_quantities(), *typed]:
             if first.setdefault(quantity.column, quantity) != quantity:
-                return [
-                    (
-                        location,
-                        f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset",
-                    )
-                ]
+                reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"
+                return [(location, reason)]
         return []
 
     def located_model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
@@ -388,9 +376,8 @@ class Vehicle(Section):
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [quantity for _, quantity in self.located_model_quantities()] + [
-            quantity for _, _, quantity in self.typed_quantities()
-        ]
+        quantities = [quantity for *_, quantity in self.located_model_quantities()]
+        quantities += [quantity for *_, quantity in self.typed_quantities()]
         quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 

@@ -70,13 +70,7 @@ _DERIVED_NAME = (
 )
 """Names of what others derive from a quantity, or want of it: none of these is the quantity."""
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
-_RATE_UNIT_BY_NAME_PART = {
-    "rad_s": "rad/s",
-    "rad/s": "rad/s",
-    "deg_s": "deg/s",
-    "deg/s": "deg/s",
-    "dps": "deg/s",
-}
+_UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
@@ -99,12 +93,8 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
     parts = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
     for part, (_, lines) in enumerate(parts, 1):
         remarks += lines if len(parts) == 1 else [f"part {part} of {len(parts)}: {line}" for line in lines]
-    return {
-        "log": str(path),
-        "usable": all(usable for usable, _ in parts),
-        "lines": remarks,
-        "vehicle": guess,
-    }
+    usable = all(usable for usable, _ in parts)
+    return {"log": str(path), "usable": usable, "lines": remarks, "vehicle": guess}
 
 
 def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
@@ -113,11 +103,8 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
         samples = resample(log, vehicle)
     except BadInput as error:
         return False, [str(error)]
-    still = [
-        axis
-        for axis, rate in zip("pqr", samples.rates.T, strict=True)
-        if np.ptp(rate[np.isfinite(rate)]) == 0.0
-    ]
+    rates = zip("pqr", samples.rates.T, strict=True)
+    still = [axis for axis, rate in rates if np.ptp(rate[np.isfinite(rate)]) == 0.0]
     lines = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still]
     return not still, [_log_size_text(samples), *samples.notes, *_compare_angles(log, vehicle), *lines]
 
@@ -135,23 +122,19 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     if angles is None or angles.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch = angles.pitch
-    pitch_column_in_si = (
-        _column_in_si(columns, pitch) if pitch is not None and pitch.column in columns else None
-    )
-    roll_fit = physics.fit_roll(gyros, _column_in_si(columns, angles.roll), pitch_column_in_si)
-    if roll_fit is None:
+    named = [angle if angle and angle.column in columns else None for angle in (angles.pitch, angles.yaw)]
+    roll = _column_in_si(columns, angles.roll)
+    pitch, yaw = (None if angle is None else _column_in_si(columns, angle) for angle in named)
+    fits = [
+        physics.fit_roll(gyros, roll, pitch),
+        physics.fit_pitch(gyros, roll, pitch) if pitch else None,
+        physics.fit_yaw(gyros, roll, pitch, yaw) if yaw else None,
+    ]
+    if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
-    texts = [_fit_text(roll_fit, angles.roll.column, vehicle.rates.p.column)]
-    if pitch is not None and pitch_column_in_si is not None:
-        pitch_fit = physics.fit_pitch(gyros, _column_in_si(columns, angles.roll), pitch_column_in_si)
-        texts += [_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
-    if (yaw := angles.yaw) is not None and yaw.column in columns:
-        yaw_fit = physics.fit_yaw(
-            gyros, _column_in_si(columns, angles.roll), pitch_column_in_si, _column_in_si(columns, yaw)
-        )
-        texts += [_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
-    return texts
+    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    trios = zip(fits, (angles.roll, *named), rates, strict=True)
+    return [_fit_text(fit, angle.column, rate) for fit, angle, rate in trios if fit and angle]
 
 
 def _fit_text(fit: physics.AngleFit, angle: str, rate: str) -> str:
@@ -175,33 +158,25 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     log, in_log, mixing = _read_likely(path, reader, time)
     remarks += mixing.lines
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
+    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
     found = {
-        quantity: _shortest_match(
-            pattern,
-            [
-                name
-                for name in names
-                if quantity not in ("roll", "pitch") or not re.search(_ANGLE_RATE_NAME, _snake_case(name))
-            ],
-        )
+        quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
         for quantity, pattern in _NAME_PATTERNS.items()
     }
     if not mixing.surfaces:
         rotors = multicopter_reason(log.parameters, in_log)
         if rotors is not None:
-            remarks.append(
-                f"{path}: is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of "
-                "an aircraft with surfaces"
-            )
+            reason = f"is the log of a multicopter ({rotors}), which has no surfaces"
+            remarks.append(f"{path}: {reason}, allowed: a log of an aircraft with surfaces")
             return None
-        _guess_surfaces(mixing, log, names)
+        for name in command_names(names, log.parameters)[:_MAX_PROPOSED_COMMANDS]:
+            mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
+            mixing.surfaces[_plain_name(name)] = {name: 1.0}
     missing = [axis for axis in "pqr" if found[axis] is None]
     if missing or not mixing.surfaces:
-        problem = (
-            f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
-            if missing
-            else missing_commands_text(in_log)
-        )
+        problem = missing_commands_text(in_log)
+        if missing:
+            problem = f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
         nearest = nearest_names_text("rate" if missing else "command", in_log)
         remarks.append(f"{path}: {problem}; the log has {nearest}")
         return None
@@ -228,9 +203,8 @@ def _propose_vehicle(
     vehicle["surfaces"] = mixing.surfaces
     angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
     if roll is not None:
-        vehicle["attitude"] = {
-            axis: _column_entry(str(name), angle_unit, "rad") for axis, name in angles.items()
-        }
+        entries = {axis: _column_entry(str(name), angle_unit, "rad") for axis, name in angles.items()}
+        vehicle["attitude"] = entries
     if az := found["az"]:
         median = float(np.nanmedian(np.abs(columns[az].values)))
         unit = nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0) if median > 0.0 else None
@@ -239,13 +213,6 @@ def _propose_vehicle(
     if found["airspeed"]:
         vehicle["airspeed"] = found["airspeed"]
     return vehicle
-
-
-def _guess_surfaces(mixing: Mixing, log: RecordedFlight, names: Sequence[str]) -> None:
-    """Make a surface of each column that is known to carry a command."""
-    for name in command_names(names, log.parameters)[:_MAX_PROPOSED_COMMANDS]:
-        mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
-        mixing.surfaces[_plain_name(name)] = {name: 1.0}
 
 
 def _read_likely(
@@ -257,11 +224,11 @@ def _read_likely(
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        names_to_read = [*_likely_columns(names, None), *mixing.entry_by_column]
-        return read_flight(path, reader, columns=names_to_read), names, mixing
+        likely = [*_likely_columns(names, None), *mixing.entry_by_column]
+        return read_flight(path, reader, columns=likely), names, mixing
     wanted = _likely_columns(column_names(path)) if reader == "table" else None
-    recording = next(read_parts(path, reader, time, wanted))
-    return recording, list(recording.columns), Mixing()
+    log = next(read_parts(path, reader, time, wanted))
+    return log, list(log.columns), Mixing()
 
 
 def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
@@ -298,11 +265,8 @@ def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
         if phrase := text_of_column_phrase(cells, name):
             phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
         step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
-        units = [
-            unit
-            for unit, seconds in TIME_UNITS.items()
-            if step > 0.0 and _is_log_rate_plausible(1.0 / (step * seconds))
-        ]
+        rates = {unit: 1.0 / (step * seconds) for unit, seconds in TIME_UNITS.items()} if step > 0.0 else {}
+        units = [unit for unit, rate in rates.items() if _LOG_RATES_HZ[0] <= rate <= _LOG_RATES_HZ[1]]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
             if (name, unit) != (TIME_COLUMN, "s"):
@@ -310,14 +274,8 @@ def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
             return name, unit
     allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     phrase = f" ({'; '.join(phrases)})" if phrases else ""
-    raise BadInput(
-        f"{path}: no column of time{phrase}, allowed: {allowed}; it has "
-        f"{nearest_names_text(TIME_COLUMN, names)}"
-    )
-
-
-def _is_log_rate_plausible(rate_hz: float) -> bool:
-    return _LOG_RATES_HZ[0] <= rate_hz <= _LOG_RATES_HZ[1]
+    nearest = nearest_names_text(TIME_COLUMN, names)
+    raise BadInput(f"{path}: no column of time{phrase}, allowed: {allowed}; it has {nearest}")
 
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
@@ -338,7 +296,7 @@ def _guess_rate_unit(
         if roll_fit is not None and abs(roll_fit.correlation) > _MIN_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (unit for name_part, unit in _RATE_UNIT_BY_NAME_PART.items() if name_part in rate_names[0].lower()),
+        (unit for name_part, unit in _UNIT_OF_PART.items() if name_part in rate_names[0].lower()),
         None,
     )
     if unit_in_name:

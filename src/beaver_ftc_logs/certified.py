@@ -21,17 +21,17 @@ def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) ->
     scheme than ours diagnosed."""
     alarmed = (stretch for stretch in inputs.gap_free_stretches if rows.faulty[stretch[0] : stretch[1]].any())
     begin, end = next(alarmed, inputs.gap_free_stretches[0])
-    stretch_inputs = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
+    arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
     diagnosis = inputs.diagnosis
 
-    def step_diagnosis_and_yield_index() -> Iterator[int]:
-        for k, sample in enumerate(zip(*stretch_inputs, strict=True)):
+    def step() -> Iterator[int]:
+        for k, sample in enumerate(zip(*arrays, strict=True)):
             diagnosis.step(*sample)
             yield k
 
     diagnosis.reset()
     memory, scenario = diagnosis.inside()
-    scenario_named_as_flight = scenario.model_copy(update={"name": inputs.samples.name})
-    log, document = by_frames.proved(scenario_named_as_flight, memory, step_diagnosis_and_yield_index())
+    scenario = scenario.model_copy(update={"name": inputs.samples.name})
+    log, document = by_frames.proved(scenario, memory, step())
     document = certificate.with_digest(document | {"begins_s": float(inputs.samples.t_s[begin])})
-    by_frames.write(scenario_named_as_flight, log, document, folder)
+    by_frames.write(scenario, log, document, folder)

@@ -36,30 +36,24 @@ def corrected_logs(
     samples: Samples, vehicle: Vehicle, unknown: Collection[str] = ()
 ) -> Iterator[CorrectedLog]:
     """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
-    that the attitude confirms stays as it is. unknown: surfaces whose effect the model
-    does not know: that shows nothing of their commands."""
+    that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
+    shows nothing of their commands."""
     surfaces = list(vehicle.surfaces)
-    doubtful = [
-        name for axis in "pqr" if (name := getattr(vehicle.rates, axis).column) not in samples.confirmed_rates
-    ]
-    for first_surface_index, j in combinations(
-        [i for i, name in enumerate(surfaces) if name not in unknown], 2
-    ):
+    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    doubtful = [name for name in rates if name not in samples.confirmed_rates]
+    for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
         order = list(range(len(surfaces)))
-        order[first_surface_index], order[j] = (j, first_surface_index)
+        order[i], order[j] = j, i
         exchanged = replace(samples, commands=samples.commands[:, order])
-        yield CorrectedLog(
-            f"the commands of {surfaces[first_surface_index]} and {surfaces[j]} exchanged", exchanged
-        )
+        yield CorrectedLog(f"the commands of {surfaces[i]} and {surfaces[j]} exchanged", exchanged)
     for first, second in combinations(doubtful, 2):
         exchanged = _altered(samples, vehicle, {first: second, second: first}, {})
         yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
     for name in [*doubtful, *vehicle.signal_columns]:
-        is_rate = name in doubtful
         for factor in SIGN_AND_UNIT_FACTORS:
             scaled = _altered(samples, vehicle, {}, {name: factor})
-            log_jacobian, scaled_signal = (float(np.log(abs(factor))), "") if is_rate else (0.0, name)
-            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, log_jacobian, scaled_signal)
+            also = (float(np.log(abs(factor))), "") if name in doubtful else (0.0, name)
+            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, *also)
 
 
 def log_without_signal(samples: Samples, vehicle: Vehicle, signal: str) -> Samples:
@@ -71,12 +65,12 @@ def _altered(
     samples: Samples, vehicle: Vehicle, sources: Mapping[str, str], factors: Mapping[str, float]
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.regressor_columns
-    columns = dict(zip(column_names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
+    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.regressor_columns
+    columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
     new = []
-    for name in column_names:
+    for name in names:
         logged = name.removesuffix(" by airspeed")
         suffix = name[len(logged) :]
         new.append(factors.get(logged, 1.0) * columns[sources.get(logged, logged) + suffix])
-    new_signals = np.column_stack(new[3:]) if new[3:] else samples.signals
-    return replace(samples, rates=np.column_stack(new[:3]), signals=new_signals)
+    signals = np.column_stack(new[3:]) if new[3:] else samples.signals
+    return replace(samples, rates=np.column_stack(new[:3]), signals=signals)

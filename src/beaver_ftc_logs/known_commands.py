@@ -149,14 +149,12 @@ def missing_commands_text(names: Collection[str]) -> str:
     """Which known command messages are missing, and how a vehicle file names others."""
     examples = ", ".join(dict.fromkeys(f"{known.example} ({known.ecosystem})" for known in KNOWN_COMMANDS))
     outputs = [name for name in names if re.match(_OUTPUT_PATTERN, name)]
-    outputs_text = (
-        f"; {outputs[0]} and its like are outputs to servos and to motors, and the log does not state which "
-        "moves a surface"
-        if outputs
-        else ""
-    )
+    found = ""
+    if outputs:
+        reason = "outputs to servos and to motors, and the log does not state which moves a surface"
+        found = f"; {outputs[0]} and its like are {reason}"
     return (
-        f"no column is known to carry the command of a surface{outputs_text}, allowed: {examples}, words "
+        f"no column is known to carry the command of a surface{found}, allowed: {examples}, words "
         "such as elevator_cmd, or a vehicle file that names it: commands: [COLUMN], "
         "surfaces: {elevator: {COLUMN: 1}}"
     )

@@ -25,13 +25,9 @@ def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) ->
     if not labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
     last = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
-    labelled_rows = {
-        name: getattr(rows, name).compress(labelled, axis=1)
-        for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
-    }
-    return score_against_labels(
-        replace(rows, **labelled_rows), samples.labels[last].compress(labelled, axis=1)
-    )
+    names = ("effectiveness", "effectiveness_low", "effectiveness_high")
+    rows = replace(rows, **{name: getattr(rows, name).compress(labelled, axis=1) for name in names})
+    return score_against_labels(rows, samples.labels[last].compress(labelled, axis=1))
 
 
 def score_against_labels(rows: LogRows, labels: Floats) -> Document:
@@ -46,7 +42,7 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
         keys = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
         return {"rows": 0, "settings": [], **dict.fromkeys(keys)}
     truth = labels[known]
-    e = rows.effectiveness[known]
+    e, low, high = (x[known] for x in (rows.effectiveness, rows.effectiveness_low, rows.effectiveness_high))
     levels, counts = np.unique(truth, axis=0, return_counts=True)
     frequent = levels[counts >= 0.005 * len(truth)]
     faulty = (truth < 1.0).any(axis=1)
@@ -57,14 +53,12 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
         "healthy_or_faulty": float(np.mean((rows.faulty[known] == 1) == faulty)),
         "side": float(np.mean(((e < 1.0) == (truth < 1.0)).all(axis=1))),
         "mean_error": float(np.abs(e - truth).mean()),
-        "held_by_bounds": float(
-            np.mean((rows.effectiveness_low[known] <= truth) & (truth <= rows.effectiveness_high[known]))
-        ),
+        "held_by_bounds": float(np.mean((low <= truth) & (truth <= high))),
     }
 
 
 def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:
-    """Index of the setting nearest to each row of e (n, S), (n,)."""
+    """Index of the setting nearest to each row of the effectiveness e (n, S), (n,)."""
     distance = ((e[:, None, :] - levels[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(distance.argmin(axis=1))
 
@@ -100,20 +94,15 @@ def _name_shares(rows: LogRows, alarms: np.ndarray) -> dict[str, float]:
 
 
 def _is_main_name_right(
-    name_shares: dict[str, float], failed_surfaces: list[str], groups: list[list[str]]
+    shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
-    """Whether the most frequent name after the failure is a group that failed; None without a failure or
-    name."""
-    suffixes = tuple(f"_{surface}" for surface in failed_surfaces)
-    failed = {
-        g
-        for g, group in enumerate(groups)
-        for name in group
-        if name in failed_surfaces or name.endswith(suffixes)
-    }
-    shares = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
-    if not failed or not shares:
+    """Whether the most frequent name after the failure of some surfaces is a group that failed; None without
+    a failure or name."""
+    suffixes = tuple(f"_{surface}" for surface in surfaces)
+    has_failed = [any(name in surfaces or name.endswith(suffixes) for name in group) for group in groups]
+    shares = {name: share for name, share in shares.items() if name != UNKNOWN_SURFACE}
+    if not any(has_failed) or not shares:
         return None
     main = set(max(shares, key=lambda name: shares[name]).split("+"))
-    named = {g for g, group in enumerate(groups) if main & set(group)}
-    return bool(named) and named <= failed
+    right = [failed for failed, group in zip(has_failed, groups, strict=True) if main & set(group)]
+    return bool(right) and all(right)

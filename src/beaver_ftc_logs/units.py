@@ -34,9 +34,7 @@ def units_of_kind(kind: str) -> list[str]:
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratios = {
-        name: max(si_factor / SI_UNITS[name][1], SI_UNITS[name][1] / si_factor)
-        for name in units_of_kind(kind)
-    }
+    sizes = {name: size for name, (one, size) in SI_UNITS.items() if one == kind}
+    ratios = {name: max(si_factor / size, size / si_factor) for name, size in sizes.items()}
     nearest = min(ratios, key=lambda name: ratios[name])
     return nearest if ratios[nearest] <= max_ratio else None

@@ -104,10 +104,8 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
     while not is_last:
         is_last = len(stamps) - begin <= MAX_LAST_PART_FACTOR * part_rows
         end = len(stamps) if is_last else begin + part_rows
-        columns = {
-            name: _select_period(column, stamps[begin], stamps[end - 1])
-            for name, column in log.columns.items()
-        }
+        period = stamps[begin], stamps[end - 1]
+        columns = {name: _select_period(column, *period) for name, column in log.columns.items()}
         yield replace(log, name=f"{log.name}-part-{part}", columns=columns)
         begin, part = end - round(PART_OVERLAP_SHARE * part_rows), part + 1
 
@@ -133,9 +131,9 @@ def check_is_log_itself(path: Path) -> None:
         head = file.read(_POINTER_BYTES)
     for pattern, (store, command) in _LARGE_FILE_STORES.items():
         if re.match(pattern, head):
+            allowed = f"the log itself, which `{command}` fetches"
             raise BadInput(
-                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: the log "
-                f"itself, which `{command}` fetches"
+                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: {allowed}"
             )
 
 
@@ -147,8 +145,6 @@ def reader_name_for_path(path: Path) -> str:
         raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
     reader = _READER_OF_SUFFIX.get(path.suffix.lower())
     if reader is None:
-        raise BadInput(
-            f"{path}: what kind of log this is cannot be seen, allowed: "
-            f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
-        )
+        allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
+        raise BadInput(f"{path}: what kind of log this is cannot be seen, allowed: {allowed}")
     return reader

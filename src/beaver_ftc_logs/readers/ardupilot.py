@@ -69,11 +69,8 @@ class _Messages:
         if kind in _IGNORED_MESSAGES or _TIME_FIELD not in fields:
             return []
         instance = re.compile(re.escape(kind) + r"(-?\d+)?")
-        wanted = {
-            column.partition(".")[2]
-            for column in self.wanted_columns or ()
-            if instance.fullmatch(column.partition(".")[0])
-        }
+        parts = (column.partition(".") for column in self.wanted_columns or ())
+        wanted = {name for message, _, name in parts if instance.fullmatch(message)}
         wanted |= {_TIME_FIELD, *_INSTANCE_FIELDS}
         return [name for name in fields if self.wanted_columns is None or name in wanted]
 
@@ -106,23 +103,16 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     if not messages.fields_by_message:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
     if not messages.values_by_message:
-        return RecordedFlight(
-            path.stem,
-            columns_without_numbers(messages.fields_by_message, _TIME_FIELD),
-            parameters=messages.parameters,
-        )
+        empty = columns_without_numbers(messages.fields_by_message, _TIME_FIELD)
+        return RecordedFlight(path.stem, empty, parameters=messages.parameters)
     damaged = [name for name, stamps in messages.stamps_by_message.items() if not stamps.in_order]
     if damaged:  # which of their stamps is the first depends on all of them
         messages = _read_messages(path, wanted, damaged)
     first_us = [stamps.first for stamps in messages.stamps_by_message.values()]
-    column_names = column_names_of_topics(messages.fields_by_message, _TIME_FIELD)
+    names = column_names_of_topics(messages.fields_by_message, _TIME_FIELD)
     columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_us)
-    return RecordedFlight(
-        path.stem,
-        columns,
-        parameters=messages.parameters,
-        unread_column_names=tuple(name for name in column_names if name not in columns),
-    )
+    unread = tuple(name for name in names if name not in columns)
+    return RecordedFlight(path.stem, columns, parameters=messages.parameters, unread_column_names=unread)
 
 
 def _read_messages(

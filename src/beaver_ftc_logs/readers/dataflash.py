@@ -64,15 +64,9 @@ def _is_format_of_parameter(fmt: Any) -> bool:
 
 def _numeric_fields(fmt: Any, as_text: bool) -> list[str]:
     """The fields that hold numbers, in their order; in text a flight mode (M) is a word."""
-    is_number = [
-        kind in (int, float) and not (as_text and code == "M")
-        for kind, code in zip(fmt.msg_types, fmt.msg_fmts, strict=True)
-    ]
-    return [
-        field
-        for field, index in fmt.colhash.items()
-        if index < len(is_number) and is_number[index]  # a damaged format may have more fields than types
-    ]
+    kinds = enumerate(zip(fmt.msg_types, fmt.msg_fmts, strict=True))
+    numbers = {i for i, (kind, code) in kinds if kind in (int, float) and not (as_text and code == "M")}
+    return [field for field, index in fmt.colhash.items() if index in numbers]
 
 
 class _MappedLog:
@@ -179,19 +173,14 @@ class _Layout:
     def __init__(self, fmt: Any, fields_of: FieldsOfFormat) -> None:
         fields = {fmt.colhash[field]: field for field in fields_of(fmt)}
         codes = [FORMAT_TO_STRUCT[code][0] for code in fmt.msg_fmts]
-        self._struct = struct.Struct(
-            f"<{_HEADER_BYTES}x"
-            + "".join(
-                code if index in fields else f"{struct.calcsize(f'<{code}')}x"
-                for index, code in enumerate(codes)
-            )
-        )
+        skipped = [f"{struct.calcsize(f'<{code}')}x" for code in codes]
+        parts = [code if i in fields else skipped[i] for i, code in enumerate(codes)]
+        self._struct = struct.Struct(f"<{_HEADER_BYTES}x{''.join(parts)}")
         self._fields = [fields[index] for index in sorted(fields)]
-        self._divisors = {
-            fields[index]: 1.0 / factor
-            for index, factor in enumerate(fmt.msg_mults)
-            if factor is not None and index in fields
-        }
+        factors = [
+            (i, factor) for i, factor in enumerate(fmt.msg_mults) if factor is not None and i in fields
+        ]
+        self._divisors = {fields[i]: 1.0 / factor for i, factor in factors}
         self.is_plain = self._struct.size == fmt.len and fmt.name != "FMT"
 
     def read_numbers(self, data: Any, offset: int) -> Numbers:

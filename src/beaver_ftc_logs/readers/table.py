@@ -57,9 +57,8 @@ def read_parts(
     names, parts = _names_and_parts(path, None if columns is None else {time, *columns}, part_rows)
     if time not in names:
         allowed = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
-        raise BadInput(
-            f"{path}: no column {time}, allowed: {allowed}; it has {nearest_names_text(time, names)}"
-        )
+        nearest = nearest_names_text(time, names)
+        raise BadInput(f"{path}: no column {time}, allowed: {allowed}; it has {nearest}")
     for part, (cells, remarks, has_more) in enumerate(parts, 1):
         table = _whole_table(names, cells)
         notes: dict[str, str] = {}
@@ -70,14 +69,10 @@ def read_parts(
         select = slice(None) if kept is None else kept
         t_s = t_s[select]
         check_time(path, t_s, time, cells.n_rows_before)
-        flight_columns = {
-            name: Column(t_s, values[select], notes.get(name, "")) for name, values in table.items()
-        }
-        is_whole = part == 1 and not has_more
-        table_notes = (*filter(None, notes.get("", "").split("\n")), *left_out)
-        yield RecordedFlight(
-            path.stem if is_whole else f"{path.stem}-part-{part}", flight_columns, notes=table_notes
-        )
+        read = {name: Column(t_s, values[select], notes.get(name, "")) for name, values in table.items()}
+        name = path.stem if part == 1 and not has_more else f"{path.stem}-part-{part}"
+        lines = (*filter(None, notes.get("", "").split("\n")), *left_out)
+        yield RecordedFlight(name, read, notes=lines)
 
 
 def _whole_table(names: Sequence[str], cells: TableCells) -> NumberTable:
@@ -92,20 +87,16 @@ def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[
     if not n_bad:
         return None, []
     if n_bad > len(t_s) // 2:
-        phrase = text_of_column_phrase(cells, time)
-        raise BadInput(
-            f"{path}: {time}: {n_bad} of {len(t_s)} rows hold no number{phrase}, allowed: increasing time"
-        )
+        reason = f"{n_bad} of {len(t_s)} rows hold no number{text_of_column_phrase(cells, time)}"
+        raise BadInput(f"{path}: {time}: {reason}, allowed: increasing time")
     return np.isfinite(t_s), [f"{time}: rows without a number, left out: {n_bad} of {len(t_s)}"]
 
 
 def text_of_column_phrase(cells: TableCells, name: str) -> str:
     """`, but text such as '7 ticks'` for a column with cells of text, else nothing."""
-    return (
-        f", but text such as {cells.text_cell_summaries[name][2][:30]!r}"
-        if (name in cells.text_cell_summaries)
-        else ""
-    )
+    if name not in cells.text_cell_summaries:
+        return ""
+    return f", but text such as {cells.text_cell_summaries[name][2][:30]!r}"
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
@@ -165,12 +156,8 @@ def _names_and_parts(
     check_is_log_itself(path)
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
     with _read_errors(path):
-        names, readable = (
-            _parquet_columns(path, columns)
-            if layout is None
-            else (list(layout.column_names), list(layout.column_names))
-        )
-    doubled = layout.doubled_names if layout else _repeated_names(names)
+        names, readable = (list(layout.column_names),) * 2 if layout else _parquet_columns(path, columns)
+    doubled = layout.doubled_names if layout else {name for name, n in Counter(names).items() if n > 1}
     ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
     if ambiguous:
         raise BadInput(f"{path}: has two columns {ambiguous[0]}, allowed: one of a name")
@@ -193,10 +180,8 @@ def _join_blocks(
                 joined = join_blocks(held)
                 done = joined.select_rows(0, part_rows)
                 rest = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
-                done.text_cell_summaries, done.broken_line_beginnings = (
-                    joined.text_cell_summaries,
-                    joined.broken_line_beginnings,
-                )
+                done.text_cell_summaries = joined.text_cell_summaries
+                done.broken_line_beginnings = joined.broken_line_beginnings
                 held, n_held = [rest], rest.n_rows
                 yield (done, list(table_remarks(layout, done)) if layout else [], True)
         joined = join_blocks(held)
@@ -213,9 +198,8 @@ def _parquet_columns(path: Path, columns: Collection[str] | None) -> tuple[list[
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
         numeric = [field.name for field in schema if _is_numeric_type(field.type)]
-        _check_parquet_size(
-            path, file.metadata, [name for name in numeric if columns is None or name in columns]
-        )
+        wanted = [name for name in numeric if columns is None or name in columns]
+        _check_parquet_size(path, file.metadata, wanted)
     return list(schema.names), numeric
 
 
@@ -226,13 +210,13 @@ def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCel
     n_read = 0
     with parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
-            yield TableCells({name: _as_floats(batch[name]) for name in names}, batch.num_rows, n_read)
+            yield TableCells(
+                {name: np.asarray(batch[name].to_numpy(), dtype=float) for name in names},
+                batch.num_rows,
+                n_read,
+            )
             n_read += batch.num_rows
     yield TableCells({name: np.empty(0) for name in names}, 0, n_read)
-
-
-def _repeated_names(names: Sequence[str]) -> frozenset[str]:
-    return frozenset(name for name, n in Counter(names).items() if n > 1)
 
 
 def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
@@ -244,16 +228,11 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
     total = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in set(names))
     size = max(total, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
     if size > _MAX_NUMBER_BYTES:
-        raise BadInput(
-            f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
-        )
+        allowed = f"up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
+        raise BadInput(f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: {allowed}")
 
 
 def _is_numeric_type(kind: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
-
-
-def _as_floats(column: Any) -> Floats:
-    return np.asarray(column.to_numpy(), dtype=float)

@@ -53,7 +53,7 @@ class TableCells:
     broken_line_beginnings: list[str] = field(default_factory=list)
 
     def select_rows(self, first: int, end_row: int | None = None) -> "TableCells":
-        """The rows from first to before end_row, of which nothing else is said."""
+        """The rows from `first` to before `end_row`, of which nothing else is said."""
         numbers = {name: values[first:end_row].copy() for name, values in self.numbers.items()}
         return TableCells(numbers, len(range(self.n_rows)[first:end_row]), self.n_rows_before + first)
 
@@ -79,9 +79,7 @@ def find_layout(path: Path) -> TableLayout:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise _unreadable_error(path, "is written in UTF-16, not in UTF-8")
     lines = head.decode("utf-8-sig", errors="replace").splitlines()[:_MAX_LAYOUT_LINES]
-    layouts = [
-        layout for delimiter in _DELIMITER_TITLES if (layout := _layout_with_delimiter(lines, delimiter))
-    ]
+    layouts = [*filter(None, (_layout_with_delimiter(lines, delimiter) for delimiter in _DELIMITER_TITLES))]
     if not layouts:
         raise _unreadable_error(path, _describe_unreadable(lines))
     return max(layouts, key=lambda layout: len(layout.column_names))
@@ -160,10 +158,9 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
     with csv.open_csv(path, **options) as blocks:
         for block in blocks:
             cells = TableCells({}, block.num_rows, n_read)
-            cells.numbers = {
-                name: _convert_column(block[name], layout.decimal_mark, name, cells, days[name])
-                for name in wanted
-            }
+            for name in wanted:
+                numbers = _convert_column(block[name], layout.decimal_mark, name, cells, days[name])
+                cells.numbers[name] = numbers
             cells.broken_line_beginnings, broken[:] = broken[:], []
             n_read += block.num_rows
             yield cells
@@ -175,9 +172,8 @@ def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> No
     n_broken, n_lines = len(cells.broken_line_beginnings), cells.n_rows + len(cells.broken_line_beginnings)
     if n_broken > _MAX_BROKEN_LINE_SHARE * n_lines:
         reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
-        raise _unreadable_error(
-            path, f"{reason}, {len(layout.column_names)}: the first {cells.broken_line_beginnings[0]!r}"
-        )
+        first = f"{len(layout.column_names)}: the first {cells.broken_line_beginnings[0]!r}"
+        raise _unreadable_error(path, f"{reason}, {first}")
 
 
 def _broken_line_recorder(broken: list[str]) -> Callable[[Any], str]:

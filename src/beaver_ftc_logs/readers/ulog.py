@@ -32,23 +32,19 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     """
     params: dict[str, tuple[float, ...]] = {}
     fields, kept = _read_topics(path, wanted, params)
-    column_names = column_names_of_topics(fields, _TIME_FIELD)
-    lacks = wanted is not None and not {*wanted} <= {*column_names}
+    names = column_names_of_topics(fields, _TIME_FIELD)
+    lacks = wanted is not None and not {*wanted} <= {*names}
     if lacks:
         fields, _ = _read_topics(path, (), {})
-        column_names = column_names_of_topics(fields, _TIME_FIELD)
+        names = column_names_of_topics(fields, _TIME_FIELD)
     if not fields:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    if wanted is not None and not {*wanted} & {*column_names}:
+    if wanted is not None and not {*wanted} & {*names}:
         return RecordedFlight(path.stem, columns_without_numbers(fields, _TIME_FIELD), parameters=params)
     columns, origin_s = columns_and_time_origin(kept, _TIME_FIELD)
-    return RecordedFlight(
-        path.stem,
-        columns,
-        notes=(f"time counts from {origin_s:.3f} s of the autopilot's clock",),
-        parameters=params,
-        unread_column_names=tuple(name for name in column_names if name not in columns),
-    )
+    unread = tuple(name for name in names if name not in columns)
+    notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
+    return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
 
 
 def _read_topics(
@@ -67,11 +63,9 @@ def _read_topics(
         any_wanted = wanted is None or bool(topics)
 
         def kept_fields(topic: str, fields: list[str]) -> list[str]:
-            return [
-                field
-                for field in fields
-                if any_wanted and (field == _TIME_FIELD or wanted is None or f"{topic}.{field}" in wanted)
-            ]
+            if not any_wanted or wanted is None:
+                return list(fields) if any_wanted else []
+            return [field for field in fields if field == _TIME_FIELD or f"{topic}.{field}" in wanted]
 
         fields_by_topic: dict[str, list[str]] = {}
         kept_by_topic: dict[str, dict[str, Floats]] = {}
@@ -100,7 +94,5 @@ def _min_message_bytes(formats: dict[str, Any], name: str, outer: tuple[str, ...
         raise ValueError(f"a message {name} holds itself")
     if name not in formats:  # a number, or a type that pyulog complains about
         return 1
-    return sum(
-        max(count, 1) * _min_message_bytes(formats, kind, (*outer, name))
-        for kind, count, _ in formats[name].fields
-    )
+    fields, outer = formats[name].fields, (*outer, name)
+    return sum(max(count, 1) * _min_message_bytes(formats, kind, outer) for kind, count, _ in fields)

@@ -5,6 +5,7 @@ block is reduced to the kept fields, in the numbers' own types.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +38,7 @@ def read_topics(
     while log.data_list:
         topic = log.data_list.pop(0)
         name, fields = _column_topic_name(topic.name, topic.multi_id), list(topic.data)
-        blocks = [
-            block for messages in log.messages_of_topics if messages.is_of(topic) for block in messages.blocks
-        ]
+        blocks = [*chain(*(messages.blocks for messages in log.messages_of_topics if messages.is_of(topic)))]
         numbers: dict[str, Floats] = {}
         for field in kept(name, fields):
             parts = [*(block.pop(field) for block in blocks), topic.data[field]]

@@ -121,7 +121,7 @@ class _Axes:
 
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
-    """The mixing that the params of a log say, with commands out of these columns. Without surfaces where
+    """The mixing that the parameters of a log say, with commands out of these columns. Without surfaces where
     they say none, or their commands are not in the log."""
     if reader not in SELECTIVE_READERS:
         return Mixing()
@@ -216,7 +216,7 @@ def _ardupilot_mixers(
     params: _Parameters, functions: Collection[int], lines: list[str]
 ) -> tuple[Floats | None, str]:
     """The factors of the mixers on aileron, elevator and rudder, None where they are not known, and the
-    params that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
+    parameters that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
     if not any(_ARDUPILOT_SURFACES[function][2] for function in functions):
         return None, ""
     try:
@@ -243,9 +243,8 @@ def _ardupilot_channel_reading(params: _Parameters, channel: int) -> Reading:
             params.number(f"{prefix}_{part}", *limits, " us") for part, limits in _PULSE_RANGE_US.items()
         )
         if not low < high or not low <= trim <= high:
-            raise _BadParameter(
-                f"{prefix}_MIN, _TRIM, _MAX are {low:g}, {trim:g}, {high:g} us, allowed: ascending"
-            )
+            given = f"{low:g}, {trim:g}, {high:g} us"
+            raise _BadParameter(f"{prefix}_MIN, _TRIM, _MAX are {given}, allowed: ascending")
         reverse = params.whole_number(f"{prefix}_REVERSED", 0, 1) == 1
     except _BadParameter as problem:
         return _assumed_reading(problem)
@@ -333,12 +332,10 @@ def _px4_axis_shares(
 
 
 def _px4_output_parameters(params: _Parameters, index: int) -> list[str]:
-    """The params that give an output to a surface: PWM_MAIN_FUNC3."""
-    return [
-        name
-        for name, values in params.values_by_name.items()
-        if re.fullmatch(_PX4_OUTPUT_PATTERN, name) and values[-1] == _PX4_FIRST_SERVO + index
-    ]
+    """The parameters that give an output to a surface: PWM_MAIN_FUNC3."""
+    servo = _PX4_FIRST_SERVO + index
+    names = [name for name, values in params.values_by_name.items() if values[-1] == servo]
+    return [name for name in names if re.fullmatch(_PX4_OUTPUT_PATTERN, name)]
 
 
 def _px4_servos(surfaces: Sequence[_Surface]) -> _Outputs:
@@ -360,10 +357,8 @@ def _px4_pulses(params: _Parameters, surfaces: Sequence[_Surface]) -> list[_Outp
 def _px4_output_reading(params: _Parameters, driver: str, number: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text [PX4, mixer_module.cpp]."""
     try:
-        low, high = (
-            params.number(f"{driver}_{part}{number}", *_PULSE_RANGE_US[part], " us")
-            for part in ("MIN", "MAX")
-        )
+        low = params.number(f"{driver}_MIN{number}", *_PULSE_RANGE_US["MIN"], " us")
+        high = params.number(f"{driver}_MAX{number}", *_PULSE_RANGE_US["MAX"], " us")
         if not low < high:
             raise _BadParameter(f"{driver}_MIN{number} is {low:g} us, allowed: less than {high:g} us")
         mask = params.whole_number(f"{driver}_REV", 0, 2**16 - 1)
@@ -449,9 +444,8 @@ def _sum_of_weights(factors: Floats, weights: list[Weights]) -> Weights:
 
 
 def _tidy(weights: Weights) -> Weights:
-    return {
-        column: float(f"{weight:.10g}") for column, weight in weights.items() if abs(weight) > _LEAST_WEIGHT
-    }
+    kept = {column: weight for column, weight in weights.items() if abs(weight) > _LEAST_WEIGHT}
+    return {column: float(f"{weight:.10g}") for column, weight in kept.items()}
 
 
 def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[_Surface], axes: _Axes, names: set[str]) -> None:
@@ -463,10 +457,9 @@ def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[_Surface], axes: _A
         weights = _weights_of_axes(surface, axes)
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column |= {column: _command_entry(column, axes.scale, 0.0) for column in weights}
-        mix_text = " ".join(f"{weight:+.4g} {column}" for column, weight in weights.items())
-        mixing.lines.append(
-            f"{surface.place} is the {_spoken(surface)}, {mix_text}: {surface.reason}{surface.mixer_reason}"
-        )
+        mix = " ".join(f"{weight:+.4g} {column}" for column, weight in weights.items())
+        reason = f"{surface.reason}{surface.mixer_reason}"
+        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}, {mix}: {reason}")
 
 
 def _problem_of_axes(surface: _Surface, axes: _Axes, names: set[str]) -> str:
@@ -491,9 +484,8 @@ def _stays_out(surface: _Surface, reason: str) -> str:
 def _command_entry(column: str, scale: float, offset: float) -> Any:
     if (scale, offset) == (1.0, 0.0):
         return column
-    return {"column": column, "scale": float(f"{scale:.10g}")} | (
-        {"offset": float(f"{offset:.10g}")} if offset else {}
-    )
+    entry = {"column": column, "scale": float(f"{scale:.10g}")}
+    return entry | ({"offset": float(f"{offset:.10g}")} if offset else {})
 
 
 def _spoken(surface: _Surface) -> str:
@@ -513,10 +505,9 @@ def load_vehicle_for_logs(
         for log in logs:
             keys, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
             if first and keys != first:
-                raise BadInput(
-                    f"{log}: its parameters give another mixing than those of {logs[0]}, allowed: one for "
-                    f"all, or {' and '.join(missing)} in {path}"
-                )
+                allowed = f"one for all, or {' and '.join(missing)} in {path}"
+                reason = f"its parameters give another mixing than those of {logs[0]}"
+                raise BadInput(f"{log}: {reason}, allowed: {allowed}")
             first, lines = keys, lines or [f"{log}: {line}" for line in lines_of_log]
         document.data.update(first)
     return validate(Vehicle, document, path), lines

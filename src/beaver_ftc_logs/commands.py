@@ -165,12 +165,11 @@ def diagnose(options: DiagnoseOptions) -> None:
     certificate: With --aircraft: also write certificate.json and log.parquet, the proof of the alarm.
     """
     _check_options_agree(options)
-    flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:
         _diagnose_with_aircraft(options)
         return
     if options.model is None:
-        _replay_run_logs(flights, out, format)
+        _replay_run_logs(options.flights, options.out, options.format)
         return
     from beaver_ftc_logs.detectors import check_detector_name
     from beaver_ftc_logs.findings import as_text
@@ -180,16 +179,11 @@ def diagnose(options: DiagnoseOptions) -> None:
     check_detector_name(options.detector)
     model = load_model(options.model)
     verdicts = [
-        _diagnose_and_write(flight, model, out, options.score, options.detector)
-        for flight in stream_flights(flights, model.vehicle, options.reader)
+        _diagnose_and_write(flight, model, options.out, options.score, options.detector)
+        for flight in stream_flights(options.flights, model.vehicle, options.reader)
     ]
-    answer(
-        format,
-        {"flights": verdicts},
-        lambda: "\n".join(
-            f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
-        ),
-    )
+    texts = (f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts)
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
@@ -199,9 +193,8 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
         extra |= {"--certificate": "" if options.certificate else None}
         for option, value in extra.items():
             if value is not None:
-                raise BadInput(
-                    f"diagnose: {f'{option} {value}'.rstrip()}: allowed: only with --aircraft NAME"
-                )
+                given = f"{option} {value}".rstrip()
+                raise BadInput(f"diagnose: {given}: allowed: only with --aircraft NAME")
         if options.model is None:
             _check_replay_options(options)
         return
@@ -252,9 +245,9 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
             samples, surfaces = inputs.samples, given.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
-            writer = (
-                partial(certified.write_certificate_and_log, inputs, rows) if options.certificate else None
-            )
+            writer = None
+            if options.certificate:
+                writer = partial(certified.write_certificate_and_log, inputs, rows)
             folder = write_aircraft_diagnosis(options.out, samples, surfaces, rows, verdict, writer)
             verdicts.append(verdict | {"folder": str(folder)})
         texts += [*mixing, *map(as_text, verdicts[before:])]

@@ -4,6 +4,7 @@ from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +39,8 @@ def load_template(name: str) -> "Template":
     """A page's template by its file name."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = Environment(
-        loader=FileSystemLoader(_TEMPLATE_FOLDER), autoescape=True, undefined=StrictUndefined
-    )
-    return loader.get_template(name)
+    files = FileSystemLoader(_TEMPLATE_FOLDER)
+    return Environment(loader=files, autoescape=True, undefined=StrictUndefined).get_template(name)
 
 
 def render_diagnosis(samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]) -> str:
@@ -58,8 +57,7 @@ def render_diagnosis(samples: Samples, model: Model, rows: LogRows, verdict: dic
 def _render_flight_page(
     samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: dict[str, Any], words: dict[str, str]
 ) -> str:
-    """A flight's page. wording: what its bounds are called, what is said without an event, and of the
-    model."""
+    """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
         duration_text=duration_text(verdict),
@@ -86,8 +84,8 @@ def _log_notes(samples: Samples) -> list[str]:
 def flight_figure(
     samples: Samples, surfaces: Sequence[str], rows: LogRows, label: str = "90 % bounds"
 ) -> Any:
-    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault.
-    label: what they are called."""
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. label: what
+    the bounds are called."""
     figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
@@ -151,25 +149,12 @@ def write_diagnosis(
     parent: Path, samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]
 ) -> Path:
     """Write the folder `parent/<flight>` whole or not at all; returns it."""
-    columns = (
-        column
-        for columns_of_surface in zip(
-            rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True
-        )
-        for column in columns_of_surface
-    )
-    columns_in_order = (
-        rows.t_s,
-        rows.faulty,
-        rows.isolated_surfaces.tolist(),
-        *columns,
-        rows.fault_probability,
-        rows.credible,
-    )
-    table = dict(zip(diagnosis_column_names(model.vehicle.surfaces), columns_in_order, strict=True))
-    return write_results(
-        parent, samples.name, table, verdict, render_diagnosis(samples, model, rows, verdict)
-    )
+    levels = rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T
+    head = rows.t_s, rows.faulty, rows.isolated_surfaces.tolist()
+    columns = (*head, *chain(*zip(*levels, strict=True)), rows.fault_probability, rows.credible)
+    table = dict(zip(diagnosis_column_names(model.vehicle.surfaces), columns, strict=True))
+    page = render_diagnosis(samples, model, rows, verdict)
+    return write_results(parent, samples.name, table, verdict, page)
 
 
 def write_aircraft_diagnosis(
@@ -180,8 +165,7 @@ def write_aircraft_diagnosis(
     verdict: dict[str, Any],
     extra: Callable[[Path], None] | None = None,
 ) -> Path:
-    """The same of a flight that an aircraft's own model diagnosed; extra: writes into the folder,
-    too."""
+    """The same of a flight that an aircraft's own model diagnosed; extra: writes into the folder, too."""
     from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     words = {
@@ -218,9 +202,8 @@ def write_results(
 
 def refuse_foreign_file(path: Path) -> None:
     """Raise BadInput where the page would take the place of a file that is not a page of ours."""
-    if path.exists() and (
-        not path.is_file() or PAGE_MARK not in path.read_text("utf-8", errors="replace")[:2000]
-    ):
+    is_page = path.is_file() and PAGE_MARK in path.read_text("utf-8", errors="replace")[:2000]
+    if path.exists() and not is_page:
         raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
 
 
@@ -255,17 +238,15 @@ def _encode_png(figure: Any) -> str:
 
 def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    folds = [
-        (fitting.refit(fitted, model), held_out, name)
-        for fitted, held_out, name in fitting.validation_folds(usable)
-    ]
+    all_folds = fitting.validation_folds(usable)
+    folds = [(fitting.refit(fitted, model), held_out, name) for fitted, held_out, name in all_folds]
     folds = [fold for fold in folds if fold[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
     n = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
-    for part, (fold_model, held_out, name) in zip(parts, folds, strict=False):
+    for part, (refitted, held_out, name) in zip(parts, folds, strict=False):
         axes = part.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _liveliest_window(fold_model, held_out, round(_FIGURE_SPAN_S * model.rate_hz))
+        t_s, rates, residual = _liveliest_window(refitted, held_out, round(_FIGURE_SPAN_S * model.rate_hz))
         for i, axis in enumerate(axes):
             residuals, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
             axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")

@@ -33,10 +33,10 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    column_names_of_each_input = [*stepped.input_columns(aircraft), ["altitude_m"]]
-    log = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
+    groups = [*stepped.input_columns(aircraft), ["altitude_m"]]
+    log = _read_columns(path, ["t_s", *chain.from_iterable(groups)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
-    arrays = [np.column_stack([log[name] for name in names]) for names in column_names_of_each_input]
+    arrays = [np.column_stack([log[name] for name in names]) for names in groups]
     replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
     rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
     return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
@@ -55,26 +55,19 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
 def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
-    columns: dict[str, Any] = {
-        "t_s": rows.t_s,
-        "faulty": rows.faulty,
-        "named": rows.isolated_surfaces.tolist(),
-    }
+    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty}
+    columns["named"] = rows.isolated_surfaces.tolist()
     for i, surface in enumerate(surfaces):
         columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
-        columns[f"{surface}_low"], columns[f"{surface}_high"] = (
-            rows.effectiveness_low[:, i],
-            rows.effectiveness_high[:, i],
-        )
+        columns[f"{surface}_low"] = rows.effectiveness_low[:, i]
+        columns[f"{surface}_high"] = rows.effectiveness_high[:, i]
     return columns | {"credible": rows.credible}
 
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log["t_s"]
-    detected = [
-        float(time_s) for time_s, row_verdict in zip(t_s, verdicts, strict=True) if row_verdict.detected
-    ]
+    detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
     isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
     pairs = zip(log.get("detected", []), verdicts, strict=False)
     verdict: Document = {
@@ -86,7 +79,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
         "detection_s": detected[0] if detected else None,
         "isolation_s": isolation_s,
         "isolated": name,
-        "rows_that_differ": sum(bool(flag) != row_verdict.detected for flag, row_verdict in pairs),
+        "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
         "left_out": _unreplayed_input_texts(scenario),
     }
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
@@ -103,10 +96,10 @@ def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[fl
 
 def _unreplayed_input_texts(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
-    ideal_sensors = type(scenario.sensors)()
-    declared = [name for name, settings in scenario.sensors if settings != getattr(ideal_sensors, name)]
-    ideal = [name for name in declared if name not in ("p", "q", "r")]
-    return [f"the declared errors of {name}: the log has the true value" for name in ideal]
+    ideal = type(scenario.sensors)()
+    declared = [name for name, settings in scenario.sensors if settings != getattr(ideal, name)]
+    lacking = [name for name in declared if name not in ("p", "q", "r")]
+    return [f"the declared errors of {name}: the log has the true value" for name in lacking]
 
 
 def _is_as_flown(path: Path, verdict: Document) -> bool | None:
@@ -131,11 +124,8 @@ def _is_same_time(flown_s: float | None, now_s: float | None) -> bool:
 
 def as_text(verdict: Document) -> str:
     """The verdict of a replay in lines for people."""
-    outcome = (
-        "nothing detected"
-        if verdict["detection_s"] is None
-        else f"detected at {verdict['detection_s']:.2f} s"
-    )
+    at_s = verdict["detection_s"]
+    outcome = "nothing detected" if at_s is None else f"detected at {at_s:.2f} s"
     if verdict["isolated"]:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
     texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}

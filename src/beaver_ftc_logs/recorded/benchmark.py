@@ -53,7 +53,7 @@ METHOD_TITLES = {
 }
 _SHOWN_DELAY_S = 30.0
 VEHICLE_FILE = "vehicle.yaml"
-_ALFA_GYRO_FILE_PATTERN = "*-mavros-imu-data_raw.csv"
+_ALFA_GYRO_FILES = "*-mavros-imu-data_raw.csv"
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,8 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
     data_sets = [data for path in (folder, *sorted(folder.iterdir())) if (data := _load_data_set(path))]
     if not data_sets:
-        raise BadInput(
-            f"compare: --flights {folder}: holds no data set, allowed: folders with tables and a "
-            f"{VEHICLE_FILE}, or with processed folders of the ALFA data set"
-        )
+        allowed = f"folders with tables and a {VEHICLE_FILE}, or with processed folders of the ALFA data set"
+        raise BadInput(f"compare: --flights {folder}: holds no data set, allowed: {allowed}")
     return data_sets
 
 
@@ -85,9 +83,7 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
     if (path / VEHICLE_FILE).is_file():
         paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
         return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
-    folders = sorted(
-        folder for folder in path.iterdir() if folder.is_dir() and any(folder.glob(_ALFA_GYRO_FILE_PATTERN))
-    )
+    folders = sorted(each for each in path.iterdir() if each.is_dir() and any(each.glob(_ALFA_GYRO_FILES)))
     return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
 
 
@@ -120,10 +116,9 @@ def _compare_methods(data: FlightDataSet) -> Document:
     for fitted, held_out, name in validation_folds(usable):
         model = add_ranges_and_threshold(fitted, fit_model(fitted, data.vehicle, settings))
         log = next(log for log in data.recordings if log.name == held_out.samples.name)
-        entries += [
-            {"left_out": name, "method": title, **_score_against_log(held_out, rows, model)}
-            for title, rows in _diagnose_each(log, held_out, model)
-        ]
+        for title, rows in _diagnose_each(log, held_out, model):
+            scores = _score_against_log(held_out, rows, model)
+            entries.append({"left_out": name, "method": title, **scores})
     by_labels = "classes" in entries[0]
     summarize = summarize_labels if by_labels else summarize_failures
     titles = dict.fromkeys(entry["method"] for entry in entries)
@@ -142,10 +137,8 @@ def _compare_methods(data: FlightDataSet) -> Document:
 def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iterator[tuple[str, LogRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
-        yield (
-            METHOD_TITLES.get(name, f"{name}, of the loop"),
-            diagnose_with_detector(name, held_out.samples, model),
-        )
+        title = METHOD_TITLES.get(name, f"{name}, of the loop")
+        yield title, diagnose_with_detector(name, held_out.samples, model)
     frozen = diagnose_by_freeze_rule(log, held_out.samples, model)
     if frozen is not None:
         yield FREEZE_RULE_TITLE, frozen
@@ -168,10 +161,10 @@ def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Docume
 def labels_in_span(held_out: FitPart) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
-    usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
-    if usable_rows.size:
-        row_span = slice(usable_rows[0], usable_rows[-1] + 1)
-        labels[row_span] = held_out.samples.labels[row_span]
+    rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
+    if rows.size:
+        span = slice(rows[0], rows[-1] + 1)
+        labels[span] = held_out.samples.labels[span]
     return labels
 
 
@@ -207,11 +200,8 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
 def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
     """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
     counts: an aileron before a rudder."""
-    kin = [
-        score
-        for score in failed
-        if min(_KIND_OF_SURFACE.get(surface, surface) for surface in score["failure"].split("+")) == kind
-    ]
+    kinds = [min(_KIND_OF_SURFACE.get(one, one) for one in score["failure"].split("+")) for score in failed]
+    kin = [score for score, first in zip(failed, kinds, strict=True) if first == kind]
     delays_s = [score["delay_s"] for score in kin if score["detected"]]
     return {
         "failures": len(kin),
@@ -237,11 +227,9 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
         return _tables_of_other_days(document["other_days"])
     tables = []
     for data in document["sets"]:
-        head, cells_of = (
-            (LABEL_HEADER, _label_score_cells)
-            if data["scored_by"] == "labels"
-            else (FAILURE_HEADER, _failure_score_cells)
-        )
+        by_labels = data["scored_by"] == "labels"
+        head = LABEL_HEADER if by_labels else FAILURE_HEADER
+        cells_of = _label_score_cells if by_labels else _failure_score_cells
         rows = [cells_of(row) for row in (*data["rows"], *data["published"])]
         tables.append((f"{data['set']}: left out, {data['left_out']}", (head, rows)))
     return tables
@@ -254,10 +242,8 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
     for data in document["sets"]:
         rows = [[day["day"], *_day_score_cells(day)] for day in data["rows"] if day["kind"] == "one change"]
         for summary in data["summary"]:
-            rows += [
-                [f"{summary['kind']}: {statistic}", *_day_score_cells(summary[statistic])]
-                for statistic in ("mean", "worst")
-            ]
+            for key in ("mean", "worst"):
+                rows.append([f"{summary['kind']}: {key}", *_day_score_cells(summary[key])])
         tables.append((f"{data['set']}: other days made of it, halves left out in turn", (head, rows)))
     return tables
 
@@ -302,8 +288,8 @@ def _score_texts_or_empty(row: Document, keys: Iterable[str]) -> list[str]:
 def _mean_delay_text(delay: Document) -> str:
     if delay.get("mean") is None:
         return "not found" if delay.get("failures") else ""
-    count_text = f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
-    return f"{delay['mean']:.1f}{count_text}"
+    counts = f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
+    return f"{delay['mean']:.1f}{counts}"
 
 
 def as_text(document: Document) -> str:
@@ -331,15 +317,14 @@ def update_page(document: Document, page: Path) -> None:
 def draw_comparison_figure(document: Document) -> Any:
     """How late each method found each failure, and how near it came to the labels: a panel a data set."""
     data_sets = document["sets"]
-    figure, axes = panels(
-        len(data_sets), 1, 8.6, sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
-    )
+    height = sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
+    figure, axes = panels(len(data_sets), 1, 8.6, height)
     for axis, data in zip(axes[:, 0], data_sets, strict=True):
-        draw = _draw_shares if data["scored_by"] == "labels" else _draw_failure_delays
-        draw(axis, data)
+        (_draw_shares if data["scored_by"] == "labels" else _draw_failure_delays)(axis, data)
         axis.set_title(f"{data['set']}: left out, {data['left_out']}", fontsize=10, loc="left")
-        axis.set_yticks(range(len(_method_titles(data))), _method_titles(data))
-        axis.set_ylim(len(_method_titles(data)) - 0.5, -0.5)
+        titles = _method_titles(data)
+        axis.set_yticks(range(len(titles)), titles)
+        axis.set_ylim(len(titles) - 0.5, -0.5)
         axis.tick_params(labelsize=8)
         axis.grid(color=GRID, linewidth=0.5)
         axis.set_axisbelow(True)
@@ -356,26 +341,14 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
     titles = _method_titles(data)
     failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
     failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
-    for i, surface_failure in enumerate(failures):
-        entries = [
-            entry
-            for entry in data["flights"]
-            if entry["failure"] == surface_failure and entry["method"] in titles
-        ]
-        delays_s = [
-            _SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"] for entry in entries
-        ]
-        heights = [
-            titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(failures) - 0.5) for entry in entries
-        ]
-        label = surface_failure.replace("_", " ").replace("+", " + ")
-        axis.plot(
-            [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s],
-            heights,
-            marker(i),
-            color=SERIES[i],
-            label=label,
-        )
+    for i, failure in enumerate(failures):
+        shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
+        entries = [one for one in data["flights"] if one["failure"] == failure and one["method"] in titles]
+        delays_s = [np.inf if entry["delay_s"] is None else entry["delay_s"] for entry in entries]
+        delays_s = [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s]
+        heights = [titles.index(entry["method"]) + shift for entry in entries]
+        label = failure.replace("_", " ").replace("+", " + ")
+        axis.plot(delays_s, heights, marker(i), color=SERIES[i], label=label)
     axis.axvspan(_SHOWN_DELAY_S, _SHOWN_DELAY_S + 2.0, color=GRID)
     axis.set_xlim(-0.5, _SHOWN_DELAY_S + 2.0)
     axis.set_xlabel(f"delay, s (grey: not found within {_SHOWN_DELAY_S:g} s)", fontsize=9)
@@ -386,10 +359,8 @@ def _draw_shares(axis: Any, data: Document) -> None:
     labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*data["rows"], *data["published"]]
     for i, (key, label) in enumerate(labels.items()):
-        scored = [row_index for row_index, row in enumerate(rows) if row.get(key) is not None]
-        heights = [row_index + 0.22 * (i - 1) for row_index in scored]
-        axis.plot(
-            [rows[row_index][key] for row_index in scored], heights, marker(i), color=SERIES[i], label=label
-        )
+        scored = [k for k, row in enumerate(rows) if row.get(key) is not None]
+        heights = [k + 0.22 * (i - 1) for k in scored]
+        axis.plot([rows[k][key] for k in scored], heights, marker(i), color=SERIES[i], label=label)
     axis.set_xlim(0, 1)
     axis.set_xlabel("share of the rows that are right", fontsize=9)

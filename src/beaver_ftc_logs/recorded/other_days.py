@@ -57,33 +57,21 @@ def unchanged_day(n: int) -> DayChanges:
     return DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
 
 
-def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
-    """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
-    unchanged = unchanged_day(len(mixer_shares))
+def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
+    """One thing changed at a time. mixer (S, C): share of each command in each surface."""
+    unchanged = unchanged_day(len(mixer))
     days = [unchanged]
-    for command, shares in zip(command_names, mixer_shares.T, strict=True):
+    for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            days.append(
-                replace(unchanged, name=f"trim of {command} {shift:+.2f}", trim_shift_commands=shift * shares)
-            )
-            days.append(
-                replace(
-                    unchanged,
-                    name=f"neutral of {command} {shift:+.2f}",
-                    neutral_shift_commands=shift * shares,
-                )
-            )
+            by, name = shift * shares, f"of {command} {shift:+.2f}"
+            days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=by))
+            days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=by))
     days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days += [
-        replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
-        for delay_s in (-0.04, 0.04)
-    ]
+    days += [replace(unchanged, name=f"commands {by:+.2f} s", command_delay_s=by) for by in (-0.04, 0.04)]
     days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
-    days += [
-        replace(unchanged, name="noise 1.5", noise_ratio=1.5),
-        replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
-    ]
-    for i, unit in enumerate(np.eye(len(mixer_shares))):
+    days.append(replace(unchanged, name="noise 1.5", noise_ratio=1.5))
+    days.append(replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01))
+    for i, unit in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
             gains = np.where(unit, gain, 1.0)
             days.append(replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains))
@@ -111,8 +99,8 @@ def _random_day(n: int, seed: int) -> DayChanges:
 
 
 def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:
-    """The flight as it might have been on that day. A (3 h, 3) and Q
-    (3, 3) of its model."""
+    """The flight as it might have been on that day. A (3 h, 3): how its model's rates answer their own past,
+    Q (3, 3) (rad/s)2: covariance of its noise. e (n, S): effectiveness."""
     rng = np.random.default_rng(20)
     e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
@@ -120,8 +108,8 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
     commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
     drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
     commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + drift) / e
-    trim_rates = _running_mean(samples.rates, round(_TRIM_MEAN_S / samples.dt_s))
-    rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
+    mean = _running_mean(samples.rates, round(_TRIM_MEAN_S / samples.dt_s))
+    rates = mean + day.motion_scale * (samples.rates - mean)
     extra = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
     rates = rates + extra * _response_to_noise(rng, A, Q, len(rates))
     return replace(samples, commands=commands, rates=rates)
@@ -141,29 +129,30 @@ def _running_mean(values: Floats, n: int) -> Floats:
 
 
 def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) -> Floats:
-    """Coloured noise of standard deviation 1 and correlation time `n`."""
+    """Coloured noise x[k] = a x[k-1] + w[k] of standard deviation 1 and correlation time n samples,
+    a = exp(-1/n)."""
     from scipy.signal import lfilter
 
-    retention = np.exp(-1.0 / n)
-    white_noise = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
-    return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
+    a = np.exp(-1.0 / n)
+    w = rng.standard_normal(shape) * np.sqrt(1.0 - a**2)
+    return np.asarray(lfilter([1.0], [1.0, -a], w, axis=0))
 
 
 def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:
-    """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
-    noise = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
-    n_lags = len(A) // 3
-    rates = np.zeros((n + n_lags, 3))
+    """Return the rates (n, 3), rad/s, under white moments w of the model's noise:
+    x[k] = A' (x[k-1], ..., x[k-h]) + w[k]."""
+    w = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
+    h = len(A) // 3
+    x = np.zeros((n + h, 3))
     for k in range(n):
-        rates[k + n_lags] = rates[k : k + n_lags][::-1].ravel() @ A[: 3 * n_lags] + noise[k]
-    return rates[n_lags:]
+        x[k + h] = x[k : k + h][::-1].ravel() @ A[: 3 * h] + w[k]
+    return x[h:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled = [
-        data for data in benchmark.load_data_sets(folder) if np.isfinite(data.flights[0].labels).any()
-    ]
+    all_sets = benchmark.load_data_sets(folder)
+    labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
     return {"sets": [_test_data_set_on_days(data) for data in labelled]}
@@ -172,50 +161,39 @@ def run_other_days(folder: Path) -> Document:
 def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
     usable = fit_parts(data.flights)
     settings = benchmark.whole_settings(usable, data)
-    folds = [
-        (fit_model(fitted, data.vehicle, settings), held_out)
-        for fitted, held_out, _ in validation_folds(usable)
-    ]
+    parts = validation_folds(usable)
+    folds = [(fit_model(fitted, data.vehicle, settings), held_out) for fitted, held_out, _ in parts]
     model = fit_model(usable, data.vehicle, settings)
     n = len(data.vehicle.surfaces)
-    days_by_kind = {
+    kinds = {
         "one change": one_change_days(mixer_matrix(data.vehicle), data.vehicle.command_columns),
         "drawn, settings chosen on these": random_days(n, TUNING_SEEDS),
         "drawn, not looked at": random_days(n, TEST_SEEDS),
     }
-    scores = [day for kind, days in days_by_kind.items() for day in _score_days(kind, days, folds, model)]
-    summary = [_summarize_days(kind, [day for day in scores if day["kind"] == kind]) for kind in days_by_kind]
+    scores = [day for kind, days in kinds.items() for day in _score_days(kind, days, folds, model)]
+    summary = [_summarize_days(kind, [day for day in scores if day["kind"] == kind]) for kind in kinds]
     return {"set": data.name, "rows": scores, "summary": summary}
 
 
 def _score_days(
-    kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], all_flights_model: Model
+    kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
-    _, A, _, Q = all_flights_model.as_arrays()
+    """The scores of each day; whole: the model of all flights."""
+    _, A, _, Q = whole.as_arrays()
     for day in days:
         scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in folds:
             altered = apply_day_changes(day, held_out.samples, A, Q)
             labels = benchmark.labels_in_span(held_out)
             for detector, parts in scores.items():
-                parts.append(
-                    scoring.score_against_labels(diagnose_with_detector(detector, altered, model), labels)
-                )
-        rival = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
-        yield {
-            "kind": kind,
-            "day": day.name,
-            **benchmark.summarize_labels(scores[OUR_DETECTOR]),
-            "beside": rival,
-        }
+                rows = diagnose_with_detector(detector, altered, model)
+                parts.append(scoring.score_against_labels(rows, labels))
+        ours, rival = (benchmark.summarize_labels(scores[name]) for name in (OUR_DETECTOR, _RIVAL_DETECTOR))
+        yield {"kind": kind, "day": day.name, **ours, "beside": rival["classes"]}
 
 
-def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
+def _summarize_days(kind: str, days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values = {key: [day[key] for day in scores_of_days] for key in (*benchmark.LABEL_TITLES, "beside")}
-    mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values.items()}
-    return {
-        "kind": kind,
-        "mean": mean_by_score,
-        "worst": {k: _WORST_OF_SCORE.get(k, min)(score_values) for k, score_values in values.items()},
-    }
+    values = {key: [day[key] for day in days] for key in (*benchmark.LABEL_TITLES, "beside")}
+    worst = {key: _WORST_OF_SCORE.get(key, min)(one) for key, one in values.items()}
+    return {"kind": kind, "mean": {key: float(np.mean(one)) for key, one in values.items()}, "worst": worst}

@@ -77,11 +77,10 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
 class LogInputs:
     """A log as inputs of the diagnosis.
 
-    input_arrays: one array (n, ...) each, as `stepped.input_columns`.
-    held_age_s: mean age of the values of each column that is held. has_missing_value (n,):
-    rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
-    which the diagnosis is stepped without a reset. full_deflection_rad (S,): what a command of 1 is in the
-    log."""
+    input_arrays: one array (n, ...) each, as `stepped.input_columns`. held_age_s: mean age of the values of
+    each column that is held. has_missing_value (n,): rows in which an input is not a number.
+    gap_free_stretches: first row and end of each stretch through which the diagnosis is stepped without a
+    reset. full_deflection_rad (S,): what a command of 1 is in the log."""
 
     samples: Samples
     diagnosis: "Diagnosis"
@@ -109,9 +108,8 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
     stretches = _gap_free_stretches(samples, missing, rate_hz)
     if not stretches:
         raise BadInput(
-            f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a "
-            "missing number, allowed: all signals logged at one rate of "
-            f"{_MIN_HZ:g} to {_MAX_HZ:g} Hz"
+            f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
+            f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
     places = _surface_places(vehicle, given.aircraft)
     samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
@@ -148,7 +146,7 @@ def _replay_flight(inputs: LogInputs, aircraft: Aircraft) -> Replayed:
         replays.append(replay_samples(diagnosis, arrays, inputs.rate_hz))
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_command_signs(inputs.samples.name, aircraft, replays)
-    return _join_stretch_verdicts(len(inputs.samples.t_s), inputs.gap_free_stretches, replays)
+    return _join_stretches(len(inputs.samples.t_s), inputs.gap_free_stretches, replays)
 
 
 def _replayed_rows(inputs: LogInputs, aircraft: Aircraft, replay: Replayed) -> LogRows:
@@ -181,11 +179,9 @@ def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> N
             continue
         rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
         if rows_then.clears_alarm(rows):
-            raise BadInput(
-                f"{inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
-                f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
-                f"{aircraft.name}"
-            )
+            pair = f"{aircraft.surfaces[first]} and {aircraft.surfaces[second]}"
+            reason = f"if the commands of {pair} are exchanged, there is no alarm"
+            raise BadInput(f"{inputs.samples.name}: {reason}, allowed: commands as of {aircraft.name}")
 
 
 def _with_commands(inputs: LogInputs, commands: Floats) -> LogInputs:
@@ -228,7 +224,7 @@ def _check_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> 
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
     for quantity in (vehicle.airspeed, *(vehicle.flow[name] for name in flow)):
         if quantity.column not in log.columns:
-            nearest = log.nearest_column_names_text(quantity.column)
+            nearest = log.nearest_columns_text(quantity.column)
             reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
             raise BadInput(f"{log.name}: {reason}")
 
@@ -325,7 +321,7 @@ def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list
     return [(first, last + 1) for first, last in ends if last + 1 - first >= _MIN_SAMPLES]
 
 
-def _join_stretch_verdicts(n: int, stretches: list[tuple[int, int]], replays: list[Replayed]) -> Replayed:
+def _join_stretches(n: int, stretches: list[tuple[int, int]], replays: list[Replayed]) -> Replayed:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
     verdicts = [Verdict()] * n

@@ -71,10 +71,10 @@ _DERIVED_NAME = (
 """Names of what others derive from a quantity, or want of it: none of these is the quantity."""
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
-_PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
+_PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
-_MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
+_MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _LOG_RATES_HZ = (4.0, 2000.0)
 
 
@@ -169,7 +169,7 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
             reason = f"is the log of a multicopter ({rotors}), which has no surfaces"
             remarks.append(f"{path}: {reason}, allowed: a log of an aircraft with surfaces")
             return None
-        for name in command_names(names, log.parameters)[:_MAX_PROPOSED_COMMANDS]:
+        for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
             mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
             mixing.surfaces[_plain_name(name)] = {name: 1.0}
     missing = [axis for axis in "pqr" if found[axis] is None]
@@ -296,8 +296,7 @@ def _guess_rate_unit(
         if roll_fit is not None and abs(roll_fit.correlation) > _MIN_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (unit for name_part, unit in _UNIT_OF_PART.items() if name_part in rate_names[0].lower()),
-        None,
+        (unit for name_part, unit in _UNIT_OF_PART.items() if name_part in rate_names[0].lower()), None
     )
     if unit_in_name:
         return unit_in_name
@@ -315,7 +314,7 @@ def _column_entry(name: str, unit: str, si_unit: str) -> Any:
 def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
     median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
-    if _PWM_MEDIAN_RANGE_US[0] < median < _PWM_MEDIAN_RANGE_US[1]:
+    if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
         return {"column": name, "scale": 0.0025, "offset": -3.75}
     return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
 

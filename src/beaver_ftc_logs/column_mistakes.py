@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc_logs.samples import Samples
-from beaver_ftc_logs.units import SIGN_AND_UNIT_FACTORS
+from beaver_ftc_logs.units import UNIT_FACTORS
 from beaver_ftc_logs.vehicle import Vehicle
 
 
@@ -50,7 +50,7 @@ def corrected_logs(
         exchanged = _altered(samples, vehicle, {first: second, second: first}, {})
         yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
     for name in [*doubtful, *vehicle.signal_columns]:
-        for factor in SIGN_AND_UNIT_FACTORS:
+        for factor in UNIT_FACTORS:
             scaled = _altered(samples, vehicle, {}, {name: factor})
             also = (float(np.log(abs(factor))), "") if name in doubtful else (0.0, name)
             yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, *also)

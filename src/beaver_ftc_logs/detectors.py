@@ -60,8 +60,8 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
     X (n, 3, 3 + G), y (n, 3): of `_whitened_regression`. M0: information before. P: covariance of theta.
     """
     X, y = _whitened_regression(samples, model)
-    M = _fading_or_sliding_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
-    b = _fading_or_sliding_sums(np.einsum("nai,na->ni", X, y), samples.dt_s, fades)
+    M = _memory_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
+    b = _memory_sums(np.einsum("nai,na->ni", X, y), samples.dt_s, fades)
     M0 = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(X.shape[2] - 3, 4.0)])
     P = np.linalg.inv(M + M0)
     theta = np.einsum("nij,nj->ni", P, b)
@@ -80,7 +80,7 @@ def _whitened_regression(samples: Samples, model: Model) -> tuple[Floats, Floats
     return np.einsum("ab,nbi->nai", W, X), healthy_residual(model, known, y, F)
 
 
-def _fading_or_sliding_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
+def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
     """Sums over the memory that ends at each sample."""
     if fades:
         from scipy.signal import lfilter

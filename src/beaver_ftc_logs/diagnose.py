@@ -45,8 +45,8 @@ class LogRows:
     t_s (n,). faulty (n,): 0 or 1. isolated_surfaces (n,): names joined by +, empty without an alarm.
     effectiveness of each surface, its bounds effectiveness_low and effectiveness_high (n, S).
     fault_probability (n,) of any surface. credible (n,): 0 or 1, by default 1. evidence_start_time_s (n,):
-    time at which the evidence for a fault began to increase, by default t_s. doubtful_rows:
-    for each reason the rows (n,) that are not credible.
+    time at which the evidence for a fault began to increase, by default t_s. doubtful_rows: for each reason
+    the rows (n,) that are not credible.
     """
 
     t_s: Floats
@@ -254,7 +254,7 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
         mu_name = model.settings.name_evidence_ratio * mu
         alarmed = (evidence >= mu) & ~calm
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
-    faulty = _latch_until_healthy(alarmed, calm).astype(np.int64)
+    faulty = _latched(alarmed, calm).astype(np.int64)
     start = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
     per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
     e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
@@ -265,7 +265,7 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
     return LogRows(
         t_s=samples.t_s,
         faulty=faulty,
-        isolated_surfaces=_surfaces_at_fault(model, bank, P, faulty, _latch_until_healthy(nameable, calm)),
+        isolated_surfaces=_surfaces_at_fault(model, bank, P, faulty, _latched(nameable, calm)),
         effectiveness=expand_groups(e, model),
         effectiveness_low=expand_groups(low, model),
         effectiveness_high=expand_groups(high, model),
@@ -296,7 +296,7 @@ def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool
     return np.asarray(holds & (held > n))
 
 
-def _latch_until_healthy(alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latched(alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
     k = np.arange(len(alarmed))
     last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))

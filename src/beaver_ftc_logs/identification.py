@@ -19,8 +19,8 @@ from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
-    UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S,
-    UNFITTED_NOISE_MA_CANDIDATES,
+    UNFITTED_GYROS_RAD_S,
+    UNFITTED_MA,
     Samples,
     scale_by_airspeed,
     whiten_samples,
@@ -85,12 +85,12 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
         "quick": min(powers, default=None),
     }
     models = list(model.noise_models)
-    for ma in UNFITTED_NOISE_MA_CANDIDATES:
+    for ma in UNFITTED_MA:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
             e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
             models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
-    for gyro_sd in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
+    for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
         models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
     return model.model_copy(update={"noise_models": models})

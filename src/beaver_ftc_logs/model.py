@@ -21,7 +21,7 @@ _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
 # keys of `fitted` in files of release 1.0.0
-_KEYS_WITHOUT_EFFECT = ("correlation", "scale", "minutes", "column_sd")
+_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
@@ -175,11 +175,11 @@ class FittedRanges(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _drop_keys_without_effect(cls, data: object) -> object:
+    def _drop_dead_keys(cls, data: object) -> object:
         """Model files of release 1.0.0 have keys that nothing reads any more."""
         if not isinstance(data, dict):
             return data
-        return {key: value for key, value in data.items() if key not in _KEYS_WITHOUT_EFFECT}
+        return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
 
 
 class NoiseModel(Section):

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from beaver_ftc_logs.recording import Column, Floats
-from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, SIGN_AND_UNIT_FACTORS, nearest_unit
+from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
 _ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
 _MIN_MANY_WINDOWS, _AGREEING, _UNIT_RATIO = 20, 0.7, 1.3
@@ -200,7 +200,7 @@ def _exact_factor_remark(
     since q turns it as well."""
     if abs(fit.correlation) >= _AGREEING:
         return None
-    for factor in SIGN_AND_UNIT_FACTORS:
+    for factor in UNIT_FACTORS:
         scaled = replace(gyros[axis], values=factor * gyros[axis].values)
         trial = _fit_axis([*gyros[:axis], scaled, *gyros[axis + 1 :]], angles, axis)
         if trial is not None and _is_exact(trial):

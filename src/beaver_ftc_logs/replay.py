@@ -68,7 +68,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log["t_s"]
     detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
-    isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
+    isolation_s, name = _last_isolation(t_s, verdicts)
     pairs = zip(log.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
@@ -80,12 +80,12 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
         "isolation_s": isolation_s,
         "isolated": name,
         "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
-        "left_out": _unreplayed_input_texts(scenario),
+        "left_out": _lacking_inputs(scenario),
     }
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
 
 
-def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
+def _last_isolation(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
     """Since when what is named at last has been named: what was withdrawn before does not count."""
     since_s, name = None, None
     for time_s, verdict in zip(t_s, verdicts, strict=True):
@@ -94,7 +94,7 @@ def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[fl
     return since_s, name
 
 
-def _unreplayed_input_texts(scenario: Any) -> list[str]:
+def _lacking_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal = type(scenario.sensors)()
     declared = [name for name, settings in scenario.sensors if settings != getattr(ideal, name)]

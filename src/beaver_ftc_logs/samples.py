@@ -24,7 +24,7 @@ from beaver_ftc_logs.units import TIME_UNITS
 from beaver_ftc_logs.vehicle import Vehicle
 
 MIN_HZ, _MAX_HZ = 4.0, 1e5
-_LEAST_SAMPLES = 50
+_MIN_ROWS = 50
 _MAX_NUMBER, _MAX_RATE_RAD_S, _MAX_RATE_SD_RAD_S = 1e6, 60.0, 3.0
 _QDYN_RATIOS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
@@ -35,10 +35,10 @@ NOISE_MA_CANDIDATES = (
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
-UNFITTED_NOISE_MA_CANDIDATES = NOISE_MA_CANDIDATES[:2]
-UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
-"""Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a
-laboratory's to a toy's, so close together that none is 1.8 times off."""
+UNFITTED_MA = NOISE_MA_CANDIDATES[:2]
+UNFITTED_GYROS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
+"""Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a laboratory's to a
+toy's, so close together that none is 1.8 times off."""
 _MIN_GAP_STEPS = 3.5
 """A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
@@ -50,14 +50,14 @@ class Samples:
     t_s (n,) s: the log's own stamps, or an even grid within each stretch if the log is faster than the
     vehicle's largest sample rate. rates (n, 3) rad/s. commands (n, S): command of each surface as the mixer
     makes it, in shares of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown.
-    stretch_number (n,): number of the gap-free stretch. held_age_s: mean age of the values of
-    each column that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading.
-    airspeed (n,) m/s, nan where unknown. unchanged_s: for how long each column of rates,
-    commands and signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of
-    the energy height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving
-    average of the noise by which rates, commands and signals are whitened, empty if they are not. fit_weight
-    of each sample in a fit. n_log_parts: number of parts in which the log was read; if several, the samples
-    are chosen stretches. confirmed_rates: the columns of rates that the logged angles confirm.
+    stretch_number (n,): number of the gap-free stretch. held_age_s: mean age of the values of each column
+    that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading. airspeed
+    (n,) m/s, nan where unknown. unchanged_s: for how long each column of rates, commands and signals has been
+    constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy height over the
+    last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the noise by which
+    rates, commands and signals are whitened, empty if they are not. fit_weight of each sample in a fit.
+    n_log_parts: number of parts in which the log was read; if several, the samples are chosen stretches.
+    confirmed_rates: the columns of rates that the logged angles confirm.
     """
 
     name: str
@@ -275,7 +275,7 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
     another unit."""
     missing = [name for name in used if name not in log.columns]
     if missing:
-        nearest = log.nearest_column_names_text(missing[0])
+        nearest = log.nearest_columns_text(missing[0])
         reason = f"no column {missing[0]}, allowed: a log that has it; it has {nearest}"
         raise BadInput(f"{log.name}: {reason}")
     largest = {}
@@ -299,8 +299,8 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
 
 def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
-    if (n := len(stamps)) < _LEAST_SAMPLES:
-        raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_LEAST_SAMPLES}")
+    if (n := len(stamps)) < _MIN_ROWS:
+        raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
     step_s = _median_step_s(stamps)
     rate_hz = 1.0 / step_s
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
@@ -312,9 +312,9 @@ def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDAr
     if rate_hz <= 1.05 * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
     even = _even_time_base(stamps, 1.0 / max_hz)
-    if len(even[0]) < _LEAST_SAMPLES:
+    if len(even[0]) < _MIN_ROWS:
         reason = f"{n} rows within {stamps[-1] - stamps[0]:.3g} s are {len(even[0])} samples at {max_hz:g} Hz"
-        allowed = f"at least {_LEAST_SAMPLES}; is time in another unit?"
+        allowed = f"at least {_MIN_ROWS}; is time in another unit?"
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}")
     return even
 
@@ -339,7 +339,7 @@ def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.i
 
 def _median_step_s(stamps: Floats) -> float:
     """The usual step of the first stamps, s: a log cut short later has the same."""
-    return float(np.median(np.diff(stamps[:_LEAST_SAMPLES]))) if len(stamps) > 1 else float("inf")
+    return float(np.median(np.diff(stamps[:_MIN_ROWS]))) if len(stamps) > 1 else float("inf")
 
 
 def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:

@@ -23,7 +23,7 @@ from beaver_ftc_logs.regression import bound_above, split_parts
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 BOUND_WINDOW_S = 1.0
-_LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
+_LOSS_ROUNDING, _ROUNDING_RAD_S2 = 1e-9, 1e-12
 _EFFECTIVE_SAMPLE_SHARE = 0.4
 _ERROR_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
@@ -99,7 +99,7 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame;
     least above greatest where none does."""
-    eta = eta + _BOUND_ROUNDING_RAD_S2
+    eta = eta + _ROUNDING_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
     Z1 = np.where(acts, Z, 1.0)
     ends = np.sort(np.stack([(nu - eta) / Z1, (nu + eta) / Z1]), axis=0)

@@ -23,7 +23,7 @@ SI_UNITS: dict[str, tuple[str, float]] = {
 """Kind of each unit, and its size in the SI unit."""
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of the time column."""
-SIGN_AND_UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
+UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 """What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse."""
 
 

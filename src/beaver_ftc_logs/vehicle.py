@@ -39,7 +39,7 @@ from beaver_ftc_logs.units import (
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0
-STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
+STILL_AIR_HZ, _MOVING_AIR_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -96,7 +96,7 @@ def _expand_column_name(value: Any) -> Any:
     return {"column": value} if isinstance(value, str) else value
 
 
-NamedColumnType = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
+ColumnSpec = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
 
 
 class TimeColumn(Section):
@@ -111,20 +111,20 @@ class TimeColumn(Section):
 class RateColumns(Section):
     """The columns of the three body rates. Without `unit`, the numbers are in rad/s."""
 
-    p: NamedColumnType = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
-    q: NamedColumnType = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
-    r: NamedColumnType = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+    p: ColumnSpec = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
+    q: ColumnSpec = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
+    r: ColumnSpec = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
 
 
 class AttitudeColumns(Section):
     """Columns of the attitude angles. With these angles, wrong units and signs of the body rates are found.
     If turbulence is declared, `diagnose --aircraft` requires these columns."""
 
-    roll: NamedColumnType = Field(description="column of the roll angle, rad", examples=["roll_rad"])
-    pitch: NamedColumnType | None = Field(
+    roll: ColumnSpec = Field(description="column of the roll angle, rad", examples=["roll_rad"])
+    pitch: ColumnSpec | None = Field(
         default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
     )
-    yaw: NamedColumnType | None = Field(
+    yaw: ColumnSpec | None = Field(
         default=None, description="column of the yaw angle, rad", examples=["yaw_rad"]
     )
 
@@ -132,8 +132,8 @@ class AttitudeColumns(Section):
 class EnergyColumns(Section):
     """Columns that show an engine failure. After an engine failure, altitude and airspeed fall together."""
 
-    altitude: NamedColumnType = Field(description="column of the altitude, m", examples=["altitude_m"])
-    airspeed: NamedColumnType = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
+    altitude: ColumnSpec = Field(description="column of the altitude, m", examples=["altitude_m"])
+    airspeed: ColumnSpec = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
 
 
 class Vehicle(Section):
@@ -150,7 +150,7 @@ class Vehicle(Section):
         description="column with the time. Only a table without the column `t_s` needs this section",
     )
     rates: RateColumns = Field(description="columns of the three body rates")
-    commands: list[NamedColumnType] = Field(
+    commands: list[ColumnSpec] = Field(
         min_length=1,
         max_length=20,
         description="columns of the commands that the autopilot sends to the servos. Do not use measured "
@@ -158,7 +158,7 @@ class Vehicle(Section):
         "can leave out this key, if the parameters in the log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
-    signals: list[NamedColumnType] = Field(
+    signals: list[ColumnSpec] = Field(
         default=[],
         max_length=12,
         description="columns of other measured quantities. With rates and commands, the model predicts the "
@@ -175,7 +175,7 @@ class Vehicle(Section):
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
-    labels: dict[str, NamedColumnType] = Field(
+    labels: dict[str, ColumnSpec] = Field(
         default={},
         description="columns with the true effectiveness of each surface, for test flights with known "
         "faults. 1: the surface is healthy. `identify` and `diagnose --score` read these columns",
@@ -185,14 +185,14 @@ class Vehicle(Section):
         default=None,
         description="columns of the attitude angles. They show wrong units and signs of the body rates",
     )
-    acceleration: NamedColumnType | None = Field(
+    acceleration: ColumnSpec | None = Field(
         default=None,
         description="column of the specific force along the z axis. It shows a wrong unit, because the "
         "median of its magnitude must be about 1 g. Its sign does not matter",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
-    airspeed: NamedColumnType | None = Field(
+    airspeed: ColumnSpec | None = Field(
         default=None,
         description="column of the airspeed. With it, the diagnosis draws conclusions only in the range of "
         "airspeeds that the fit used",
@@ -204,7 +204,7 @@ class Vehicle(Section):
         description="columns that show an engine failure. While altitude and airspeed fall as after an "
         "engine failure, the diagnosis names no surface",
     )
-    flow: dict[str, NamedColumnType] = Field(
+    flow: dict[str, ColumnSpec] = Field(
         default={},
         description="columns of further inputs of the design model, for `diagnose --aircraft`. The keys are "
         "`alpha_rad`, `beta_rad`, `qdyn_pa` and the signals in the aircraft file",
@@ -233,7 +233,7 @@ class Vehicle(Section):
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
-    outputs: dict[str, NamedColumnType] = Field(
+    outputs: dict[str, ColumnSpec] = Field(
         default={},
         description="columns of the servo outputs. Only `compare --flights` uses them, for a published "
         "detector called the freeze rule",
@@ -298,7 +298,7 @@ class Vehicle(Section):
             if quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._column_reading_conflicts()
+        mistakes += self._reading_conflicts()
         refuse(mistakes)
         return self
 
@@ -320,7 +320,7 @@ class Vehicle(Section):
             (tuple(keys.split()), kind, quantity) for keys, kind, quantity in kinds if quantity is not None
         ]
 
-    def _column_reading_conflicts(self) -> list[Conflict]:
+    def _reading_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
         first: dict[str, QuantityColumn] = {}
         typed = [(location, quantity) for location, _, quantity in self.typed_quantities()]
@@ -353,7 +353,7 @@ class Vehicle(Section):
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
         still = self.moving_air is False or (self.moving_air is None and self.labels)
-        default_hz = STILL_AIR_MAX_RATE_HZ if still else _MOVING_AIR_MAX_RATE_HZ
+        default_hz = STILL_AIR_HZ if still else _MOVING_AIR_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:

@@ -16,7 +16,7 @@ ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
 SAMPLES_PER_PART = 400_000
 """Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000."""
-MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
+LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
 READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
 SELECTIVE_READERS = ("ulog", "ardupilot")
@@ -97,12 +97,12 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
     a part begins with its last value before, if it has no value at the first of these rows.
     """
     part_rows = round(SAMPLES_PER_PART * ratio)
-    if len(stamps) <= MAX_LAST_PART_FACTOR * part_rows:
+    if len(stamps) <= LAST_PART_FACTOR * part_rows:
         yield log
         return
     begin, part, is_last = 0, 1, False
     while not is_last:
-        is_last = len(stamps) - begin <= MAX_LAST_PART_FACTOR * part_rows
+        is_last = len(stamps) - begin <= LAST_PART_FACTOR * part_rows
         end = len(stamps) if is_last else begin + part_rows
         period = stamps[begin], stamps[end - 1]
         columns = {name: _select_period(column, *period) for name, column in log.columns.items()}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.readers import MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
+from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
 from beaver_ftc_logs.readers.text import (
     TableCells,
     TableLayout,
@@ -94,9 +94,9 @@ def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[
 
 def text_of_column_phrase(cells: TableCells, name: str) -> str:
     """`, but text such as '7 ticks'` for a column with cells of text, else nothing."""
-    if name not in cells.text_cell_summaries:
+    if name not in cells.text_cells:
         return ""
-    return f", but text such as {cells.text_cell_summaries[name][2][:30]!r}"
+    return f", but text such as {cells.text_cells[name][2][:30]!r}"
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
@@ -176,12 +176,12 @@ def _join_blocks(
             n_held = sum(held_block.n_rows for held_block in held)
             if part_rows is None and n_held > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
-            while part_rows is not None and n_held > MAX_LAST_PART_FACTOR * part_rows:
+            while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
                 joined = join_blocks(held)
                 done = joined.select_rows(0, part_rows)
                 rest = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
-                done.text_cell_summaries = joined.text_cell_summaries
-                done.broken_line_beginnings = joined.broken_line_beginnings
+                done.text_cells = joined.text_cells
+                done.broken_lines = joined.broken_lines
                 held, n_held = [rest], rest.n_rows
                 yield (done, list(table_remarks(layout, done)) if layout else [], True)
         joined = join_blocks(held)

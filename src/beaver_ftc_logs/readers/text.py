@@ -7,7 +7,7 @@ many cells costs itself; both are counted.
 import csv as csv_lines
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -22,7 +22,7 @@ from beaver_ftc_logs.recording import Floats
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _LAYOUT_HEAD_BYTES, _MAX_LAYOUT_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
-_MAX_BROKEN_LINE_SHARE = 0.1
+_BROKEN_SHARE = 0.1
 """Share of lines with another number of cells that a table may have."""
 
 
@@ -49,8 +49,8 @@ class TableCells:
     numbers: dict[str, Floats]
     n_rows: int
     n_rows_before: int = 0
-    text_cell_summaries: dict[str, tuple[int, int, str]] = field(default_factory=dict)
-    broken_line_beginnings: list[str] = field(default_factory=list)
+    text_cells: dict[str, tuple[int, int, str]] = field(default_factory=dict)
+    broken_lines: list[str] = field(default_factory=list)
 
     def select_rows(self, first: int, end_row: int | None = None) -> "TableCells":
         """The rows from `first` to before `end_row`, of which nothing else is said."""
@@ -65,10 +65,10 @@ def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     numbers = {name: np.concatenate([block.numbers.pop(name) for block in blocks]) for name in column_names}
     joined = TableCells(numbers, sum(block.n_rows for block in blocks), first.n_rows_before)
     for block in blocks:
-        joined.broken_line_beginnings += block.broken_line_beginnings
-        for name, (n_texts, row, cell) in block.text_cell_summaries.items():
-            earlier = joined.text_cell_summaries.get(name, (0, row, cell))
-            joined.text_cell_summaries[name] = (earlier[0] + n_texts, *earlier[1:])
+        joined.broken_lines += block.broken_lines
+        for name, (n_texts, row, cell) in block.text_cells.items():
+            earlier = joined.text_cells.get(name, (0, row, cell))
+            joined.text_cells[name] = (earlier[0] + n_texts, *earlier[1:])
     return joined
 
 
@@ -144,13 +144,16 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
     from pyarrow import csv
 
     broken: list[str] = []
+
+    def record(row: Any) -> str:
+        broken.append((row.text or "")[:60])
+        return "skip"
+
     options = {
         "read_options": csv.ReadOptions(
             column_names=layout.column_names, skip_rows=layout.header_line_index + 1, block_size=_BLOCK_BYTES
         ),
-        "parse_options": csv.ParseOptions(
-            delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken)
-        ),
+        "parse_options": csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=record),
         "convert_options": _all_text_conversion(layout.column_names, wanted),
     }
     n_read = 0
@@ -161,27 +164,19 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
             for name in wanted:
                 numbers = _convert_column(block[name], layout.decimal_mark, name, cells, days[name])
                 cells.numbers[name] = numbers
-            cells.broken_line_beginnings, broken[:] = broken[:], []
+            cells.broken_lines, broken[:] = broken[:], []
             n_read += block.num_rows
             yield cells
-    yield TableCells({name: np.empty(0) for name in wanted}, 0, n_read, broken_line_beginnings=broken)
+    yield TableCells({name: np.empty(0) for name in wanted}, 0, n_read, broken_lines=broken)
 
 
 def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
     """Raise BadInput where too many lines have another number of cells than the header."""
-    n_broken, n_lines = len(cells.broken_line_beginnings), cells.n_rows + len(cells.broken_line_beginnings)
-    if n_broken > _MAX_BROKEN_LINE_SHARE * n_lines:
+    n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
+    if n_broken > _BROKEN_SHARE * n_lines:
         reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
-        first = f"{len(layout.column_names)}: the first {cells.broken_line_beginnings[0]!r}"
+        first = f"{len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
         raise _unreadable_error(path, f"{reason}, {first}")
-
-
-def _broken_line_recorder(broken: list[str]) -> Callable[[Any], str]:
-    def record_line(row: Any) -> str:
-        broken.append((row.text or "")[:60])
-        return "skip"
-
-    return record_line
 
 
 def _all_text_conversion(column_names: Sequence[str], wanted: Sequence[str]) -> Any:
@@ -223,13 +218,13 @@ def _convert_column(cells: Any, mark: str, name: str, table: TableCells, days: D
 def _record_text_cells(name: str, cells: Any, bare: Sequence[int], table: TableCells) -> None:
     rows = [row for row in bare if cells[row].as_py()]
     if rows:
-        table.text_cell_summaries[name] = (len(rows), table.n_rows_before + rows[0] + 1, str(cells[rows[0]]))
+        table.text_cells[name] = (len(rows), table.n_rows_before + rows[0] + 1, str(cells[rows[0]]))
 
 
 def table_remarks(layout: TableLayout, table: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
-    for name, (n_texts, row, first_cell) in table.text_cell_summaries.items():
+    for name, (n_texts, row, first_cell) in table.text_cells.items():
         if np.isfinite(table.numbers[name]).any():
             count_text = "1 cell holds" if n_texts == 1 else f"{n_texts} cells hold"
             yield (name, f"{name}: {count_text} no number, the first in row {row}: {first_cell[:30]!r}")
@@ -238,5 +233,5 @@ def table_remarks(layout: TableLayout, table: TableCells) -> Iterator[tuple[str,
     if layout.delimiter != ",":
         comma = ", with a decimal comma" if layout.decimal_mark == "," else ""
         yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{comma}"
-    if table.broken_line_beginnings:
-        yield "", f"lines with too few or too many cells, left out: {len(table.broken_line_beginnings)}"
+    if table.broken_lines:
+        yield "", f"lines with too few or too many cells, left out: {len(table.broken_lines)}"

@@ -57,7 +57,7 @@ _ALFA_GYRO_FILES = "*-mavros-imu-data_raw.csv"
 
 
 @dataclass(frozen=True)
-class FlightDataSet:
+class DataSet:
     """Flights of one vehicle: as they were logged, and on one time base."""
 
     name: str
@@ -66,7 +66,7 @@ class FlightDataSet:
     flights: tuple[Samples, ...]
 
 
-def load_data_sets(folder: Path) -> list[FlightDataSet]:
+def load_data_sets(folder: Path) -> list[DataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
@@ -77,7 +77,7 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
     return data_sets
 
 
-def _load_data_set(path: Path) -> FlightDataSet | None:
+def _load_data_set(path: Path) -> DataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
@@ -87,9 +87,9 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
     return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
 
 
-def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
+def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
     recordings = tuple(read_vehicle_columns(path, vehicle) for path in paths)
-    return FlightDataSet(name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings))
+    return DataSet(name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings))
 
 
 def run_benchmark(folder: Path) -> Document:
@@ -106,7 +106,7 @@ def result_files(document: Document) -> Files:
     }
 
 
-def _compare_methods(data: FlightDataSet) -> Document:
+def _compare_methods(data: DataSet) -> Document:
     usable = fit_parts(data.flights)
     is_single = len(data.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
@@ -144,7 +144,7 @@ def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iter
         yield FREEZE_RULE_TITLE, frozen
 
 
-def whole_settings(usable: list[FitPart], data: FlightDataSet) -> FilterSettings:
+def whole_settings(usable: list[FitPart], data: DataSet) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
     model = fit_model(usable, data.vehicle)
     if len(usable) > 1:
@@ -229,8 +229,10 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     for data in document["sets"]:
         by_labels = data["scored_by"] == "labels"
         head = LABEL_HEADER if by_labels else FAILURE_HEADER
-        cells_of = _label_score_cells if by_labels else _failure_score_cells
-        rows = [cells_of(row) for row in (*data["rows"], *data["published"])]
+        rows = [
+            [row["method"], *_score_texts(row, LABEL_TITLES)] if by_labels else _failure_score_cells(row)
+            for row in (*data["rows"], *data["published"])
+        ]
         tables.append((f"{data['set']}: left out, {data['left_out']}", (head, rows)))
     return tables
 
@@ -260,14 +262,10 @@ FAILURE_HEADER = [
 ]  # fmt: skip
 
 
-def _label_score_cells(row: Document) -> list[str]:
-    return [row["method"], *_score_texts_or_empty(row, LABEL_TITLES)]
-
-
 def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
     delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
-    cells = [row["method"], *_score_texts_or_empty(row, FAILURE_HEADER[1:4]), *map(_mean_delay_text, delays)]
+    cells = [row["method"], *_score_texts(row, FAILURE_HEADER[1:4]), *map(_mean_delay_text, delays)]
     if "false_alarms_per_hour" not in row:
         return cells + [""] * (len(FAILURE_HEADER) - len(cells))
     n_soon, n_failed = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
@@ -281,7 +279,7 @@ def _failure_score_cells(row: Document) -> list[str]:
     ]
 
 
-def _score_texts_or_empty(row: Document, keys: Iterable[str]) -> list[str]:
+def _score_texts(row: Document, keys: Iterable[str]) -> list[str]:
     return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
 
 

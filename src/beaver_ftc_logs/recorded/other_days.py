@@ -79,7 +79,7 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
 
 
 def random_days(n: int, seeds: range) -> list[DayChanges]:
-    """Days on which everything differs a little."""
+    """Days on which everything differs a little from the recorded one."""
     return [_random_day(n, seed) for seed in seeds]
 
 
@@ -103,7 +103,7 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
     Q (3, 3) (rad/s)2: covariance of its noise. e (n, S): effectiveness."""
     rng = np.random.default_rng(20)
     e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
+    commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)
     trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
     commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
     drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
@@ -115,7 +115,7 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
     return replace(samples, commands=commands, rates=rates)
 
 
-def _shift_values_earlier(values: Floats, n: float) -> Floats:
+def _shifted(values: Floats, n: float) -> Floats:
     """Values that act `n` samples later than these: logged earlier by as much, (n, S)."""
     rows = np.arange(len(values)) + n
     return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
@@ -155,10 +155,10 @@ def run_other_days(folder: Path) -> Document:
     labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
-    return {"sets": [_test_data_set_on_days(data) for data in labelled]}
+    return {"sets": [_test_data_set(data) for data in labelled]}
 
 
-def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
+def _test_data_set(data: benchmark.DataSet) -> Document:
     usable = fit_parts(data.flights)
     settings = benchmark.whole_settings(usable, data)
     parts = validation_folds(usable)
@@ -178,7 +178,7 @@ def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
 def _score_days(
     kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
-    """The scores of each day; whole: the model of all flights."""
+    """Yield the scores of each day. whole: the model of all flights."""
     _, A, _, Q = whole.as_arrays()
     for day in days:
         scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}

@@ -492,7 +492,7 @@ def test_stretches_make_one_flight():
         stepped.Replayed(*said),
         stepped.Replayed([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), gains[1] - 1.0, gains[1]),
     )
-    found = by_aircraft._join_stretch_verdicts(5, 2, [(1, 3), (4, 5)], [one, other])
+    found = by_aircraft._join_stretches(5, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
     assert (
         found.alone_low[:, 1].tolist(),

@@ -195,7 +195,7 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
 def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
     """Of all of them without a word more; of hardly any there is no verdict."""
     assert findings._no_event_text({"credible": {"share": share}}) == says
-    little = findings._MIN_CREDIBLE_ROW_SHARE
+    little = findings._MIN_CREDIBLE_SHARE
     assert findings._no_event_text({"credible": {"share": 0.99 * little}}) == "no verdict"
     assert findings._no_event_text({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
 

@@ -261,11 +261,11 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     flights = [flown((1.0,), 0.5, 2000, 31)]
     model = moving.model_copy(update={"noise_models": moving.noise_models[:1]})
     found = identification.add_unseen_noise(model, flights)
-    gyros = found.noise_models[-len(samples.UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S) :]
+    gyros = found.noise_models[-len(samples.UNFITTED_GYROS_RAD_S) :]
     others = found.noise_models[1:]
     others = others[: -len(gyros)]
     assert found.noise_models[0] == model.noise_models[0]
-    assert {tuple(one.ma_coefficients) for one in others} == {*samples.UNFITTED_NOISE_MA_CANDIDATES} - {
+    assert {tuple(one.ma_coefficients) for one in others} == {*samples.UNFITTED_MA} - {
         tuple(model.noise_models[0].ma_coefficients)
     }
     for one in others:

@@ -428,11 +428,11 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     assert [one.n_rows_before for one in blocks] == [
         sum(each.n_rows for each in blocks[:k]) for k in range(len(blocks))
     ]
-    assert {name: found for one in reversed(blocks) for name, found in one.text_cell_summaries.items()} == {
+    assert {name: found for one in reversed(blocks) for name, found in one.text_cells.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
     whole = text.join_blocks(blocks)
-    assert whole.text_cell_summaries == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
+    assert whole.text_cells == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
         400,
         2,

@@ -149,11 +149,11 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
 
 def test_what_is_withdrawn_is_not_what_is_named():
     """The name that stands at the end, since it has stood there."""
-    assert of._last_isolation_start_and_name(T_S[:4], SAID[:4]) == (1.5, "rudder")
-    assert of._last_isolation_start_and_name(T_S[:5], SAID[:5]) == (1.5, "rudder")
-    assert of._last_isolation_start_and_name(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    assert of._last_isolation(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._last_isolation(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._last_isolation(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
     again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
-    assert of._last_isolation_start_and_name(T_S[:5], again) == (1.5, "elevator")
+    assert of._last_isolation(T_S[:5], again) == (1.5, "elevator")
 
 
 def test_a_replay_that_finds_nothing(tmp_path):
@@ -172,7 +172,7 @@ def test_a_replay_that_finds_nothing(tmp_path):
 def test_errors_of_the_flow_sensors_are_left_out():
     """Those of the gyros are in the measured rates."""
     flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
-    assert of._unreplayed_input_texts(flawed) == ["the declared errors of alpha: the log has the true value"]
+    assert of._lacking_inputs(flawed) == ["the declared errors of alpha: the log has the true value"]
 
 
 FOUND = {

@@ -51,7 +51,7 @@ def test_a_condition_stands_once_it_has_held(hold_s, stands):
 ])  # fmt: skip
 def test_an_alarm_stands_until_health_is_the_likelier(raised, well, alarm):
     given = (np.array([flag == "1" for flag in flags]) for flags in (raised, well))
-    assert "".join(str(int(flag)) for flag in diagnose._latch_until_healthy(*given)) == alarm
+    assert "".join(str(int(flag)) for flag in diagnose._latched(*given)) == alarm
 
 
 LEVELS = np.array([0.0, 0.25, 0.5, 1.0])

@@ -130,7 +130,7 @@ def test_a_wander_of_its_length():
 @pytest.mark.parametrize("length", [0.4, -0.4, 0.0])
 def test_commands_that_act_later_were_logged_earlier(length):
     values = np.column_stack([np.arange(6.0), np.arange(6.0) ** 2])
-    found = other_days._shift_values_earlier(values, length)
+    found = other_days._shifted(values, length)
     at = np.clip(np.arange(6) + length, 0, 5)
     np.testing.assert_allclose(found[:, 0], at)
     np.testing.assert_allclose(found[:, 1], np.interp(at, np.arange(6), values[:, 1]))
@@ -151,7 +151,7 @@ def test_mean_and_worst_of_days():
 @pytest.fixture(scope="module")
 def data():
     flight = small.flight(MODEL, 1000, lost=LOST)
-    return benchmark.FlightDataSet("set", MODEL.vehicle, (), (flight,))
+    return benchmark.DataSet("set", MODEL.vehicle, (), (flight,))
 
 
 def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
@@ -162,7 +162,7 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
         other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)]
     )
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
-    document = other_days._test_data_set_on_days(data)
+    document = other_days._test_data_set(data)
     assert not changed(document)
     assert [(row["kind"], row["day"]) for row in document["rows"]] == [
         ("one change", "as it was"), ("drawn, settings chosen on these", "drawn 0"),
@@ -180,7 +180,7 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
 
 def test_only_labelled_data_sets_have_other_days(monkeypatch, tmp_path, data):
     bare = replace(data, flights=(replace(data.flights[0], labels=np.full((1000, 2), np.nan)),))
-    monkeypatch.setattr(other_days, "_test_data_set_on_days", lambda one: one.name)
+    monkeypatch.setattr(other_days, "_test_data_set", lambda one: one.name)
     monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare, data])
     assert other_days.run_other_days(tmp_path) == {"sets": ["set"]}
     mixed = replace(data, name="mixed", flights=(*data.flights, *bare.flights))

@@ -132,7 +132,7 @@ def recording(samples):
 
 
 def data_set(model, flights):
-    return benchmark.FlightDataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
+    return benchmark.DataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
 
 
 @pytest.fixture

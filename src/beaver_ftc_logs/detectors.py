@@ -213,7 +213,11 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n, members = len(verdicts), group_indices(model)
-    faulty = np.array([_is_alarm(verdict) for verdict in verdicts], dtype=np.int64)
+    statistic, detected = (
+        np.array([getattr(one, key) for one in verdicts]) for key in ("statistic", "detected")
+    )
+    # by the statistic of a sample where there is one: the loop's own latch serves one fault a flight
+    faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
     e, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
@@ -223,14 +227,8 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
         g = LOOP_SURFACES.index(str(verdicts[k].isolated))
         names[k], low[k, members[g]] = "+".join(model.groups[g]), 0.0
         e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
-    p = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
-    p = np.where(np.isfinite(p), p, faulty)
+    p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
     return _plain_rows(samples, names, e, low=low, high=np.ones_like(low), probability=p)
-
-
-def _is_alarm(verdict: Verdict) -> bool:
-    """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
-    return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:

@@ -74,7 +74,8 @@ def score_against_failures(
     before = onset.is_false(rows.t_s)
     alarms = np.flatnonzero(~before & (rows.faulty == 1))
     detected = bool(alarms.size)
-    shares = _name_shares(rows, alarms)
+    names, counts = np.unique(rows.isolated_surfaces[alarms].astype(str), return_counts=True)
+    shares = dict(zip(names.tolist(), (counts / max(len(alarms), 1)).tolist(), strict=True))
     return {
         "failure": "+".join(failed) or None,
         "failure_s": onset.at_s,
@@ -85,12 +86,6 @@ def score_against_failures(
         "named": shares,
         "right_group": _is_main_name_right(shares, failed, groups),
     }
-
-
-def _name_shares(rows: LogRows, alarms: np.ndarray) -> dict[str, float]:
-    """Return the names after the failure, as shares of the rows with an alarm."""
-    names, counts = np.unique(rows.isolated_surfaces[alarms].astype(str), return_counts=True)
-    return {str(name): float(share) for name, share in zip(names, counts / max(len(alarms), 1), strict=True)}
 
 
 def _is_main_name_right(

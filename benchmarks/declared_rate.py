@@ -56,7 +56,7 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
     assert known.alarm_peak_tail is not None
     assert threshold is not None
     rate, count = (
-        extremes.expected_false_alarms_per_hour(known.alarm_peak_tail, threshold),
+        extremes.false_alarm_rate(known.alarm_peak_tail, threshold),
         round(hours * 3600.0 / LENGTH_S),
     )
     alarms = sum(
@@ -71,10 +71,8 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
 
 def identified(flights: list[Samples], vehicle: Vehicle) -> Model:
     """The model of flights, with its threshold."""
-    usable_flights = fitting.flights_with_usable_rows(flights)
-    return fitting.add_fitted_ranges_and_alarm_threshold(
-        usable_flights, fitting.fit_model(usable_flights, vehicle)
-    )
+    usable_flights = fitting.fit_parts(flights)
+    return fitting.add_ranges_and_threshold(usable_flights, fitting.fit_model(usable_flights, vehicle))
 
 
 def begun(faulty: np.ndarray) -> int:

@@ -38,11 +38,11 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
-from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
-from beaver_ftc_logs.identification import identify, scale_by_dynamic_pressure_if_better
+from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
+from beaver_ftc_logs.diagnose import LogRows, diagnose
+from beaver_ftc_logs.identification import identify, scale_if_better
 from beaver_ftc_logs.model import Model, model_file_text
-from beaver_ftc_logs.samples import load_flights_for_fit, read_columns_of_vehicle, resample
+from beaver_ftc_logs.samples import load_flights_for_fit, read_vehicle_columns, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 Document = dict[str, Any]
@@ -161,15 +161,15 @@ def recorded(document: Document, kind: str, folder: Path) -> Log:
     return Log(scenario, place, place / RECORDING_FILE_OF_KIND[kind])
 
 
-Said = tuple[DiagnosisRows, str | None]
+Said = tuple[LogRows, str | None]
 """The rows, and the surface that is named in the end."""
 
 
 def by_aircraft(log: Log, of: Campaign) -> Said:
     """As `diagnose --aircraft`."""
     vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
-    told = load_aircraft_and_declared_errors(of.aircraft, str(log.folder / "scenario.yaml"))
-    _, rows, verdict = diagnose_with_aircraft_model(read_columns_of_vehicle(log.path, vehicle), vehicle, told)
+    told = load_diagnosed(of.aircraft, str(log.folder / "scenario.yaml"))
+    _, rows, verdict = diagnose_aircraft(read_vehicle_columns(log.path, vehicle), vehicle, told)
     return rows, verdict["isolated"]
 
 
@@ -179,7 +179,7 @@ def identified(of: Campaign, logs: list[Log]) -> Model:
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(update={"faults": faults})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    found = identify(*scale_by_dynamic_pressure_if_better(load_flights_for_fit(named, vehicle), vehicle))
+    found = identify(*scale_if_better(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(model_file_text(found))
 
 
@@ -224,7 +224,7 @@ def told(log: Log, noise: dict[bool, Whitener]) -> bool:
 
 def by_model(log: Log, model: Model) -> Said:
     """As `diagnose --model`."""
-    rows = diagnose(resample(read_columns_of_vehicle(log.path, model.vehicle), model.vehicle), model)
+    rows = diagnose(resample(read_vehicle_columns(log.path, model.vehicle), model.vehicle), model)
     names, count = np.unique(rows.isolated_surfaces[rows.faulty == 1].astype(str), return_counts=True)
     return rows, str(names[count.argmax()]) if len(names) else None
 

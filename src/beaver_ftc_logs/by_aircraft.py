@@ -20,15 +20,10 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
-from beaver_ftc_logs.diagnose import DiagnosisRows, reversed_command_error
+from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
-from beaver_ftc_logs.stepped import (
-    ReplayedVerdicts,
-    declared_error_sections,
-    diagnosis_rows_from_replay,
-    replay_samples,
-)
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
+from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 if TYPE_CHECKING:
@@ -36,12 +31,12 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 
-_MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
-_MAX_RELATIVE_STEP_JITTER = 0.1
-_MIN_STRETCH_SAMPLES = 50
-_AIR_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
-_MAX_COMMAND_TO_STOP_RATIO = 1.1
-_UNANTICIPATED_FAULT_AT_START_WINDOW_S = 1.0
+_MAX_HZ, _MIN_HZ = 1000.0, 20.0
+_STEP_JITTER = 0.1
+_MIN_SAMPLES = 50
+_DENSITIES_KG_M3 = (0.2, 1.6)
+_STOP_RATIO = 1.1
+_START_WINDOW_S = 1.0
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
@@ -53,7 +48,7 @@ class DiagnosedAircraft:
     declared_errors: Document = field(default_factory=dict)
 
 
-def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
+def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
     """The aircraft with this name, and the errors that a scenario (file or name) declares; without a scenario
     the default ones. Raises BadInput if the scenario has another aircraft."""
     from beaver_ftc.aircraft import UnknownAircraft
@@ -65,253 +60,180 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
         raise BadInput(f"--aircraft: {error}") from None
     if scenario is None:
         return DiagnosedAircraft(aircraft)
-    loaded_scenario = load_scenario(scenario)
-    if loaded_scenario.fdi.sensor_monitor == "always":
+    loaded = load_scenario(scenario)
+    if loaded.fdi.sensor_monitor == "always":
         reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded_scenario.fdi.scheme == "none":
+    if loaded.fdi.scheme == "none":
         reason = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded_scenario.airframe.name != aircraft.name:
-        reason = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
+    if loaded.airframe.name != aircraft.name:
+        reason = f"flies {loaded.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {reason}")
-    return DiagnosedAircraft(loaded_scenario.airframe, declared_error_sections(loaded_scenario))
+    return DiagnosedAircraft(loaded.airframe, error_sections(loaded))
 
 
 @dataclass(frozen=True)
-class AircraftDiagnosisInputs:
+class LogInputs:
     """A log as inputs of the diagnosis.
 
-    rates_signals_commands_attitude: one array (n, ...) each, as `stepped.log_column_names_of_each_input`.
-    mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
-    rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
-    which the diagnosis is stepped without a reset. full_deflection_rad (S,): what a command of 1 is in the
-    log."""
+    input_arrays: one array (n, ...) each, as `stepped.input_columns`. held_age_s: mean age of the values of
+    each column that is held. has_missing_value (n,): rows in which an input is not a number.
+    gap_free_stretches: first row and end of each stretch through which the diagnosis is stepped without a
+    reset. full_deflection_rad (S,): what a command of 1 is in the log."""
 
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
-    rates_signals_commands_attitude: list[Floats]
-    mean_age_s_by_held_column: dict[str, float]
+    input_arrays: list[Floats]
+    held_age_s: dict[str, float]
     has_missing_value: Mask
     gap_free_stretches: list[tuple[int, int]]
     full_deflection_rad: Floats
 
 
-def read_diagnosis_inputs(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
-) -> AircraftDiagnosisInputs:
+def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check_log_has_inputs(recording, vehicle, diagnosed_aircraft.aircraft)
-    samples = resample(
-        recording,
-        vehicle.model_copy(update={"max_rate_hz": _MAX_LOG_RATE_HZ, "reference_airspeed_mps": None}),
-    )
+    _check_inputs(log, vehicle, given.aircraft)
+    changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
+    samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
-    diagnosis = Diagnosis(diagnosed_aircraft.aircraft, rate_hz, **diagnosed_aircraft.declared_errors)
-    needs_attitude = diagnosis.declared.air.moves
-    rates_signals_commands_attitude, mean_age_s_by_held_column = _read_sample_inputs(
-        samples, recording, vehicle, diagnosed_aircraft.aircraft, needs_attitude
-    )
-    _check_units_plausible(samples.name, rates_signals_commands_attitude, diagnosed_aircraft.aircraft)
-    has_missing_value = np.asarray(~np.isfinite(np.hstack(rates_signals_commands_attitude)).all(axis=1))
-    gap_free_stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
-    if not gap_free_stretches:
+    diagnosis = Diagnosis(given.aircraft, rate_hz, **given.declared_errors)
+    tilted = diagnosis.declared.air.moves
+    arrays, ages = _read_sample_inputs(samples, log, vehicle, given.aircraft, tilted)
+    _check_plausible(samples.name, arrays, given.aircraft)
+    missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
+    stretches = _gap_free_stretches(samples, missing, rate_hz)
+    if not stretches:
         raise BadInput(
-            f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
-            "missing number, allowed: all signals logged at one rate of "
-            f"{_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
+            f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
+            f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
-    surface_indices = _vehicle_surface_indices(vehicle, diagnosed_aircraft.aircraft)
-    samples = replace(
-        samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
-    )
-    return AircraftDiagnosisInputs(
-        samples,
-        diagnosis,
-        rate_hz,
-        rates_signals_commands_attitude,
-        mean_age_s_by_held_column,
-        has_missing_value,
-        gap_free_stretches,
-        _full_deflection_rad(vehicle, diagnosed_aircraft.aircraft),
-    )
+    places = _surface_places(vehicle, given.aircraft)
+    samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
+    full_rad = _full_deflection_rad(vehicle, given.aircraft)
+    return LogInputs(samples, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
 
 
-def diagnose_with_aircraft_model(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
-) -> tuple[Samples, DiagnosisRows, Document]:
+def diagnose_aircraft(
+    log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
+) -> tuple[Samples, LogRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed_aircraft)
-    return aircraft_inputs.samples, *diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
+    inputs = read_inputs(log, vehicle, given)
+    return inputs.samples, *diagnose_inputs(inputs, given)
 
 
-def diagnose_aircraft_inputs(
-    aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
-) -> tuple[DiagnosisRows, Document]:
+def diagnose_inputs(inputs: LogInputs, given: DiagnosedAircraft) -> tuple[LogRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, aircraft = aircraft_inputs.samples, diagnosed_aircraft.aircraft
-    replayed_flight_verdicts = _replay_flight(aircraft_inputs, aircraft)
-    rows = _rows_of_replayed_flight(aircraft_inputs, aircraft, replayed_flight_verdicts)
+    samples, aircraft = inputs.samples, given.aircraft
+    replay = _replay_flight(inputs, aircraft)
+    rows = _replayed_rows(inputs, aircraft, replay)
     if rows.has_credible_alarm():
-        _refuse_reversed_command_without_alarm(aircraft_inputs, aircraft, replayed_flight_verdicts, rows)
-        _refuse_exchanged_commands_without_alarm(aircraft_inputs, aircraft, rows)
-    return rows, _verdict_document(
-        samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
-    )
+        _refuse_reversed(inputs, aircraft, replay, rows)
+        _refuse_exchanged(inputs, aircraft, rows)
+    return rows, _verdict_document(samples, rows, replay, given, inputs.held_age_s)
 
 
-def _replay_flight(aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft) -> ReplayedVerdicts:
+def _replay_flight(inputs: LogInputs, aircraft: Aircraft) -> Replayed:
     """The verdicts of all samples. Raises BadInput if a command has the other sign in every part."""
-    diagnosis = aircraft_inputs.diagnosis
-    replayed_verdicts_by_stretch = []
-    for begin, end in aircraft_inputs.gap_free_stretches:
+    diagnosis = inputs.diagnosis
+    replays = []
+    for begin, end in inputs.gap_free_stretches:
         diagnosis.reset()
-        replayed_verdicts_by_stretch.append(
-            replay_samples(
-                diagnosis,
-                [array[begin:end] for array in aircraft_inputs.rates_signals_commands_attitude],
-                aircraft_inputs.rate_hz,
-            )
-        )
+        arrays = [array[begin:end] for array in inputs.input_arrays]
+        replays.append(replay_samples(diagnosis, arrays, inputs.rate_hz))
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(aircraft_inputs.samples.name, aircraft, replayed_verdicts_by_stretch)
-    return _join_stretch_verdicts(
-        len(aircraft_inputs.samples.t_s),
-        len(aircraft.surfaces),
-        aircraft_inputs.gap_free_stretches,
-        replayed_verdicts_by_stretch,
-    )
+        _check_command_signs(inputs.samples.name, aircraft, replays)
+    return _join_stretches(len(inputs.samples.t_s), inputs.gap_free_stretches, replays)
 
 
-def _rows_of_replayed_flight(
-    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, replayed_flight_verdicts: ReplayedVerdicts
-) -> DiagnosisRows:
+def _replayed_rows(inputs: LogInputs, aircraft: Aircraft, replay: Replayed) -> LogRows:
     """The rows, without a verdict where the log is not credible."""
-    t_s, gap_free_stretches = aircraft_inputs.samples.t_s, aircraft_inputs.gap_free_stretches
-    rows = diagnosis_rows_from_replay(
-        t_s, replayed_flight_verdicts, aircraft.surfaces, aircraft_inputs.diagnosis.config
-    )
-    rows_by_reason = _undiagnosable_rows_by_reason(
-        aircraft_inputs.rates_signals_commands_attitude[1],
-        aircraft,
-        aircraft_inputs.has_missing_value,
-        gap_free_stretches,
-    ) | _rows_by_reason_after_unanticipated_start(t_s, gap_free_stretches, replayed_flight_verdicts)
-    return rows.without_verdict(
-        _drop_empty_add_doubtful_alarm_reason(gap_free_stretches, rows, rows_by_reason)
-    )
+    t_s, stretches = inputs.samples.t_s, inputs.gap_free_stretches
+    rows = rows_of_replay(t_s, replay, aircraft.surfaces, inputs.diagnosis.config)
+    reasons = _doubtful_rows_of(inputs.input_arrays[1], aircraft, inputs.has_missing_value, stretches)
+    reasons |= _unexplained_starts(t_s, stretches, replay)
+    return rows.without_verdict(_complete_reasons(stretches, rows, reasons))
 
 
-def _refuse_reversed_command_without_alarm(
-    aircraft_inputs: AircraftDiagnosisInputs,
-    aircraft: Aircraft,
-    replayed_flight_verdicts: ReplayedVerdicts,
-    rows: DiagnosisRows,
-) -> None:
+def _refuse_reversed(inputs: LogInputs, aircraft: Aircraft, replay: Replayed, rows: LogRows) -> None:
     """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
-    for surface_index in np.flatnonzero(replayed_flight_verdicts.relative_command_gains < 0.0):
-        rates, signals, commands, attitude = aircraft_inputs.rates_signals_commands_attitude
-        signs = np.where(np.arange(len(aircraft.surfaces)) == surface_index, -1.0, 1.0)
-        corrected_inputs = replace(
-            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, commands * signs, attitude]
-        )
-        corrected_rows = _rows_of_replayed_flight(
-            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
-        )
-        if corrected_rows.are_healthy_where_credible_in(rows):
-            raise reversed_command_error(
-                aircraft_inputs.samples.name, aircraft.surfaces[surface_index], f"of {aircraft.name}"
-            )
+    for s in np.flatnonzero(replay.command_gains < 0.0):
+        commands = inputs.input_arrays[2] * np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
+        corrected = _with_commands(inputs, commands)
+        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
+        if rows_then.clears_alarm(rows):
+            raise reversed_command_error(inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}")
 
 
-def _refuse_exchanged_commands_without_alarm(
-    aircraft_inputs: AircraftDiagnosisInputs, aircraft: Aircraft, rows: DiagnosisRows
-) -> None:
+def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> None:
     """Raise BadInput if the log has no alarm once two commands are exchanged."""
-    rates, signals, _, attitude = aircraft_inputs.rates_signals_commands_attitude
     for first, second in combinations(range(len(aircraft.surfaces)), 2):
         order = np.arange(len(aircraft.surfaces))
         order[[first, second]] = second, first
-        exchanged_commands = aircraft_inputs.samples.commands[:, order] * aircraft_inputs.full_deflection_rad
-        corrected_inputs = replace(
-            aircraft_inputs, rates_signals_commands_attitude=[rates, signals, exchanged_commands, attitude]
-        )
-        if _raises_any_alarm(corrected_inputs):
+        corrected = _with_commands(inputs, inputs.samples.commands[:, order] * inputs.full_deflection_rad)
+        if _raises_any_alarm(corrected):
             continue
-        corrected_rows = _rows_of_replayed_flight(
-            corrected_inputs, aircraft, _replay_flight(corrected_inputs, aircraft)
-        )
-        if corrected_rows.are_healthy_where_credible_in(rows):
-            raise BadInput(
-                f"{aircraft_inputs.samples.name}: if the commands of {aircraft.surfaces[first]} and "
-                f"{aircraft.surfaces[second]} are exchanged, there is no alarm, allowed: commands as of "
-                f"{aircraft.name}"
-            )
+        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
+        if rows_then.clears_alarm(rows):
+            pair = f"{aircraft.surfaces[first]} and {aircraft.surfaces[second]}"
+            reason = f"if the commands of {pair} are exchanged, there is no alarm"
+            raise BadInput(f"{inputs.samples.name}: {reason}, allowed: commands as of {aircraft.name}")
 
 
-def _raises_any_alarm(aircraft_inputs: AircraftDiagnosisInputs) -> bool:
+def _with_commands(inputs: LogInputs, commands: Floats) -> LogInputs:
+    """The inputs with other commands, rad."""
+    rates, signals, _, attitude = inputs.input_arrays
+    return replace(inputs, input_arrays=[rates, signals, commands, attitude])
+
+
+def _raises_any_alarm(inputs: LogInputs) -> bool:
     """Whether an alarm is raised in any stretch; nothing after it is replayed."""
-    for begin, end in aircraft_inputs.gap_free_stretches:
-        aircraft_inputs.diagnosis.reset()
-        arrays = [
-            np.ascontiguousarray(array[begin:end])
-            for array in aircraft_inputs.rates_signals_commands_attitude
-        ]
-        if any(aircraft_inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
+    for begin, end in inputs.gap_free_stretches:
+        inputs.diagnosis.reset()
+        arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
+        if any(inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
             return True
     return False
 
 
-def _check_command_signs(
-    flight_name: str, aircraft: Aircraft, replayed_verdicts_by_stretch: list[ReplayedVerdicts]
-) -> None:
+def _check_command_signs(flight: str, aircraft: Aircraft, replays: list[Replayed]) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
-    for surface, gain_upper_bound in zip(
-        aircraft.surfaces,
-        np.min(
-            [replayed.relative_command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
-        ),
-        strict=True,
-    ):
-        if gain_upper_bound < trust.MAX_REVERSED_GAIN:
+    gains = np.min([replay.command_gain_bounds for replay in replays], axis=0)
+    for surface, upper in zip(aircraft.surfaces, gains, strict=True):
+        if upper < trust.MAX_REVERSED_GAIN:
             reason = f"the rates answer the command of {surface} the other way round in all of it"
-            raise BadInput(
-                f"{flight_name}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
-            )
+            raise BadInput(f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
 
 
-def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
+def _check_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
     """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
-    missing_surfaces = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
-    if missing_surfaces:
-        reason = (
-            f"surfaces: no {missing_surfaces[0]}, allowed: what the commands make of "
-            f"{', '.join(aircraft.surfaces)}"
-        )
-        raise BadInput(f"vehicle {vehicle.name}: {reason}")
+    missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
+    if missing:
+        allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
+        raise BadInput(f"vehicle {vehicle.name}: surfaces: no {missing[0]}, allowed: {allowed}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
-    flow_names = _flow_input_names(aircraft)
-    for name in flow_names:
+    flow = _flow_input_names(aircraft)
+    for name in flow:
         if name not in vehicle.flow:
-            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow_names)}"
+            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
-    for quantity_column in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
-        if quantity_column.column not in recording.columns:
-            nearest_text = recording.nearest_column_names_text(quantity_column.column)
-            reason = f"no column {quantity_column.column}, allowed: a log that has it; it has {nearest_text}"
-            raise BadInput(f"{recording.name}: {reason}")
+    for quantity in (vehicle.airspeed, *(vehicle.flow[name] for name in flow)):
+        if quantity.column not in log.columns:
+            nearest = log.nearest_columns_text(quantity.column)
+            reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
+            raise BadInput(f"{log.name}: {reason}")
 
 
 def _flow_input_names(aircraft: Aircraft) -> list[str]:
     return ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
 
 
-def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
+def _surface_places(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
     """Place of each of the aircraft's surfaces among the vehicle's."""
     return [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
 
@@ -322,93 +244,66 @@ def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
-    first_times_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
-    steps_s = np.diff(first_times_s)
-    even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
-    rate_hz = float(f"{1.0 / (even_steps_s.mean() if len(even_steps_s) else samples.dt_s):.4g}")
-    if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
-        reason = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
+    steps_s = np.diff(samples.t_s[:_MIN_SAMPLES])
+    even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
+    rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")
+    if not _MIN_HZ <= rate_hz <= _MAX_HZ:
+        reason = f"an aircraft's model takes {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {reason}")
     return rate_hz
 
 
 def _read_sample_inputs(
-    samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
+    samples: Samples, log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, tilted: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.log_column_names_of_each_input`, and
-    the mean age of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
-    si_column_by_name = convert_to_si(recording, vehicle).columns
-    mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
+    """Rates, signals, commands and attitude at each sample, as `stepped.input_columns`, and the mean age of
+    the values of each held column, s. tilted: if false, the attitude is zeros."""
+    columns = convert_to_si(log, vehicle).columns
+    ages = dict(samples.held_age_s)
 
-    def sample_values_and_store_age(quantity_column: QuantityColumn) -> Floats:
-        values, mean_age_s = values_and_mean_age_at(
-            si_column_by_name[quantity_column.column], samples.t_s, samples.dt_s
-        )
-        if mean_age_s is not None:
-            mean_age_s_by_held_column[quantity_column.column] = mean_age_s
+    def sampled_at(quantity: QuantityColumn) -> Floats:
+        values, age_s = sample_column(columns[quantity.column], samples.t_s, samples.dt_s)
+        if age_s is not None:
+            ages[quantity.column] = age_s
         return values
 
-    alpha_rad, beta_rad, qdyn_pa, *signals_beyond_flow = (
-        sample_values_and_store_age(vehicle.flow[name]) for name in _flow_input_names(aircraft)
-    )
-    assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signal_arrays = [
-        alpha_rad,
-        beta_rad,
-        sample_values_and_store_age(vehicle.airspeed),
-        qdyn_pa,
-        *signals_beyond_flow,
-    ]
-    surface_indices = _vehicle_surface_indices(vehicle, aircraft)
-    full_deflection_rad = _full_deflection_rad(vehicle, aircraft)
+    assert vehicle.airspeed is not None  # as `_check_inputs` has seen
+    flow = [vehicle.flow[name] for name in _flow_input_names(aircraft)]
+    signals = [sampled_at(quantity) for quantity in (*flow[:2], vehicle.airspeed, *flow[2:])]
+    places = _surface_places(vehicle, aircraft)
+    full_rad = _full_deflection_rad(vehicle, aircraft)
     attitude = np.zeros_like(samples.rates)
-    if needs_attitude:
-        for axis, angle_name in enumerate(_ATTITUDE_ANGLE_NAMES):
-            quantity_column = getattr(vehicle.attitude, angle_name) if vehicle.attitude else None
-            if quantity_column is None or quantity_column.column not in si_column_by_name:
+    if tilted:
+        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
+            quantity = getattr(vehicle.attitude, angle) if vehicle.attitude else None
+            if quantity is None or quantity.column not in columns:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle_name}: {reason}")
-            attitude[:, axis] = sample_values_and_store_age(quantity_column)
-    return [
-        samples.rates,
-        np.column_stack(signal_arrays),
-        samples.commands[:, surface_indices] * full_deflection_rad,
-        attitude,
-    ], mean_age_s_by_held_column
+                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
+            attitude[:, axis] = sampled_at(quantity)
+    return [samples.rates, np.column_stack(signals), samples.commands[:, places] * full_rad, attitude], ages
 
 
-def _check_units_plausible(
-    flight_name: str, rates_signals_commands_attitude: list[Floats], aircraft: Aircraft
-) -> None:
+def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    signals, commands = rates_signals_commands_attitude[1], rates_signals_commands_attitude[2]
-    for signal_index, name in enumerate(("alpha_rad", "beta_rad")):
-        median_flow_angle_magnitude = _median_without_nan(np.abs(signals[:, signal_index]))
-        if median_flow_angle_magnitude > 0.5 * pi:
-            raise BadInput(
-                f"{flight_name}: flow.{name} is {median_flow_angle_magnitude:.3g} in the middle, "
-                "allowed: rad; `unit: deg`?"
-            )
-    is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
-    density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
-    median_density_kg_m3 = _median_without_nan(density_kg_m3)
-    if (
-        density_kg_m3.size
-        and not _AIR_DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _AIR_DENSITY_LIMITS_KG_M3[1]
-    ):
-        reason = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
-        allowed_text = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
-        raise BadInput(f"{flight_name}: {reason}, allowed: {allowed_text}, true airspeed in m/s and Pa")
-    for surface_index, surface in enumerate(aircraft.surfaces):
+    signals, commands = arrays[1], arrays[2]
+    for i, name in enumerate(("alpha_rad", "beta_rad")):
+        median = _median_without_nan(np.abs(signals[:, i]))
+        if median > 0.5 * pi:
+            raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
+    flies = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
+    rho = _median_without_nan(2.0 * signals[flies, 3] / signals[flies, 2] ** 2)
+    if flies.any() and not _DENSITIES_KG_M3[0] < rho < _DENSITIES_KG_M3[1]:
+        reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
+        allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
+        raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
+    for s, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
-        max_deflection_rad = max(abs(travel.min_rad), abs(travel.max_rad))
-        max_command_rad = np.nanmax(np.abs(commands[:, surface_index]), initial=0.0)
-        if max_command_rad > _MAX_COMMAND_TO_STOP_RATIO * max_deflection_rad:
-            reason = (
-                f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
-                f"{max_deflection_rad:.3g} rad"
-            )
-            raise BadInput(f"{flight_name}: {reason}; full_deflection_rad says what 1 is")
+        stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
+        max_rad = np.nanmax(np.abs(commands[:, s]), initial=0.0)
+        if max_rad > _STOP_RATIO * stop_rad:
+            reason = f"the command of {surface} reaches {max_rad:.3g} rad"
+            allowed = f"its stop, {stop_rad:.3g} rad"
+            raise BadInput(f"{flight}: {reason}, allowed: {allowed}; full_deflection_rad says what 1 is")
 
 
 def _median_without_nan(values: Floats) -> float:
@@ -417,174 +312,121 @@ def _median_without_nan(values: Floats) -> float:
     return float(np.median(numbers)) if numbers.size else float("nan")
 
 
-def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: float) -> list[tuple[int, int]]:
+def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
-    is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
-    is_known = ~has_missing_value
-    joins_next_row = is_known[1:] & is_known[:-1] & ~is_uneven_step
-    stretch_edges = np.flatnonzero(np.diff(np.concatenate([[False], joins_next_row, [False]]).astype(int)))
-    first_rows_and_last_rows_inclusive = zip(
-        stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True
-    )
-    return [
-        (first, last + 1)
-        for first, last in first_rows_and_last_rows_inclusive
-        if last + 1 - first >= _MIN_STRETCH_SAMPLES
-    ]
+    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
+    joins = ~(missing[1:] | missing[:-1] | uneven)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], joins, [False]]).astype(int)))
+    ends = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(first, last + 1) for first, last in ends if last + 1 - first >= _MIN_SAMPLES]
 
 
-def _join_stretch_verdicts(
-    n_samples: int,
-    n_surfaces: int,
-    gap_free_stretches: list[tuple[int, int]],
-    replayed_verdicts_by_stretch: list[ReplayedVerdicts],
-) -> ReplayedVerdicts:
+def _join_stretches(n: int, stretches: list[tuple[int, int]], replays: list[Replayed]) -> Replayed:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
-    verdicts = [Verdict()] * n_samples
-    effectiveness_low = np.zeros((n_samples, n_surfaces))
-    effectiveness_high = np.ones((n_samples, n_surfaces))
-    least_gains, least_gain_upper_bounds = (
-        np.min([getattr(replayed, name) for replayed in replayed_verdicts_by_stretch], axis=0)
-        for name in ("relative_command_gains", "relative_command_gain_upper_bounds")
-    )
-    for (begin, end), replayed in zip(gap_free_stretches, replayed_verdicts_by_stretch, strict=True):
-        verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
-            replayed.verdicts,
-            replayed.single_fault_effectiveness_low,
-            replayed.single_fault_effectiveness_high,
-        )
-    return ReplayedVerdicts(
-        verdicts, effectiveness_low, effectiveness_high, least_gains, least_gain_upper_bounds
-    )
+    verdicts = [Verdict()] * n
+    gains = np.min([replay.command_gains for replay in replays], axis=0)
+    upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
+    low, high = np.zeros((n, len(gains))), np.ones((n, len(gains)))
+    for (begin, end), replay in zip(stretches, replays, strict=True):
+        verdicts[begin:end] = replay.verdicts
+        low[begin:end], high[begin:end] = replay.alone_low, replay.alone_high
+    return Replayed(verdicts, low, high, gains, upper)
 
 
-def _undiagnosable_rows_by_reason(
-    signals: Floats, aircraft: Aircraft, has_missing_value: Mask, gap_free_stretches: list[tuple[int, int]]
+def _doubtful_rows_of(
+    signals: Floats, aircraft: Aircraft, missing: Mask, stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """For each reason the rows (n,) for which there is no verdict."""
-    min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
-    min_alpha_rad, max_alpha_rad = aircraft.alpha_rad
-    is_outside_stretches = np.ones(len(signals), dtype=bool)
-    for begin, end in gap_free_stretches:
-        is_outside_stretches[begin:end] = False
-    airspeed_mps, alpha_rad = signals[:, 2], signals[:, 0]
+    low_mps, high_mps = aircraft.envelope.airspeed_mps
+    low, high = aircraft.alpha_rad
+    outside = np.ones(len(signals), dtype=bool)
+    for begin, end in stretches:
+        outside[begin:end] = False
+    airspeed, alpha = signals[:, 2], signals[:, 0]
     return {
-        "a number is missing": has_missing_value,
-        "samples are not evenly spaced": is_outside_stretches & ~has_missing_value,
-        f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (
-            airspeed_mps < min_airspeed_mps
-        )
-        | (airspeed_mps > max_airspeed_mps),
-        f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (
-            alpha_rad < min_alpha_rad
-        )
-        | (alpha_rad > max_alpha_rad),
+        "a number is missing": missing,
+        "samples are not evenly spaced": outside & ~missing,
+        f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (airspeed < low_mps) | (airspeed > high_mps),
+        f"angle of attack is outside {low:.3g} to {high:.3g} rad": (alpha < low) | (alpha > high),
     }
 
 
-def _rows_by_reason_after_unanticipated_start(
-    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight_verdicts: ReplayedVerdicts
-) -> dict[str, Mask]:
+def _unexplained_starts(t_s: Floats, stretches: list[tuple[int, int]], replay: Replayed) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
-    is_after_unanticipated_fault_alarm = np.zeros(len(t_s), dtype=bool)
-    for begin, end in gap_free_stretches:
-        first_second_end_row = begin + int(
-            np.searchsorted(t_s[begin:end], t_s[begin] + _UNANTICIPATED_FAULT_AT_START_WINDOW_S)
-        )
-        if any(
-            verdict.isolated == "unanticipated"
-            for verdict in replayed_flight_verdicts.verdicts[begin:first_second_end_row]
-        ):
-            first_alarm_row = next(
-                k for k in range(begin, first_second_end_row) if replayed_flight_verdicts.verdicts[k].detected
-            )
-            is_after_unanticipated_fault_alarm[first_alarm_row:end] = True
-    reason = (
-        "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
-    )
-    return {reason: is_after_unanticipated_fault_alarm}
+    after = np.zeros(len(t_s), dtype=bool)
+    for begin, end in stretches:
+        stop = begin + int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
+        if any(verdict.isolated == "unanticipated" for verdict in replay.verdicts[begin:stop]):
+            first = next(k for k in range(begin, stop) if replay.verdicts[k].detected)
+            after[first:end] = True
+    cause = "another aircraft or loading, or undeclared errors"
+    return {f"no fault explains it from the first second on: {cause}": after}
 
 
-def _drop_empty_add_doubtful_alarm_reason(
-    gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, rows_by_reason: dict[str, Mask]
+def _complete_reasons(
+    stretches: list[tuple[int, int]], rows: LogRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
     a reason of its own."""
-    has_reason = np.logical_or.reduce(list(rows_by_reason.values()))
-    is_after_doubtful_alarm = np.zeros(len(rows.t_s), dtype=bool)
-    for begin, end in gap_free_stretches:
-        alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
-        if alarm_rows.size and has_reason[alarm_rows[0]]:
-            is_after_doubtful_alarm[alarm_rows[0] : end] = True
-    rows_by_reason = rows_by_reason | {
-        "the alarm was raised where nothing can be said": is_after_doubtful_alarm & ~has_reason
-    }
-    return {
-        reason: has_this_reason for reason, has_this_reason in rows_by_reason.items() if has_this_reason.any()
-    }
+    has_reason = np.logical_or.reduce(list(reasons.values()))
+    after = np.zeros(len(rows.t_s), dtype=bool)
+    for begin, end in stretches:
+        alarms = begin + np.flatnonzero(rows.faulty[begin:end])
+        if alarms.size and has_reason[alarms[0]]:
+            after[alarms[0] : end] = True
+    reasons = reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
+    return {reason: mask for reason, mask in reasons.items() if mask.any()}
 
 
 def _verdict_document(
-    samples: Samples,
-    rows: DiagnosisRows,
-    replayed_flight_verdicts: ReplayedVerdicts,
-    diagnosed_aircraft: DiagnosedAircraft,
-    mean_age_s_by_held_column: dict[str, float],
+    samples: Samples, rows: LogRows, replay: Replayed, given: DiagnosedAircraft, ages: dict[str, float]
 ) -> Document:
     """The document of verdict.json."""
-    surfaces = list(diagnosed_aircraft.aircraft.surfaces)
-    alarm_rows = np.flatnonzero(rows.faulty)
-    verdict_of_last_alarm_row = (
-        replayed_flight_verdicts.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
-    )
-    alarm_rows_with_last_isolation = [
-        k
-        for k in alarm_rows.tolist()
-        if replayed_flight_verdicts.verdicts[k].isolated == verdict_of_last_alarm_row.isolated
-    ]
-    held_column_notes = [
-        f"{name} is held, {mean_age_s:.2g} s old on average: errors declared have to cover it"
-        for name, mean_age_s in mean_age_s_by_held_column.items()
+    surfaces = list(given.aircraft.surfaces)
+    alarms = np.flatnonzero(rows.faulty)
+    last = replay.verdicts[alarms[-1]] if alarms.size else Verdict()
+    since = [k for k in alarms.tolist() if replay.verdicts[k].isolated == last.isolated]
+    held = [
+        f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
+        for name, age_s in ages.items()
     ]
     return {
         "flight": samples.name,
-        "aircraft": diagnosed_aircraft.aircraft.name,
-        "declared": diagnosed_aircraft.declared_errors,
+        "aircraft": given.aircraft.name,
+        "declared": given.declared_errors,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
         "recorded_s": len(samples.t_s) * samples.dt_s,
         "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
-        "faulty": bool(alarm_rows.size),
-        "detection_s": float(samples.t_s[alarm_rows[0]]) if alarm_rows.size else None,
-        "isolation_s": float(samples.t_s[alarm_rows_with_last_isolation[0]])
-        if verdict_of_last_alarm_row.isolated
-        else None,
-        "isolated": verdict_of_last_alarm_row.isolated,
-        "type": verdict_of_last_alarm_row.type,
-        "estimate": verdict_of_last_alarm_row.estimate,
-        "candidates": list(verdict_of_last_alarm_row.candidates),
-        "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
+        "faulty": bool(alarms.size),
+        "detection_s": float(samples.t_s[alarms[0]]) if alarms.size else None,
+        "isolation_s": float(samples.t_s[since[0]]) if last.isolated else None,
+        "isolated": last.isolated,
+        "type": last.type,
+        "estimate": last.estimate,
+        "candidates": list(last.candidates),
+        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
         "events": findings.fault_events(rows, surfaces),
-        "can_separate": _excluded_loss_sentences(rows, surfaces),
+        "can_separate": _excluded_losses(rows, surfaces),
         "isolability": {"together": []},
-        "notes": [*samples.notes, *held_column_notes],
+        "notes": [*samples.notes, *held],
     }
 
 
-def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
+def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
     """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
     the healthy rows."""
-    is_credible_without_alarm = (rows.faulty == 0) & (rows.credible == 1)
-    if not is_credible_without_alarm.any():
+    quiet = (rows.faulty == 0) & (rows.credible == 1)
+    if not quiet.any():
         return []
-    median_least_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
+    losses = 1.0 - np.median(rows.effectiveness_low[quiet], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, median_least_excluded_losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, losses.tolist(), strict=True)
     ]
 
 

@@ -12,36 +12,26 @@ import numpy as np
 
 from beaver_ftc_assurance.certificates import certificate
 from beaver_ftc_assurance.certificates import proved as by_frames
-from beaver_ftc_logs.by_aircraft import AircraftDiagnosisInputs
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.by_aircraft import LogInputs
+from beaver_ftc_logs.diagnose import LogRows
 
 
-def write_certificate_and_log(
-    aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path
-) -> None:
+def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
-    stretches_with_alarm = (
-        stretch
-        for stretch in aircraft_inputs.gap_free_stretches
-        if rows.faulty[stretch[0] : stretch[1]].any()
-    )
-    begin, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
-    stretch_inputs = [
-        np.ascontiguousarray(array[begin:end]) for array in aircraft_inputs.rates_signals_commands_attitude
-    ]
-    diagnosis = aircraft_inputs.diagnosis
+    alarmed = (stretch for stretch in inputs.gap_free_stretches if rows.faulty[stretch[0] : stretch[1]].any())
+    begin, end = next(alarmed, inputs.gap_free_stretches[0])
+    arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
+    diagnosis = inputs.diagnosis
 
-    def step_diagnosis_and_yield_index() -> Iterator[int]:
-        for sample_index, sample in enumerate(zip(*stretch_inputs, strict=True)):
+    def step() -> Iterator[int]:
+        for k, sample in enumerate(zip(*arrays, strict=True)):
             diagnosis.step(*sample)
-            yield sample_index
+            yield k
 
     diagnosis.reset()
-    diagnosis_memory, scenario = diagnosis.inside()
-    scenario_named_as_flight = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
-    log, document = by_frames.proved(
-        scenario_named_as_flight, diagnosis_memory, step_diagnosis_and_yield_index()
-    )
-    document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[begin])})
-    by_frames.write(scenario_named_as_flight, log, document, folder)
+    memory, scenario = diagnosis.inside()
+    scenario = scenario.model_copy(update={"name": inputs.samples.name})
+    log, document = by_frames.proved(scenario, memory, step())
+    document = certificate.with_digest(document | {"begins_s": float(inputs.samples.t_s[begin])})
+    by_frames.write(scenario, log, document, folder)

@@ -23,7 +23,7 @@ from beaver_ftc_logs.known_commands import (
 )
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
-    NAMES_OF_READERS_OF_WANTED_COLUMNS,
+    SELECTIVE_READERS,
     check_exists,
     read_flight,
     read_parts,
@@ -36,18 +36,12 @@ from beaver_ftc_logs.readers.table import (
     text_of_column_phrase,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
-from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
-from beaver_ftc_logs.units import (
-    ACCELERATION,
-    KIND_AND_SI_FACTOR_OF_UNIT,
-    RATE,
-    SECONDS_PER_TIME_UNIT,
-    nearest_unit,
-)
+from beaver_ftc_logs.samples import Samples, read_vehicle_parts, resample
+from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
 
-def _rate_name_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
+def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
     """Return a pattern of the names of a body rate: ours, by its angle, by its axis, by its place in a
     vector."""
     return "|".join((
@@ -59,10 +53,10 @@ def _rate_name_pattern(rate_name: str, angle: str, axis: str, vector_index: int)
     ))  # fmt: skip
 
 
-_COLUMN_NAME_PATTERNS = {
-    "p": _rate_name_pattern("p", "roll", "x", 0),
-    "q": _rate_name_pattern("q", "pitch", "y", 1),
-    "r": _rate_name_pattern("r", "yaw", "z", 2),
+_NAME_PATTERNS = {
+    "p": _rate_pattern("p", "roll", "x", 0),
+    "q": _rate_pattern("q", "pitch", "y", 1),
+    "r": _rate_pattern("r", "yaw", "z", 2),
     "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
     "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
     "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
@@ -70,404 +64,262 @@ _COLUMN_NAME_PATTERNS = {
     "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
     r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
-_NOT_MEASURED_NAME_PATTERN = (
+_DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
 """Names of what others derive from a quantity, or want of it: none of these is the quantity."""
-_ANGLE_DERIVATIVE_PATTERN = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
-_RATE_UNIT_BY_NAME_PART = {
-    "rad_s": "rad/s",
-    "rad/s": "rad/s",
-    "deg_s": "deg/s",
-    "deg/s": "deg/s",
-    "dps": "deg/s",
-}
-_PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
-_MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
-_MIN_ANGLE_RATE_CORRELATION = 0.7
-_MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
-_PLAUSIBLE_LOG_RATE_RANGE_HZ = (4.0, 2000.0)
+_ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
+_UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
+_PWM_RANGE_US = (700.0, 2300.0)
+_LARGEST_RAD_S = 12.0
+_MIN_CORRELATION = 0.7
+_MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
+_LOG_RATES_HZ = (4.0, 2000.0)
 
 
-def check_log(path: Path, vehicle: Vehicle | None, reader_name: str | None) -> Document:
+def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
     """Return a description of a log in `lines`, and a `vehicle` for it: the one given, or a guess.
 
     usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
     """
     remarks: list[str] = []
-    guessed_vehicle: Document | None = None
+    guess: Document | None = None
     if vehicle is None:
-        guessed_vehicle = _guess_vehicle(path, reader_name, remarks)
-        if guessed_vehicle is None:
+        guess = _guess_vehicle(path, reader, remarks)
+        if guess is None:
             return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
-        vehicle = Vehicle.model_validate(guessed_vehicle)
-    usable_and_lines_by_part = [
-        _check_recording(recording, vehicle)
-        for recording in read_parts_for_vehicle(path, vehicle, reader_name)
-    ]
-    for part_number, (_, part_lines) in enumerate(usable_and_lines_by_part, 1):
-        remarks += (
-            part_lines
-            if len(usable_and_lines_by_part) == 1
-            else [f"part {part_number} of {len(usable_and_lines_by_part)}: {line}" for line in part_lines]
-        )
-    return {
-        "log": str(path),
-        "usable": all(is_usable for is_usable, _ in usable_and_lines_by_part),
-        "lines": remarks,
-        "vehicle": guessed_vehicle,
-    }
+        vehicle = Vehicle.model_validate(guess)
+    parts = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
+    for part, (_, lines) in enumerate(parts, 1):
+        remarks += lines if len(parts) == 1 else [f"part {part} of {len(parts)}: {line}" for line in lines]
+    usable = all(usable for usable, _ in parts)
+    return {"log": str(path), "usable": usable, "lines": remarks, "vehicle": guess}
 
 
-def _check_recording(recording: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
-    """Whether a recording could be identified or diagnosed, and what is said of it."""
+def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
+    """Whether a log could be identified or diagnosed, and what is said of it."""
     try:
-        samples = resample(recording, vehicle)
+        samples = resample(log, vehicle)
     except BadInput as error:
         return False, [str(error)]
-    motionless_axes = [
-        axis
-        for axis, rate in zip("pqr", samples.rates.T, strict=True)
-        if np.ptp(rate[np.isfinite(rate)]) == 0.0
-    ]
-    motionless_lines = [
-        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in motionless_axes
-    ]
-    return not motionless_axes, [
-        _log_size_text(samples),
-        *samples.notes,
-        *_compare_rates_and_angles(recording, vehicle),
-        *motionless_lines,
-    ]
+    rates = zip("pqr", samples.rates.T, strict=True)
+    still = [axis for axis, rate in rates if np.ptp(rate[np.isfinite(rate)]) == 0.0]
+    lines = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still]
+    return not still, [_log_size_text(samples), *samples.notes, *_compare_angles(log, vehicle), *lines]
 
 
 def _log_size_text(samples: Samples) -> str:
-    n_gaps, duration_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
-    longest_gap_text = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
-    size_text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {duration_s:.4g} s"
-    return f"{size_text}; gaps: {n_gaps}{longest_gap_text}"
+    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
+    gap = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
+    text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s"
+    return f"{text}; gaps: {n_gaps}{gap}"
 
 
-def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> list[str]:
+def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, attitude_quantity_columns = recording.columns, vehicle.attitude
-    if attitude_quantity_columns is None or attitude_quantity_columns.roll.column not in columns:
+    columns, angles = log.columns, vehicle.attitude
+    if angles is None or angles.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
-    rate_columns_in_si = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch_quantity_column = attitude_quantity_columns.pitch
-    pitch_column_in_si = (
-        _column_in_si(columns, pitch_quantity_column)
-        if pitch_quantity_column is not None and pitch_quantity_column.column in columns
-        else None
-    )
-    roll_fit = physics.fit_roll_angle_to_rates(
-        rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
-    )
-    if roll_fit is None:
-        return ["too little moves to compare the rates with the roll angle"]
-    comparison_texts = [
-        _angle_rate_fit_text(roll_fit, attitude_quantity_columns.roll.column, vehicle.rates.p.column)
+    gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
+    named = [angle if angle and angle.column in columns else None for angle in (angles.pitch, angles.yaw)]
+    roll = _column_in_si(columns, angles.roll)
+    pitch, yaw = (None if angle is None else _column_in_si(columns, angle) for angle in named)
+    fits = [
+        physics.fit_roll(gyros, roll, pitch),
+        physics.fit_pitch(gyros, roll, pitch) if pitch else None,
+        physics.fit_yaw(gyros, roll, pitch, yaw) if yaw else None,
     ]
-    if pitch_quantity_column is not None and pitch_column_in_si is not None:
-        pitch_fit = physics.fit_pitch_angle_to_rates(
-            rate_columns_in_si, _column_in_si(columns, attitude_quantity_columns.roll), pitch_column_in_si
-        )
-        comparison_texts += (
-            [_angle_rate_fit_text(pitch_fit, pitch_quantity_column.column, vehicle.rates.q.column)]
-            if pitch_fit
-            else []
-        )
-    if (
-        yaw_quantity_column := attitude_quantity_columns.yaw
-    ) is not None and yaw_quantity_column.column in columns:
-        yaw_fit = physics.fit_yaw_angle_to_rates(
-            rate_columns_in_si,
-            _column_in_si(columns, attitude_quantity_columns.roll),
-            pitch_column_in_si,
-            _column_in_si(columns, yaw_quantity_column),
-        )
-        comparison_texts += (
-            [_angle_rate_fit_text(yaw_fit, yaw_quantity_column.column, vehicle.rates.r.column)]
-            if yaw_fit
-            else []
-        )
-    return comparison_texts
+    if fits[0] is None:
+        return ["too little moves to compare the rates with the roll angle"]
+    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    trios = zip(fits, (angles.roll, *named), rates, strict=True)
+    return [_fit_text(fit, angle.column, rate) for fit, angle, rate in trios if fit and angle]
 
 
-def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column_name: str, rate_column_name: str) -> str:
-    agreement_text = (
-        "they agree"
-        if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
-        else "they tell nothing of one another"
-    )
+def _fit_text(fit: physics.AngleFit, angle: str, rate: str) -> str:
+    verdict = "they agree" if abs(fit.correlation) > _MIN_CORRELATION else "they tell nothing of one another"
     return (
-        f"the change of {angle_column_name} is {fit.slope:.3f} times the integral of {rate_column_name} "
-        f"(correlation {fit.correlation:.2f}): {agreement_text}"
+        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} "
+        f"(correlation {fit.correlation:.2f}): {verdict}"
     )
 
 
-def _column_in_si(columns: Any, quantity_column: Any) -> Column:
-    column: Column = columns[quantity_column.column]
-    return replace(column, values=quantity_column.to_si(column.values))
+def _column_in_si(columns: Any, quantity: Any) -> Column:
+    column: Column = columns[quantity.column]
+    return replace(column, values=quantity.to_si(column.values))
 
 
-def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> Document | None:
+def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
-    reader_name = reader_name or reader_name_for_path(path)
-    time_column_and_unit = _require_time_column_and_unit(path, remarks) if reader_name == "table" else None
-    recording, names_in_log, mixing = _read_columns_for_guess(path, reader_name, time_column_and_unit)
+    reader = reader or reader_name_for_path(path)
+    time = _find_time(path, remarks) if reader == "table" else None
+    log, in_log, mixing = _read_likely(path, reader, time)
     remarks += mixing.lines
-    names_with_numbers = [
-        name for name, column in recording.columns.items() if np.isfinite(column.values).any()
-    ]
-    column_name_by_quantity = {
-        quantity: _shortest_matching_column_name(
-            pattern,
-            [
-                name
-                for name in names_with_numbers
-                if quantity not in ("roll", "pitch")
-                or not re.search(_ANGLE_DERIVATIVE_PATTERN, _snake_case_name(name))
-            ],
-        )
-        for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
+    names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
+    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
+    found = {
+        quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
+        for quantity, pattern in _NAME_PATTERNS.items()
     }
     if not mixing.surfaces:
-        rotors = multicopter_reason(recording.parameters, names_in_log)
+        rotors = multicopter_reason(log.parameters, in_log)
         if rotors is not None:
-            remarks.append(
-                f"{path}: is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of "
-                "an aircraft with surfaces"
-            )
+            reason = f"is the log of a multicopter ({rotors}), which has no surfaces"
+            remarks.append(f"{path}: {reason}, allowed: a log of an aircraft with surfaces")
             return None
-        _guess_surfaces(mixing, recording, names_with_numbers)
-    missing_axes = [axis for axis in "pqr" if column_name_by_quantity[axis] is None]
-    if missing_axes or not mixing.surfaces:
-        problem = (
-            f"no column looks like the rate {missing_axes[0]}, allowed: a vehicle file that names it"
-            if missing_axes
-            else missing_commands_text(names_in_log)
-        )
-        nearest_text = nearest_names_text("rate" if missing_axes else "command", names_in_log)
-        remarks.append(f"{path}: {problem}; the log has {nearest_text}")
+        for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
+            mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
+            mixing.surfaces[_plain_name(name)] = {name: 1.0}
+    missing = [axis for axis in "pqr" if found[axis] is None]
+    if missing or not mixing.surfaces:
+        problem = missing_commands_text(in_log)
+        if missing:
+            problem = f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
+        nearest = nearest_names_text("rate" if missing else "command", in_log)
+        remarks.append(f"{path}: {problem}; the log has {nearest}")
         return None
-    return _propose_vehicle(
-        path.stem, recording, reader_name, time_column_and_unit, column_name_by_quantity, mixing
-    )
+    return _propose_vehicle(path.stem, log, reader, time, found, mixing)
 
 
 def _propose_vehicle(
     name: str,
-    recording: RecordedFlight,
-    reader_name: str,
-    time_column_and_unit: tuple[str, str] | None,
-    column_name_by_quantity: dict[str, str | None],
+    log: RecordedFlight,
+    reader: str,
+    time: tuple[str, str] | None,
+    found: dict[str, str | None],
     mixing: Mixing,
 ) -> Document:
-    columns = recording.columns
-    roll_column = columns[column_name_by_quantity["roll"]] if column_name_by_quantity["roll"] else None
-    angle_unit = (
-        _guess_angle_unit(str(column_name_by_quantity["roll"]), roll_column, reader_name)
-        if roll_column is not None
-        else "rad"
-    )
-    rate_unit = _guess_rate_unit(
-        recording,
-        [str(column_name_by_quantity[axis]) for axis in "pqr"],
-        roll_column,
-        KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
-    )
-    vehicle: Document = {"name": _as_vehicle_or_surface_name(name), "reader": reader_name}
-    if time_column_and_unit and time_column_and_unit != (TIME_COLUMN, "s"):
-        vehicle["time"] = {"column": time_column_and_unit[0], "unit": time_column_and_unit[1]}
-    vehicle["rates"] = {
-        axis: _vehicle_file_column_entry(str(column_name_by_quantity[axis]), rate_unit, "rad/s")
-        for axis in "pqr"
-    }
+    columns = log.columns
+    roll = columns[found["roll"]] if found["roll"] else None
+    angle_unit = _guess_angle_unit(str(found["roll"]), roll, reader) if roll is not None else "rad"
+    rate_unit = _guess_rate_unit(log, [str(found[axis]) for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
+    vehicle: Document = {"name": _plain_name(name), "reader": reader}
+    if time and time != (TIME_COLUMN, "s"):
+        vehicle["time"] = {"column": time[0], "unit": time[1]}
+    vehicle["rates"] = {axis: _column_entry(str(found[axis]), rate_unit, "rad/s") for axis in "pqr"}
     vehicle["commands"] = mixing.commands
     vehicle["surfaces"] = mixing.surfaces
-    column_name_by_angle = {
-        axis: column_name_by_quantity[axis] for axis in ("roll", "pitch") if column_name_by_quantity[axis]
-    }
-    if roll_column is not None:
-        vehicle["attitude"] = {
-            axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
-            for axis, name in column_name_by_angle.items()
-        }
-    if z_acceleration_column_name := column_name_by_quantity["az"]:
-        median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column_name].values)))
-        acceleration_unit = (
-            nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median_magnitude, 2.0)
-            if median_magnitude > 0.0
-            else None
-        )
-        if acceleration_unit:
-            vehicle["acceleration"] = _vehicle_file_column_entry(
-                z_acceleration_column_name, acceleration_unit, "m/s2"
-            )
-    if column_name_by_quantity["airspeed"]:
-        vehicle["airspeed"] = column_name_by_quantity["airspeed"]
+    angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
+    if roll is not None:
+        entries = {axis: _column_entry(str(name), angle_unit, "rad") for axis, name in angles.items()}
+        vehicle["attitude"] = entries
+    if az := found["az"]:
+        median = float(np.nanmedian(np.abs(columns[az].values)))
+        unit = nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0) if median > 0.0 else None
+        if unit:
+            vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
+    if found["airspeed"]:
+        vehicle["airspeed"] = found["airspeed"]
     return vehicle
 
 
-def _guess_surfaces(
-    mixing: Mixing,
-    recording: RecordedFlight,
-    names_with_numbers: Sequence[str],
-) -> None:
-    """Make a surface of each column that is known to carry a command."""
-    for name in command_names(names_with_numbers, recording.parameters)[:_MAX_PROPOSED_COMMANDS]:
-        mixing.entry_by_column[name] = _vehicle_file_command_entry(name, recording.columns[name].values)
-        mixing.surfaces[_as_vehicle_or_surface_name(name)] = {name: 1.0}
-
-
-def _read_columns_for_guess(
-    path: Path, reader_name: str, time_column_and_unit: tuple[str, str] | None
+def _read_likely(
+    path: Path, reader: str, time: tuple[str, str] | None
 ) -> tuple[RecordedFlight, list[str], Mixing]:
     """The columns of a log, of a long table its first part, that may be something; the names of all; the
     mixing by its parameters."""
-    if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS:
-        names_and_parameters = read_flight(path, reader_name, columns=())
-        all_names = list(names_and_parameters.columns)
-        mixing = mixing_of_log(reader_name, names_and_parameters.parameters, all_names)
-        names_to_read = [*_names_of_columns_to_read(all_names, None), *mixing.entry_by_column]
-        return read_flight(path, reader_name, columns=names_to_read), all_names, mixing
-    names_to_read_or_all = _names_of_columns_to_read(column_names(path)) if reader_name == "table" else None
-    recording = next(read_parts(path, reader_name, time_column_and_unit, names_to_read_or_all))
-    return recording, list(recording.columns), Mixing()
+    if reader in SELECTIVE_READERS:
+        log = read_flight(path, reader, columns=())
+        names = list(log.columns)
+        mixing = mixing_of_log(reader, log.parameters, names)
+        likely = [*_likely_columns(names, None), *mixing.entry_by_column]
+        return read_flight(path, reader, columns=likely), names, mixing
+    wanted = _likely_columns(column_names(path)) if reader == "table" else None
+    log = next(read_parts(path, reader, time, wanted))
+    return log, list(log.columns), Mixing()
 
 
-def _names_of_columns_to_read(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
+def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
     """Columns that may be something: a log with many is not read whole."""
-    pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
-    names_like_quantity_or_command = [
-        name for name in names if re.fullmatch(pattern, _snake_case_name(name)) or is_command_name(name)
-    ]
-    return names_like_quantity_or_command[:max_columns]
+    pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
+    likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
+    return likely[:max_columns]
 
 
-def _snake_case_name(column_name: str) -> str:
+def _snake_case(name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    name_with_unit_suffix = re.sub(
-        r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower()
-    )
-    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", name_with_unit_suffix).strip("_")
+    text = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
+    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
 
 
-def _shortest_matching_column_name(pattern: str, names: Sequence[str]) -> str | None:
+def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
-    matching_names = [
+    matches = [
         name
         for name in names
-        if re.fullmatch(pattern, _snake_case_name(name))
-        and not re.search(_NOT_MEASURED_NAME_PATTERN, _snake_case_name(name))
+        if re.fullmatch(pattern, _snake_case(name)) and not re.search(_DERIVED_NAME, _snake_case(name))
     ]
-    return min(matching_names, key=lambda name: (len(name), name), default=None)
+    return min(matches, key=lambda name: (len(name), name), default=None)
 
 
-def _require_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
+def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
-    table_column_names = column_names(path)
-    names_like_time = [
-        name
-        for name in table_column_names
-        if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
-    ]
-    text_phrases: list[str] = []
-    for name in sorted(names_like_time, key=lambda name: name != TIME_COLUMN):
-        first_cells = first_cells_of_column(path, name)
-        first_stamps = first_cells.numbers[name][np.isfinite(first_cells.numbers[name])]
-        if text_phrase := text_of_column_phrase(first_cells, name):
-            text_phrases.append(f"{name} holds {text_phrase.removeprefix(', but ')}")
-        median_step = float(np.median(np.diff(first_stamps[:50]))) if len(first_stamps) > 1 else 0.0
-        plausible_units = [
-            unit
-            for unit, seconds_per_unit in SECONDS_PER_TIME_UNIT.items()
-            if median_step > 0.0 and _is_log_rate_plausible(1.0 / (median_step * seconds_per_unit))
-        ]
-        if plausible_units:
-            unit = next(
-                (unit for unit in plausible_units if _snake_case_name(name).endswith(unit)),
-                plausible_units[0],
-            )
+    names = column_names(path)
+    likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
+    phrases: list[str] = []
+    for name in sorted(likely, key=lambda name: name != TIME_COLUMN):
+        cells = first_cells_of_column(path, name)
+        stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
+        if phrase := text_of_column_phrase(cells, name):
+            phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
+        step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
+        rates = {unit: 1.0 / (step * seconds) for unit, seconds in TIME_UNITS.items()} if step > 0.0 else {}
+        units = [unit for unit, rate in rates.items() if _LOG_RATES_HZ[0] <= rate <= _LOG_RATES_HZ[1]]
+        if units:
+            unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
             if (name, unit) != (TIME_COLUMN, "s"):
                 remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
-    allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
-    text_phrase = f" ({'; '.join(text_phrases)})" if text_phrases else ""
-    raise BadInput(
-        f"{path}: no column of time{text_phrase}, allowed: {allowed_text}; it has "
-        f"{nearest_names_text(TIME_COLUMN, table_column_names)}"
-    )
+    allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
+    phrase = f" ({'; '.join(phrases)})" if phrases else ""
+    nearest = nearest_names_text(TIME_COLUMN, names)
+    raise BadInput(f"{path}: no column of time{phrase}, allowed: {allowed}; it has {nearest}")
 
 
-def _is_log_rate_plausible(rate_hz: float) -> bool:
-    return _PLAUSIBLE_LOG_RATE_RANGE_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATE_RANGE_HZ[1]
-
-
-def _guess_angle_unit(column_name: str, roll_column: Column, reader_name: str) -> str:
+def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
-    if (
-        reader_name == "ardupilot"
-        or "deg" in column_name.lower()
-        or _largest_magnitude(roll_column.values) > 2.0 * np.pi
-    ):
+    if reader == "ardupilot" or "deg" in name.lower() or _largest_magnitude(roll.values) > 2.0 * np.pi:
         return "deg"
     return "rad"
 
 
 def _guess_rate_unit(
-    recording: RecordedFlight,
-    rate_column_names: list[str],
-    roll_column: Column | None,
-    rad_per_roll_unit: float,
+    log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
-    logged_rate_columns = [recording.columns[name] for name in rate_column_names]
-    if roll_column is not None:
-        roll_fit = physics.fit_roll_angle_to_rates(
-            logged_rate_columns, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
-        )
-        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
+    rates = [log.columns[name] for name in rate_names]
+    if roll is not None:
+        roll_fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
+        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (
-            unit
-            for name_part, unit in _RATE_UNIT_BY_NAME_PART.items()
-            if name_part in rate_column_names[0].lower()
-        ),
-        None,
+        (unit for name_part, unit in _UNIT_OF_PART.items() if name_part in rate_names[0].lower()), None
     )
     if unit_in_name:
         return unit_in_name
-    return (
-        "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in logged_rate_columns)
-        > _MAX_RATE_NUMBER_READ_AS_RAD_S
-        else "rad/s"
-    )
+    return "deg/s" if max(_largest_magnitude(rate.values) for rate in rates) > _LARGEST_RAD_S else "rad/s"
 
 
 def _largest_magnitude(values: Floats) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _vehicle_file_column_entry(column_name: str, unit: str, si_unit: str) -> Any:
-    return column_name if unit == si_unit else {"column": column_name, "unit": unit}
+def _column_entry(name: str, unit: str, si_unit: str) -> Any:
+    return name if unit == si_unit else {"column": name, "unit": unit}
 
 
-def _vehicle_file_command_entry(column_name: str, values: Floats) -> Any:
+def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
-    median, max_magnitude = float(np.nanmedian(values)), _largest_magnitude(values)
-    if _PWM_MEDIAN_RANGE_US[0] < median < _PWM_MEDIAN_RANGE_US[1]:
-        return {"column": column_name, "scale": 0.0025, "offset": -3.75}
-    return {"column": column_name, "unit": "%"} if 10.0 < max_magnitude <= 105.0 else column_name
+    median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
+    if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
+        return {"column": name, "scale": 0.0025, "offset": -3.75}
+    return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
 
 
-def _as_vehicle_or_surface_name(name: str) -> str:
+def _plain_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
 
 
@@ -475,15 +327,15 @@ def vehicle_file_text(vehicle: Document) -> str:
     """A vehicle file's text."""
     import yaml
 
-    header = (
+    head = (
         "# Proposed by `identify --check`. Check each line. Choose commands that come before any part\n"
         "# that can fail. A surface may follow several commands: `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
     )
     yaml_text = str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
-    return header + yaml_text + unused_keys_as_comments(vehicle)
+    return head + yaml_text + unused_keys_as_comments(vehicle)
 
 
 def as_text(findings: Document) -> str:
     """Return the findings as lines of text."""
-    usability = "can be used" if findings["usable"] else "cannot be used so"
-    return "\n".join([f"{findings['log']}: {usability}", *(f"  {line}" for line in findings["lines"])])
+    usable = "can be used" if findings["usable"] else "cannot be used so"
+    return "\n".join([f"{findings['log']}: {usable}", *(f"  {line}" for line in findings["lines"])])

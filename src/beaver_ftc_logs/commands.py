@@ -61,53 +61,37 @@ def identify(
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc.results import clear_disk_errors
     from beaver_ftc.studies.engine import write_whole
-    from beaver_ftc_logs.identification import (
-        identification_text,
-        identify,
-        scale_by_dynamic_pressure_if_better,
-    )
+    from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
-    from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
+    from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.samples import load_flights_for_fit
-    from beaver_ftc_logs.vehicle import with_false_alarm_rate
+    from beaver_ftc_logs.vehicle import with_alarm_rate
 
-    page_path = out.with_suffix(".html")
-    refuse_to_replace_foreign_file(page_path)
-    loaded_vehicle, mixing_lines = load_vehicle_for_logs(vehicle, flights, reader)
+    page = out.with_suffix(".html")
+    refuse_foreign_file(page)
+    loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader)
     if false_alarms_per_hour is not None:
-        loaded_vehicle = with_false_alarm_rate(loaded_vehicle, false_alarms_per_hour)
-    loaded_flights, loaded_vehicle = scale_by_dynamic_pressure_if_better(
-        load_flights_for_fit(flights, loaded_vehicle, reader), loaded_vehicle
-    )
-    model = identify(loaded_flights, loaded_vehicle)
-    page_html = render_identification(loaded_flights, model)
-    for path, file_text in ((out, model_file_text(model)), (page_path, page_html)):
+        loaded = with_alarm_rate(loaded, false_alarms_per_hour)
+    logs, loaded = scale_if_better(load_flights_for_fit(flights, loaded, reader), loaded)
+    model = identify(logs, loaded)
+    page_html = render_identification(logs, model)
+    for path, file_text in ((out, model_file_text(model)), (page, page_html)):
         with clear_disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, file_text.encode("utf-8"))
     document = {
         "model": str(out),
-        "page": str(page_path),
-        "mixing": mixing_lines,
+        "page": str(page),
+        "mixing": mixing,
         "identified": model.identification_results,
         "settings": model.settings.model_dump(by_alias=True),
     }
-    long_log_lines = [
-        f"  {samples.name}: {samples.notes[0]}" for samples in loaded_flights if samples.n_log_parts > 1
-    ]
+    long = [f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1]
     answer(
         format,
         document,
-        lambda: "\n".join(
-            [
-                *mixing_lines,
-                identification_text(model),
-                *long_log_lines,
-                f"model: {out}",
-                f"page: {page_path}",
-            ]
-        ),
+        lambda: "\n".join([*mixing, identification_text(model), *long, f"model: {out}", f"page: {page}"]),
     )
 
 
@@ -117,25 +101,19 @@ def _check_logs(
     from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
 
-    loaded_vehicle, mixing_lines = (
-        load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
-    )
-    if out is not None and (out.exists() or loaded_vehicle is not None):
+    loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
+    if out is not None and (out.exists() or loaded is not None):
         reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {reason}")
-    findings = [check_log(path, loaded_vehicle, reader) for path in flights]
-    guessed_vehicle = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
-    texts = [*mixing_lines, *(as_text(finding) for finding in findings)]
-    if guessed_vehicle is not None and out is not None:
-        _write_vehicle_file(out, vehicle_file_text(guessed_vehicle))
+    findings = [check_log(path, loaded, reader) for path in flights]
+    guess = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
+    texts = [*mixing, *(as_text(finding) for finding in findings)]
+    if guess is not None and out is not None:
+        _write_vehicle_file(out, vehicle_file_text(guess))
         texts.append(f"vehicle file: {out}")
-    elif guessed_vehicle is not None:
-        texts.append(vehicle_file_text(guessed_vehicle))
-    answer(
-        format,
-        {"logs": findings, "vehicle": guessed_vehicle, "mixing": mixing_lines},
-        lambda: "\n".join(texts),
-    )
+    elif guess is not None:
+        texts.append(vehicle_file_text(guess))
+    answer(format, {"logs": findings, "vehicle": guess, "mixing": mixing}, lambda: "\n".join(texts))
     if not all(finding["usable"] for finding in findings):
         raise typer.Exit(2)
 
@@ -187,12 +165,11 @@ def diagnose(options: DiagnoseOptions) -> None:
     certificate: With --aircraft: also write certificate.json and log.parquet, the proof of the alarm.
     """
     _check_options_agree(options)
-    flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:
-        _diagnose_with_aircraft_model(options)
+        _diagnose_with_aircraft(options)
         return
     if options.model is None:
-        _replay_run_logs(flights, out, format)
+        _replay_run_logs(options.flights, options.out, options.format)
         return
     from beaver_ftc_logs.detectors import check_detector_name
     from beaver_ftc_logs.findings import as_text
@@ -202,28 +179,22 @@ def diagnose(options: DiagnoseOptions) -> None:
     check_detector_name(options.detector)
     model = load_model(options.model)
     verdicts = [
-        _diagnose_flight_and_write_results(flight, model, out, options.score, options.detector)
-        for flight in stream_flights(flights, model.vehicle, options.reader)
+        _diagnose_and_write(flight, model, options.out, options.score, options.detector)
+        for flight in stream_flights(options.flights, model.vehicle, options.reader)
     ]
-    answer(
-        format,
-        {"flights": verdicts},
-        lambda: "\n".join(
-            f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
-        ),
-    )
+    texts = (f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts)
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that contradict one another."""
     if options.aircraft is None:
-        aircraft_only_options = {"--scenario": options.scenario, "--vehicle": options.vehicle}
-        aircraft_only_options |= {"--certificate": "" if options.certificate else None}
-        for option, value in aircraft_only_options.items():
+        extra = {"--scenario": options.scenario, "--vehicle": options.vehicle}
+        extra |= {"--certificate": "" if options.certificate else None}
+        for option, value in extra.items():
             if value is not None:
-                raise BadInput(
-                    f"diagnose: {f'{option} {value}'.rstrip()}: allowed: only with --aircraft NAME"
-                )
+                given = f"{option} {value}".rstrip()
+                raise BadInput(f"diagnose: {given}: allowed: only with --aircraft NAME")
         if options.model is None:
             _check_replay_options(options)
         return
@@ -236,59 +207,50 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 def _check_replay_options(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
-    given_flag_by_ignored_option = {
+    ignored = {
         "--score": options.score,
         "--detector": options.detector != "bank-of-filters",
         "--reader": options.reader is not None,
     }
-    for option, is_given in given_flag_by_ignored_option.items():
+    for option, is_given in ignored.items():
         if is_given:
             raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
 
-def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import (
-        as_text,
-        diagnose_aircraft_inputs,
-        load_aircraft_and_declared_errors,
-        read_diagnosis_inputs,
-    )
+def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
+    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_diagnosed, read_inputs
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
-    from beaver_ftc_logs.pages import write_diagnosis_with_aircraft_model
+    from beaver_ftc_logs.pages import write_aircraft_diagnosis
     from beaver_ftc_logs.readers import check_exists
-    from beaver_ftc_logs.samples import read_parts_for_vehicle
+    from beaver_ftc_logs.samples import read_vehicle_parts
     from beaver_ftc_logs.scoring import score_diagnosis
 
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    diagnosed_aircraft = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
+    given = load_diagnosed(str(options.aircraft), options.scenario)
     verdicts: list[Document] = []
     texts: list[str] = []
     for path in options.flights:
         check_exists(path)
-        n_verdicts_before = len(verdicts)
-        vehicle_path_beside_log = Path(os.path.abspath(path)).parent / "vehicle.yaml"
-        if options.vehicle is None and not vehicle_path_beside_log.is_file():
+        before = len(verdicts)
+        beside = Path(os.path.abspath(path)).parent / "vehicle.yaml"
+        if options.vehicle is None and not beside.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        vehicle_path = options.vehicle or str(vehicle_path_beside_log)
-        loaded_vehicle, mixing_lines = load_vehicle_for_logs(vehicle_path, [path], options.reader)
-        for recording in read_parts_for_vehicle(path, loaded_vehicle, options.reader):
-            aircraft_inputs = read_diagnosis_inputs(recording, loaded_vehicle, diagnosed_aircraft)
-            rows, verdict = diagnose_aircraft_inputs(aircraft_inputs, diagnosed_aircraft)
-            samples, surfaces = aircraft_inputs.samples, diagnosed_aircraft.aircraft.surfaces
+        vehicle_path = options.vehicle or str(beside)
+        loaded, mixing = load_vehicle_for_logs(vehicle_path, [path], options.reader)
+        for log in read_vehicle_parts(path, loaded, options.reader):
+            inputs = read_inputs(log, loaded, given)
+            rows, verdict = diagnose_inputs(inputs, given)
+            samples, surfaces = inputs.samples, given.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
-            certificate_writer = (
-                partial(certified.write_certificate_and_log, aircraft_inputs, rows)
-                if options.certificate
-                else None
-            )
-            folder = write_diagnosis_with_aircraft_model(
-                options.out, samples, surfaces, rows, verdict, certificate_writer
-            )
+            writer = None
+            if options.certificate:
+                writer = partial(certified.write_certificate_and_log, inputs, rows)
+            folder = write_aircraft_diagnosis(options.out, samples, surfaces, rows, verdict, writer)
             verdicts.append(verdict | {"folder": str(folder)})
-        texts += [*mixing_lines, *map(as_text, verdicts[n_verdicts_before:])]
+        texts += [*mixing, *map(as_text, verdicts[before:])]
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
 
 
@@ -296,10 +258,10 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
-    paths_of_other_logs = [path for path in flights if not is_log_of_run(path)]
-    if paths_of_other_logs:
+    others = [path for path in flights if not is_log_of_run(path)]
+    if others:
         reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
-        raise BadInput(f"diagnose: {paths_of_other_logs[0]}: {reason}")
+        raise BadInput(f"diagnose: {others[0]}: {reason}")
     replays = [replay_run_log(path) for path in flights]
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
@@ -308,16 +270,16 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _diagnose_flight_and_write_results(
-    samples: "Samples", model: "Model", out: Path, with_score: bool, detector_name: str
+def _diagnose_and_write(
+    samples: "Samples", model: "Model", out: Path, with_score: bool, detector: str
 ) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with_detector
     from beaver_ftc_logs.findings import verdict_document
     from beaver_ftc_logs.pages import write_diagnosis
     from beaver_ftc_logs.scoring import score_diagnosis
 
-    rows = diagnose_with_detector(detector_name, samples, model)
-    verdict = verdict_document(samples, model, rows) | {"detector": detector_name}
+    rows = diagnose_with_detector(detector, samples, model)
+    verdict = verdict_document(samples, model, rows) | {"detector": detector}
     if with_score:
         verdict["score"] = score_diagnosis(samples, rows, model.groups)
     folder = write_diagnosis(out, samples, model, rows, verdict)
@@ -335,9 +297,9 @@ def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Pat
         write_files(result_dir, result_files(document))
     if markdown_page is not None:
         update_page(document, markdown_page)
-        figure_path = markdown_page.parent / "images" / "recorded-flights.png"
-        if figure_path.parent.is_dir():
-            figure_path.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
+        path = markdown_page.parent / "images" / "recorded-flights.png"
+        if path.parent.is_dir():
+            path.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
     answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
 
 

@@ -1,17 +1,30 @@
 """The bank of filters: one causal pass through a flight, with all hypotheses in parallel.
 
-Under hypothesis h, with effectiveness e_h of the groups, the part of the rates unexplained by the past is
+Under hypothesis h, with effectiveness a_h of the groups, the part of the rates unexplained by the past is
 
-    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, q r R)
+    y = c + s (b + sum_g a_hg F_g) + sum_g d_g k_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
 
-with the intercept b of the model. The trim c (3,), the common gain s and the additional gain d (G,) of each
-group belong to the flight: each hypothesis estimates them with a Kalman filter. r is the running scale of the
-noise, and q the variance of a sample over that of the noise, larger after quick commands
-(`quick_response_variance_scale`). The common gain multiplies the intercept and all responses, whose sum
-vanishes in trimmed flight: it shows in the motion about trim, as the dynamic pressure does, and not in the
-trim. One hypothesis changes to another at random times (interacting multiple models [Blom1988]); the new one
-inherits trim and gains, plus an offset of the rates if a surface may be stuck. The last hypothesis is that
-nothing answers the commands, as on the ground: it estimates no trim and no gain.
+    n, H, G         samples, hypotheses, groups; N = 4 + G states
+    y, F, b         unexplained rates (n, 3), healthy responses (n, G, 3), intercept (3,), rad/s, as in
+                    `regression`
+    a, k            effectiveness (H, G), and share of a response that the group's own gain multiplies (H, G)
+    x, P            state: trim c (3,) rad/s, common gain s, gain d (G,) of each group; its covariance
+    C               what the states do to y, (N, 3)
+    p               probability of each hypothesis (H,)
+    R               covariance of the noise (3, 3), (rad/s)2; W whitens it
+    nu              degrees of freedom of the t distribution of the noise
+    r               running scale of the variance of the noise
+    q               variance of a sample over that of the noise, larger after quick commands (`quick_scale`)
+    e, S, K         residual y - C' x (3,), its covariance (3, 3), gain (N, 3)
+    d2              e' S^-1 e
+    ll              log likelihood of a sample
+
+The states belong to the flight: each hypothesis estimates them with a Kalman filter. The common gain
+multiplies the intercept and all responses, whose sum vanishes in trimmed flight: it shows in the motion about
+trim, as the dynamic pressure does, and not in the trim. One hypothesis changes to another at random times
+(interacting multiple models [Blom1988]); the new one inherits trim and gains, plus an offset of the rates if
+a surface may be stuck. The last hypothesis is that nothing answers the commands, as on the ground: it
+estimates no trim and no gain.
 
 The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
 the probabilities of the delays.
@@ -23,172 +36,113 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc_logs.bank import HypothesisBank, build_residual_noise, build_trim_and_gain_state_model
+from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import whitened_rates_and_responses
+from beaver_ftc_logs.regression import whitened_rates
 from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
 
-_MODEL_EVIDENCE_MEMORY_S = 600.0
-_MIN_HYPOTHESIS_PROBABILITY = 1e-15
-_SQUARED_RESIDUAL_CLIP_PER_AXIS = 3.0
-_RESIDUAL_SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
+_EVIDENCE_MEMORY_S = 600.0
+_MIN_PROBABILITY = 1e-15
+_SQUARE_CLIP = 3.0
+_SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
-_QUICK_RESPONSE_SPAN_S = 0.5
+_QUICK_SPAN_S = 0.5
 """A response is quick if it differs from its mean over so many seconds."""
-_MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS = 0.93
+_MEAN_SQUARE = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
-_MIN_NOISE_MODEL_PROBABILITY = 1e-3
+_MIN_NOISE_WEIGHT = 1e-3
 """Probability of a noise model below which it is left out."""
 
-BankRunResult = tuple[Floats, Floats, Floats, Floats]
+BankRun = tuple[Floats, Floats, Floats, Floats]
 """As `run_bank` returns it."""
 
 
-def hypothesis_state_and_noise_posterior(
-    samples: Samples, model: Model, bank: HypothesisBank
-) -> tuple[Floats, Floats, Floats]:
+def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tuple[Floats, Floats, Floats]:
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
 
     All are averages over the command delays of the model's settings and, if the flight is not yet whitened,
     over its noise models. The weights are their probabilities given the last minutes.
     """
     if model.noise_models and not samples.noise_ma_coefficients:
-        return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_noise_covariance = model.with_inflated_covariance_of_noise_model(samples.noise_ma_coefficients)
-    command_delay_offset_candidates_s = model.settings.command_delay_offset_candidates_s
-    bank_runs = [
-        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_covariance, bank)
-        for delay_s in command_delay_offset_candidates_s
-    ]
-    return _average_bank_runs(
-        list(_model_probabilities_with_forgetting([run[3] for run in bank_runs], model.rate_hz)), bank_runs
-    )
+        return _average_noises(samples, model, bank)
+    noisy = model.with_noise_of(samples.noise_ma_coefficients)
+    delays = model.settings.command_delays_s
+    runs = [_run_flight(_with_command_delay(samples, delay_s), noisy, bank) for delay_s in delays]
+    return _average_runs(list(_model_weights([run[3] for run in runs], model.rate_hz)), runs)
 
 
-def _posterior_averaged_over_noise_models(
-    samples: Samples, model: Model, bank: HypothesisBank
-) -> tuple[Floats, Floats, Floats]:
+def _average_noises(samples: Samples, model: Model, bank: HypothesisBank) -> tuple[Floats, Floats, Floats]:
     """The average over the noise models. The bank is run with each up to the last sample at which its weight
     is not negligible: within a second most become far less likely than another, and stay so."""
-    whitened_flights_and_models = [
-        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
-        for noise_model in model.noise_models
+    pairs = [
+        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
+        for noise in model.noise_models
     ]
-    sample_log_likelihoods_by_model = [
-        _noise_model_log_likelihood(
-            whitened_flight, model_with_one_noise_model, model_with_one_noise_model.noise_models[0]
-        )
-        for whitened_flight, model_with_one_noise_model in whitened_flights_and_models
+    ll = [_noise_likelihood(flight, one, one.noise_models[0]) for flight, one in pairs]
+    p = _model_weights(ll, model.rate_hz)
+    kept = np.where(np.asarray(p) < _MIN_NOISE_WEIGHT, 0.0, p)
+    kept /= kept.sum(axis=0)
+    counts = [int(np.flatnonzero(w).max(initial=-1)) + 1 for w in kept]
+    runs = [
+        _run_flight(first_samples(flight, n), one.with_noise_of(flight.noise_ma_coefficients), bank)
+        for (flight, one), n in zip(pairs, counts, strict=True)
+        if n
     ]
-    noise_model_probabilities = _model_probabilities_with_forgetting(
-        sample_log_likelihoods_by_model, model.rate_hz
-    )
-    kept_probabilities = np.where(
-        np.asarray(noise_model_probabilities) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, noise_model_probabilities
-    )
-    kept_probabilities /= kept_probabilities.sum(axis=0)
-    n_run_samples_by_model = [
-        int(np.flatnonzero(probability).max(initial=-1)) + 1 for probability in kept_probabilities
-    ]
-    bank_runs = [
-        _run_bank_on_flight(
-            first_samples(whitened_flight, n_samples),
-            model_with_one_noise_model.with_inflated_covariance_of_noise_model(
-                whitened_flight.noise_ma_coefficients
-            ),
-            bank,
-        )
-        for (whitened_flight, model_with_one_noise_model), n_samples in zip(
-            whitened_flights_and_models, n_run_samples_by_model, strict=True
-        )
-        if n_samples
-    ]
-    return _average_bank_runs(
-        [
-            probability
-            for probability, n_samples in zip(kept_probabilities, n_run_samples_by_model, strict=True)
-            if n_samples
-        ],
-        bank_runs,
-    )
+    return _average_runs([w for w, n in zip(kept, counts, strict=True) if n], runs)
 
 
-def _average_bank_runs(
-    weights: Sequence[Floats], bank_runs: Sequence[BankRunResult]
-) -> tuple[Floats, Floats, Floats]:
+def _average_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[Floats, Floats, Floats]:
     """Weighted average of runs; weights (n,) each. A run may be shorter than n where its weight stays 0."""
     averages: list[Floats] = []
-    for output_index in range(3):
-        shape = (len(weights[0]), *bank_runs[0][output_index].shape[1:])
-        average = np.zeros(shape)
-        for weight, bank_run in zip(weights, bank_runs, strict=True):
-            output = bank_run[output_index]
-            average[: len(output)] += weight[: len(output)].reshape(-1, *[1] * (output.ndim - 1)) * output
-        averages.append(average)
+    for i in range(3):
+        shape = (len(weights[0]), *runs[0][i].shape[1:])
+        mean = np.zeros(shape)
+        for w, run in zip(weights, runs, strict=True):
+            output = run[i]
+            mean[: len(output)] += w[: len(output)].reshape(-1, *[1] * (output.ndim - 1)) * output
+        averages.append(mean)
     return averages[0], averages[1], averages[2]
 
 
-def _noise_model_log_likelihood(whitened_flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
+def _noise_likelihood(flight: Samples, model: Model, noise: NoiseModel) -> Floats:
     """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
-    the covariance of the fit, without its inflation. The filter multiplied the samples by C(1)."""
-    is_predictable, rates_unexplained_by_past, group_responses = whitened_rates_and_responses(
-        whitened_flight, model
-    )
-    residual = np.nan_to_num(
-        rates_unexplained_by_past
-        - group_responses.sum(axis=1)
-        - model.whitened_intercept(noise_model.ma_coefficients)
-    )
-    covariance = np.array(noise_model.residual_covariance)
-    quick_variance_scale = quick_response_variance_scale(
-        np.nan_to_num(group_responses), model, noise_model.ma_coefficients
-    )
-    squared_residual = np.einsum("na,ab,nb->n", residual, np.linalg.inv(covariance), residual)
-    squared_residual /= quick_variance_scale
-    t_degrees_of_freedom = model.settings.t_degrees_of_freedom
-    log_determinant = np.linalg.slogdet(covariance)[1] + 3.0 * np.log(quick_variance_scale)
-    log_likelihood = -0.5 * (
-        (t_degrees_of_freedom + 3.0) * np.log1p(squared_residual / t_degrees_of_freedom) + log_determinant
-    ) + 3.0 * np.log(sum(noise_model.ma_coefficients))
-    return np.where(is_predictable, model.settings.effective_sample_share * log_likelihood, 0.0)
+    the covariance of the fit, without its inflation. The filter multiplied the samples by the sum of `ma`."""
+    ma = noise.ma_coefficients
+    ok, y, F = whitened_rates(flight, model)
+    e = np.nan_to_num(y - F.sum(axis=1) - model.whitened_intercept(ma))
+    R = np.array(noise.residual_covariance)
+    q = quick_scale(np.nan_to_num(F), model, ma)
+    d2 = np.einsum("na,ab,nb->n", e, np.linalg.inv(R), e) / q
+    nu = model.settings.t_degrees_of_freedom
+    log_det = np.linalg.slogdet(R)[1] + 3.0 * np.log(q)
+    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + log_det) + 3.0 * np.log(sum(ma))
+    return np.where(ok, model.settings.effective_sample_share * ll, 0.0)
 
 
-def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
+def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
     """Return the increase of the log odds of any fault by each sample, beyond that by the prior of a change,
-    (n,). Its sum is the logarithm of a likelihood ratio."""
-    fault_probability = np.clip(
-        posterior[:, bank.is_fault_hypothesis].sum(axis=1),
-        _MIN_HYPOTHESIS_PROBABILITY,
-        1.0 - _MIN_HYPOTHESIS_PROBABILITY,
-    )
-    change_from_any_hypothesis_to_fault_probability = (
-        bank.change_probability_per_sample
-        * bank.transition_share[bank.is_fault_hypothesis].sum()
-        / bank.transition_share.sum()
-    )
-    predicted_fault_probability = np.concatenate(
-        [
-            [bank.prior_probability[bank.is_fault_hypothesis].sum()],
-            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1]
-            + change_from_any_hypothesis_to_fault_probability,
-        ]
-    )
-    return np.asarray(
-        np.log(fault_probability / (1.0 - fault_probability))
-        - np.log(predicted_fault_probability / (1.0 - predicted_fault_probability))
-    )
+    (n,), from the probabilities p (n, H). Its sum is the logarithm of a likelihood ratio."""
+    is_fault = bank.is_fault_hypothesis
+    share = bank.transition_share
+    change = bank.change_probability_per_sample
+    fault = np.clip(p[:, is_fault].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
+    entry = change * share[is_fault].sum() / share.sum()
+    prior = np.append(bank.prior_probability[is_fault].sum(), (1.0 - change) * fault[:-1] + entry)
+    return np.asarray(np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior)))
 
 
 @kernel
-def page_cusum(evidence_increments, max_sum):
-    """Page's sum of evidence_increments (n,): never below zero, where it starts again, and never above
-    max_sum, (n,)."""
-    page_sum, page_sums = 0.0, np.zeros(len(evidence_increments))
-    for k in range(len(evidence_increments)):
-        page_sum = min(max(page_sum + evidence_increments[k], 0.0), max_sum)
-        page_sums[k] = page_sum
-    return page_sums
+def page_cusum(z, top):
+    """Page's sum of the evidence z (n,), never below zero, where it starts again, and never above top:
+
+    S[k] = min(max(S[k-1] + z[k], 0), top)
+    """
+    s, S = 0.0, np.zeros(len(z))
+    for k in range(len(z)):
+        s = min(max(s + z[k], 0.0), top)
+        S[k] = s
+    return S
 
 
 def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
@@ -199,454 +153,286 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """
     if delay_s == 0.0:
         return samples
-    delay_magnitude_samples, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
-    neighbouring_commands = np.vstack(
-        [commands[:1], commands[:-1]] if delay_s > 0 else [commands[1:], commands[-1:]]
-    )
-    return replace(
-        samples,
-        commands=(1.0 - delay_magnitude_samples) * commands + delay_magnitude_samples * neighbouring_commands,
-    )
+    a, u = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
+    other = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
+    return replace(samples, commands=(1.0 - a) * u + a * other)
 
 
-def _model_probabilities_with_forgetting(
-    sample_log_likelihoods_by_model: Sequence[Floats], rate_hz: float
-) -> Floats:
-    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods
+def _model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
+    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods ll
     (n,), forgotten exponentially within minutes."""
     from scipy.signal import lfilter
 
-    forgetting_factor = np.exp(-1.0 / (_MODEL_EVIDENCE_MEMORY_S * rate_hz))
-    cumulated_log_likelihoods = lfilter(
-        [1.0], [1.0, -forgetting_factor], np.array(sample_log_likelihoods_by_model), axis=1
-    )
-    relative_likelihoods = np.exp(cumulated_log_likelihoods - cumulated_log_likelihoods.max(axis=0))
-    return np.asarray(relative_likelihoods / relative_likelihoods.sum(axis=0))
+    a = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
+    sums = lfilter([1.0], [1.0, -a], np.array(ll), axis=1)
+    p = np.exp(sums - sums.max(axis=0))
+    return np.asarray(p / p.sum(axis=0))
 
 
-def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRunResult:
+def _run_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRun:
     """The result of `run_bank` for one flight."""
-    is_predictable, *rates_and_responses = whitened_rates_and_responses(samples, model)
-    rates_unexplained_by_past, group_responses = (
-        np.ascontiguousarray(np.nan_to_num(array)) for array in rates_and_responses
-    )
-    noise_parameters = build_residual_noise(model, samples.noise_ma_coefficients)
-    quick_variance_scales = quick_response_variance_scale(
-        group_responses, model, samples.noise_ma_coefficients
-    )
-    min_noise_variance_scales = np.zeros(len(is_predictable))
+    ma = samples.noise_ma_coefficients
+    ok, *rest = whitened_rates(samples, model)
+    y, F = (np.ascontiguousarray(np.nan_to_num(v)) for v in rest)
+    noise = build_noise(model, ma)
+    q = quick_scale(F, model, ma)
+    r_min = np.zeros(len(ok))
     if model.vehicle.other_laws:
-        residual = np.where(
-            is_predictable[:, None],
-            rates_unexplained_by_past - noise_parameters.intercept_rad_s - group_responses.sum(axis=1),
-            0.0,
-        ) / np.sqrt(quick_variance_scales[:, None])
-        min_noise_variance_scales = recent_noise_variance_scale(
-            residual, is_predictable, noise_parameters.covariance, model.rate_hz
-        )
-    bank_run: BankRunResult = run_bank(
-        rates_unexplained_by_past,
-        group_responses,
-        is_predictable,
-        bank,
-        build_trim_and_gain_state_model(model, samples.noise_ma_coefficients),
-        noise_parameters,
-        min_noise_variance_scales,
-        quick_variance_scales,
-    )
-    return bank_run
+        e = np.where(ok[:, None], y - noise.intercept_rad_s - F.sum(axis=1), 0.0) / np.sqrt(q[:, None])
+        r_min = recent_scale(e, ok, noise.covariance, model.rate_hz)
+    run: BankRun = run_bank(y, F, ok, bank, build_states(model, ma), noise, r_min, q)
+    return run
 
 
-def quick_response_variance_scale(
-    group_responses: Floats, model: Model, ma_coefficients: Sequence[float]
-) -> Floats:
-    """Return the variance of the residual over that of the noise, (n,): above 1 where responses (n, G, 3) are
+def quick_scale(F: Floats, model: Model, ma: Sequence[float]) -> Floats:
+    """Return the variance q of the residual over that of the noise, (n,): above 1 where the responses F are
     quicker than usual in the fit, since a share of the quick part may be missing, or be too much.
 
     Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
     noise: it has the same sign in many samples.
     """
-    power = quick_response_power(
-        group_responses, model.covariance_of_noise_model(ma_coefficients), model.rate_hz
-    )
-    unusual_power = np.maximum(power - model.usual_quick_response_power(ma_coefficients), 0.0)
-    return np.asarray(1.0 + model.settings.quick_response_error_share**2 * unusual_power)
+    power = quick_power(F, model.covariance_of_noise(ma), model.rate_hz)
+    excess = np.maximum(power - model.usual_quick_power(ma), 0.0)
+    return np.asarray(1.0 + model.settings.quick_error_share**2 * excess)
 
 
-def quick_response_power(group_responses: Floats, noise_covariance: Floats, rate_hz: float) -> Floats:
-    """Return the power of the quick part of the responses (n, G, 3) an axis, in variances of the noise, (n,).
+def quick_power(F: Floats, R: Floats, rate_hz: float) -> Floats:
+    """Return the power of the quick part of the responses F an axis, in variances of the noise, (n,).
 
     The quick part is the difference from the mean over the last half second.
     """
-    window_end_rows = np.arange(1, len(group_responses) + 1)
-    window_begin_rows = np.maximum(window_end_rows - max(round(_QUICK_RESPONSE_SPAN_S * rate_hz), 1), 0)
-    cumulated_responses = np.concatenate(
-        [np.zeros((1, *group_responses.shape[1:])), np.cumsum(group_responses, axis=0)]
-    )
-    slow_responses = (cumulated_responses[window_end_rows] - cumulated_responses[window_begin_rows]) / (
-        window_end_rows - window_begin_rows
-    )[:, None, None]
-    whitening_matrix = np.linalg.inv(np.linalg.cholesky(noise_covariance)).T
-    return np.asarray((((group_responses - slow_responses) @ whitening_matrix) ** 2).sum(axis=(1, 2)) / 3.0)
+    end = np.arange(1, len(F) + 1)
+    begin = np.maximum(end - max(round(_QUICK_SPAN_S * rate_hz), 1), 0)
+    sums = np.concatenate([np.zeros((1, *F.shape[1:])), np.cumsum(F, axis=0)])
+    slow = (sums[end] - sums[begin]) / (end - begin)[:, None, None]
+    W = np.linalg.inv(np.linalg.cholesky(R)).T
+    return np.asarray((((F - slow) @ W) ** 2).sum(axis=(1, 2)) / 3.0)
 
 
-def recent_noise_variance_scale(
-    residual: Floats, is_usable: np.ndarray, noise_covariance: Floats, rate_hz: float
-) -> Floats:
-    """Return the ratio of the variance of a flight's residual (n, 3) in the last seconds to that of the
-    fitted noise, (n,): of single samples, or of sums of several if that is larger.
+def recent_scale(e: Floats, ok: np.ndarray, R: Floats, rate_hz: float) -> Floats:
+    """Return the ratio of the variance of a flight's residual e (n, 3) in the last seconds to that of the
+    fitted noise, (n,): of single samples, or of sums of several if that is larger. ok (n,): which samples
+    count.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
-    whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(noise_covariance)).T
-    cumulated_residual = np.cumsum(np.vstack([np.zeros((1, 3)), whitened_residual]), axis=0)
-    cumulated_usable_count = np.concatenate([[0], np.cumsum(is_usable)])
-    window_end_rows = np.arange(1, len(whitened_residual) + 1)
-    max_variance_ratio = np.zeros(len(whitened_residual))
-    for span_s in _RESIDUAL_SUM_SPANS_S:
-        span_begin_rows = np.maximum(window_end_rows - max(round(span_s * rate_hz), 1), 0)
-        squared_sum_per_sample_and_axis = (
-            (cumulated_residual[window_end_rows] - cumulated_residual[span_begin_rows]) ** 2
-        ).sum(axis=1) / (
-            3.0
-            * np.maximum(cumulated_usable_count[window_end_rows] - cumulated_usable_count[span_begin_rows], 1)
-        )
-        cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum_per_sample_and_axis)])
-        window_begin_rows = np.maximum(window_end_rows - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
-        max_variance_ratio = np.maximum(
-            max_variance_ratio,
-            (cumulated_squares[window_end_rows] - cumulated_squares[window_begin_rows])
-            / (window_end_rows - window_begin_rows),
-        )
-    return max_variance_ratio
+    g = e @ np.linalg.inv(np.linalg.cholesky(R)).T
+    sums = np.cumsum(np.vstack([np.zeros((1, 3)), g]), axis=0)
+    counts = np.concatenate([[0], np.cumsum(ok)])
+    end = np.arange(1, len(g) + 1)
+    ratio = np.zeros(len(g))
+    for span_s in _SUM_SPANS_S:
+        begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
+        n = np.maximum(counts[end] - counts[begin], 1)
+        squares = ((sums[end] - sums[begin]) ** 2).sum(axis=1) / (3.0 * n)
+        total = np.concatenate([[0.0], np.cumsum(squares)])
+        start = np.maximum(end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
+        ratio = np.maximum(ratio, (total[end] - total[start]) / (end - start))
+    return ratio
 
 
 @kernel
-def run_bank(
-    rates_unexplained_by_past,
-    group_responses,
-    is_usable,
-    bank,
-    state_model,
-    noise_parameters,
-    min_noise_variance_scales,
-    quick_variance_scales,
-):
-    """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and sample_log_likelihoods
-    (n,): the log likelihood of a sample given all before it, times effective_sample_share.
+def run_bank(y, F, ok, bank, states, noise, r_min, q):
+    """Posterior probabilities (n, H), mean states (n, N), noise scale r (n,) and ll (n,): the log likelihood
+    of a sample given all before it, times effective_sample_share.
 
-    Shapes: rates_unexplained_by_past (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the
-    sample may be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise_parameters:
-    ResidualNoise (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise;
-    quick_variance_scales (n,): by `quick_response_variance_scale`.
+    ok (n,): the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise, as in
+    `bank`; r_min (n,): lower bound of the scale of the noise; q (n,).
     """
-    n_samples = len(rates_unexplained_by_past)
-    n_hypotheses = len(bank.transition_share)
-    n_states = len(state_model.initial_mean)
-    no_response_hypothesis_index = n_hypotheses - 1
-    hypothesis_probabilities = bank.prior_probability.copy()
-    state_means = np.zeros((n_hypotheses, n_states))
-    state_covariances = np.zeros((n_hypotheses, n_states, n_states))
-    state_means[:] = state_model.initial_mean
-    state_covariances[:] = state_model.initial_covariance
-    posterior = np.zeros((n_samples, n_hypotheses))
-    mean_states = np.zeros((n_samples, n_states))
-    noise_variance_scales = np.zeros(n_samples)
-    sample_log_likelihoods = np.zeros(n_samples)
-    noise_variance_scale = 1.0
-    for k in range(n_samples):
-        prior_probabilities = _mix_hypotheses(
-            hypothesis_probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
-        )
-        _relax_to_model(state_means, state_covariances, state_model)
-        state_means[no_response_hypothesis_index], state_covariances[no_response_hypothesis_index] = (
-            state_model.initial_mean,
-            state_model.initial_covariance,
-        )  # while nothing answers, nothing is learnt
-        if is_usable[k]:
-            hypothesis_probabilities, mean_clipped_squared_residual, sample_log_likelihoods[k] = (
-                _correct_hypotheses(
-                    prior_probabilities,
-                    state_means,
-                    state_covariances,
-                    rates_unexplained_by_past[k],
-                    group_responses[k],
-                    bank,
-                    noise_parameters,
-                    quick_variance_scales[k] * max(noise_variance_scale, min_noise_variance_scales[k]),
-                )
-            )
-            _limit_states(
-                state_means,
-                state_model.initial_mean - state_model.max_deviation,
-                state_model.initial_mean + state_model.max_deviation,
-            )
-            noise_variance_scale *= np.exp(
-                (1.0 - hypothesis_probabilities[no_response_hypothesis_index])
-                * (mean_clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
-                / noise_parameters.scale_memory_samples
-            )
-            noise_variance_scale = min(
-                max(noise_variance_scale, noise_parameters.min_variance_scale),
-                noise_parameters.max_variance_scale,
-            )
+    n = len(y)
+    H = len(bank.transition_share)
+    N = len(states.initial_mean)
+    last = H - 1
+    p = bank.prior_probability.copy()
+    x = np.zeros((H, N))
+    P = np.zeros((H, N, N))
+    x[:] = states.initial_mean
+    P[:] = states.initial_covariance
+    lo = states.initial_mean - states.max_deviation
+    hi = states.initial_mean + states.max_deviation
+    post = np.zeros((n, H))
+    means = np.zeros((n, N))
+    scales = np.zeros(n)
+    ll = np.zeros(n)
+    r = 1.0
+    for k in range(n):
+        prior = _mix(p, x, P, bank, states.random_walk_variance)
+        _relax(x, P, states)
+        x[last] = states.initial_mean  # while nothing answers, nothing is learnt
+        P[last] = states.initial_covariance
+        if ok[k]:
+            p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
+            for h in range(H):  # bounded, so that no hypothesis adapts to a fault
+                x[h] = np.minimum(np.maximum(x[h], lo), hi)
+            r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
+            r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
         else:
-            hypothesis_probabilities = prior_probabilities
-        posterior[k] = hypothesis_probabilities
-        noise_variance_scales[k] = noise_variance_scale
-        for h in range(n_hypotheses):
-            mean_states[k] += hypothesis_probabilities[h] * state_means[h]
-    return posterior, mean_states, noise_variance_scales, sample_log_likelihoods
+            p = prior
+        post[k] = p
+        scales[k] = r
+        for h in range(H):
+            means[k] += p[h] * x[h]
+    return post, means, scales, ll
 
 
 @kernel
-def _mix_hypotheses(hypothesis_probabilities, state_means, state_covariances, bank, random_walk_variance):
-    """Interaction of the hypotheses: each may change to any other. state_means (H, N) and state_covariances
-    (H, N, N) are replaced. Returns the prior probabilities (H,)."""
-    n_hypotheses, n_states = state_means.shape
-    stay_probability = 1.0 - bank.change_probability_per_sample
-    mixed_mean = np.zeros(n_states)
-    mixed_covariance = np.zeros((n_states, n_states))
-    for h in range(n_hypotheses):
-        mixed_mean += hypothesis_probabilities[h] * state_means[h]
-    for h in range(n_hypotheses):
-        for i in range(n_states):
-            for j in range(n_states):
-                mixed_covariance[i, j] += hypothesis_probabilities[h] * (
-                    state_covariances[h, i, j]
-                    + (state_means[h, i] - mixed_mean[i]) * (state_means[h, j] - mixed_mean[j])
-                )
-    prior_probabilities = np.empty(n_hypotheses)
-    prior_probability_sum = 0.0
-    for h in range(n_hypotheses):
-        prior_probabilities[h] = (
-            stay_probability * hypothesis_probabilities[h]
-            + bank.change_probability_per_sample * bank.transition_share[h]
-        )
-        prior_probability_sum += prior_probabilities[h]
-        _merge_gaussians_and_add_variances(
-            stay_probability * hypothesis_probabilities[h] / prior_probabilities[h],
-            state_means[h],
-            state_covariances[h],
-            mixed_mean,
-            mixed_covariance,
-            bank.rate_offset_variance[h],
-            random_walk_variance,
-        )
-    return prior_probabilities / prior_probability_sum
+def _mix(p, x, P, bank, walk):
+    """Interaction of the hypotheses: each may change to any other. x (H, N) and P (H, N, N) are replaced.
+    Returns the prior probabilities (H,):
 
-
-@kernel
-def _merge_gaussians_and_add_variances(
-    own_weight,
-    state_mean,
-    state_covariance,
-    mixed_mean,
-    mixed_covariance,
-    rate_offset_variance,
-    random_walk_variance,
-):
-    """Replace two Gaussians by one with the same moments: that of the hypothesis, with weight `own_weight`,
-    and the mixture of all hypotheses, with the rest of the weight.
-
-    state_mean (N,) and state_covariance (N, N) are replaced. The mixture gets the variance of the offset of
-    the rates, rate_offset_variance (3,), that comes with a change to this hypothesis.
+        prior_h = (1 - change) p_h + change share_h,    m, M: mean and covariance of the mixture of all
     """
-    other_weight, n_states = 1.0 - own_weight, len(state_mean)
-    for i in range(n_states):
-        for j in range(n_states):
-            deviation_product = (state_mean[i] - mixed_mean[i]) * (state_mean[j] - mixed_mean[j])
-            state_covariance[i, j] = (
-                own_weight * state_covariance[i, j]
-                + other_weight * mixed_covariance[i, j]
-                + own_weight * other_weight * deviation_product
-            )
-        state_covariance[i, i] += random_walk_variance[i]
-    for i in range(n_states):
-        state_mean[i] = own_weight * state_mean[i] + other_weight * mixed_mean[i]
-    for i in range(len(rate_offset_variance)):
-        state_covariance[i, i] += other_weight * rate_offset_variance[i]
+    H, N = x.shape
+    change = bank.change_probability_per_sample
+    share = bank.transition_share
+    stay = 1.0 - change
+    m = np.zeros(N)
+    M = np.zeros((N, N))
+    for h in range(H):
+        m += p[h] * x[h]
+    for h in range(H):
+        for i in range(N):
+            for j in range(N):
+                M[i, j] += p[h] * (P[h, i, j] + (x[h, i] - m[i]) * (x[h, j] - m[j]))
+    prior = np.empty(H)
+    total = 0.0
+    for h in range(H):
+        prior[h] = stay * p[h] + change * share[h]
+        total += prior[h]
+        _merge(stay * p[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
+    return prior / total
 
 
 @kernel
-def _relax_to_model(state_means, state_covariances, state_model):
-    """Move all trims and gains towards those of the model, by one sample. state_means (H, N) and
-    state_covariances (H, N, N) are replaced."""
-    for h in range(len(state_means)):
-        for i in range(len(state_model.deviation_retention)):
-            state_means[h, i] = state_model.initial_mean[i] + state_model.deviation_retention[i] * (
-                state_means[h, i] - state_model.initial_mean[i]
-            )
-            for j in range(len(state_model.deviation_retention)):
-                state_covariances[h, i, j] *= (
-                    state_model.deviation_retention[i] * state_model.deviation_retention[j]
-                )
+def _merge(w, x, P, m, M, offset, walk):
+    """Replace two Gaussians by one with the same moments: (x, P) of the hypothesis, with weight w, and (m, M)
+    of the mixture of all hypotheses, with weight v = 1 - w:
+
+        x <- w x + v m,    P <- w P + v (M + offset) + w v (x - m)(x - m)' + walk
+
+    x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
+    change to this hypothesis; walk (N,): variance added a sample.
+    """
+    v, N = 1.0 - w, len(x)
+    for i in range(N):
+        for j in range(N):
+            P[i, j] = w * P[i, j] + v * M[i, j] + w * v * ((x[i] - m[i]) * (x[j] - m[j]))
+        P[i, i] += walk[i]
+    for i in range(N):
+        x[i] = w * x[i] + v * m[i]
+    for i in range(len(offset)):
+        P[i, i] += v * offset[i]
 
 
 @kernel
-def _correct_hypotheses(
-    prior_probabilities,
-    state_means,
-    state_covariances,
-    rates_unexplained_by_past,
-    group_responses,
-    bank,
-    noise_parameters,
-    noise_variance_scale,
-):
-    """Kalman correction of every hypothesis by one sample; state_means and state_covariances are replaced.
+def _relax(x, P, states):
+    """Move all trims and gains towards those m of the model, by one sample, with the retention a (N,):
 
-    Returns the posterior probabilities (H,), the clipped squared residual averaged over them (in the
+    x <- m + a (x - m),    P_ij <- a_i a_j P_ij,    x (H, N) and P (H, N, N) are replaced
+    """
+    m = states.initial_mean
+    a = states.deviation_retention
+    for h in range(len(x)):
+        for i in range(len(a)):
+            x[h, i] = m[i] + a[i] * (x[h, i] - m[i])
+            for j in range(len(a)):
+                P[h, i, j] *= a[i] * a[j]
+
+
+@kernel
+def _correct(prior, x, P, y, F, bank, noise, r):
+    """Kalman correction of every hypothesis by one sample y (3,), F (G, 3); x and P are replaced. The last
+    hypothesis has no states: nothing answers.
+
+        ll_h = -((nu + 3) / 2) log(1 + d2_h / nu) - log(det S_h) / 2,      p_h ~ prior_h exp(ll_h)
+
+    r: scale of the noise. Returns the posterior probabilities (H,), the clipped d2 averaged over them (in the
     covariance without its inflation), and the log likelihood of the sample.
     """
-    n_hypotheses, n_states = state_means.shape
-    log_likelihoods = np.empty(n_hypotheses)
-    squared_residuals = np.empty(n_hypotheses)
-    zero_state_mean, zero_state_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
-    noise_covariance = noise_parameters.covariance * noise_variance_scale
-    t_degrees_of_freedom = noise_parameters.t_degrees_of_freedom
-    for h in range(n_hypotheses):
-        rate_sensitivity_by_state = _rate_sensitivity_by_state(
-            bank.effectiveness[h],
-            bank.response_share_scaled_by_group_gain[h],
-            group_responses,
-            noise_parameters.intercept_rad_s,
-            n_states,
-        )
-        if h == n_hypotheses - 1:
-            squared_residuals[h], log_determinant = _update_gaussian(
-                zero_state_mean,
-                zero_state_covariance,
-                rates_unexplained_by_past,
-                rate_sensitivity_by_state,
-                noise_covariance,
-                noise_parameters,
-            )
-        else:
-            squared_residuals[h], log_determinant = _update_gaussian(
-                state_means[h],
-                state_covariances[h],
-                rates_unexplained_by_past,
-                rate_sensitivity_by_state,
-                noise_covariance,
-                noise_parameters,
-            )
-        squared_residual_for_log_likelihood = min(squared_residuals[h], noise_parameters.max_squared_residual)
-        log_likelihoods[h] = noise_parameters.effective_sample_share * (
-            -0.5
-            * (t_degrees_of_freedom + 3.0)
-            * np.log(1.0 + squared_residual_for_log_likelihood / t_degrees_of_freedom)
-            - 0.5 * log_determinant
-        )
-    max_hypothesis_log_likelihood = log_likelihoods.max()
-    hypothesis_probabilities = np.maximum(
-        prior_probabilities * np.exp(log_likelihoods - max_hypothesis_log_likelihood),
-        _MIN_HYPOTHESIS_PROBABILITY,
-    )
-    probability_sum = hypothesis_probabilities.sum()
-    hypothesis_probabilities /= probability_sum
-    mean_clipped_squared_residual = 0.0
-    for h in range(n_hypotheses):
-        mean_clipped_squared_residual += hypothesis_probabilities[h] * min(
-            noise_parameters.covariance_inflation * squared_residuals[h],
-            3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS,
-        )
-    return (
-        hypothesis_probabilities,
-        mean_clipped_squared_residual,
-        max_hypothesis_log_likelihood + np.log(probability_sum),
-    )
+    H, N = x.shape
+    ll = np.empty(H)
+    d2 = np.empty(H)
+    none = np.zeros((N, 3))
+    R = noise.covariance * r
+    nu = noise.t_degrees_of_freedom
+    for h in range(H):
+        C = _sensitivities(bank.effectiveness[h], bank.own_gain_share[h], F, noise.intercept_rad_s, N)
+        d2[h], log_det = _update(x[h], P[h], y, none if h == H - 1 else C, R, noise)
+        log_t = -0.5 * (nu + 3.0) * np.log(1.0 + min(d2[h], noise.max_squared_residual) / nu)
+        ll[h] = noise.effective_sample_share * (log_t - 0.5 * log_det)
+    top = ll.max()
+    p = np.maximum(prior * np.exp(ll - top), _MIN_PROBABILITY)
+    total = p.sum()
+    p /= total
+    mean = 0.0
+    for h in range(H):
+        mean += p[h] * min(noise.covariance_inflation * d2[h], 3.0 * _SQUARE_CLIP)
+    return p, mean, top + np.log(total)
 
 
 @kernel
-def _rate_sensitivity_by_state(
-    effectiveness, response_share_scaled_by_group_gain, group_responses, intercept_rad_s, n_states
-):
-    """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
-    multiplies the intercept and all group_responses (G, 3) times effectiveness (G,); and to each group's own
-    gain, which multiplies the share response_share_scaled_by_group_gain (G,) of its response."""
-    rate_sensitivity_by_state = np.zeros((n_states, 3))
-    rate_sensitivity_by_state[:3] = np.eye(3)
-    rate_sensitivity_by_state[3] = intercept_rad_s
-    for g in range(len(effectiveness)):
-        rate_sensitivity_by_state[4 + g] = response_share_scaled_by_group_gain[g] * group_responses[g]
-        rate_sensitivity_by_state[3] += effectiveness[g] * group_responses[g]
-    return rate_sensitivity_by_state
+def _sensitivities(a, k, F, b, N):
+    """What the states do to the unexplained rates, C (N, 3): the trim; the common gain, which multiplies
+    b + sum_g a_g F_g; each group's own gain, which multiplies k_g F_g. a, k (G,); F (G, 3); b (3,)."""
+    C = np.zeros((N, 3))
+    C[:3] = np.eye(3)
+    C[3] = b
+    for g in range(len(a)):
+        C[4 + g] = k[g] * F[g]
+        C[3] += a[g] * F[g]
+    return C
 
 
 @kernel
-def _limit_states(state_means, min_state, max_state):
-    """Limit trim and gains of every hypothesis, so that they do not adapt to a fault."""
-    for h in range(len(state_means)):
-        state_means[h] = np.minimum(np.maximum(state_means[h], min_state), max_state)
+def _update(x, P, y, C, R, noise):
+    """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance R; both are replaced:
 
+        e = y - C' x,   D = P C,   S = R + C' D,   K = D S^-1,   x <- x + K e,   P <- P - K D'
 
-@kernel
-def _update_gaussian(
-    state_mean,
-    state_covariance,
-    rates_unexplained_by_past,
-    rate_sensitivity_by_state,
-    noise_covariance,
-    noise_parameters,
-):
-    """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by
-    rates_unexplained_by_past (3,) = rate_sensitivity_by_state' state_mean + noise, with
-    rate_sensitivity_by_state (N, 3).
-
-    Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
-    The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
+    Returns d2 and log(det S). K is reduced for a residual in the tail of the t distribution, and 0 above
+    max_squared_residual.
     """
-    n_states, t_degrees_of_freedom = len(state_mean), noise_parameters.t_degrees_of_freedom
-    cross_covariance = np.zeros((n_states, 3))
-    residual_covariance = noise_covariance.copy()
-    residual = rates_unexplained_by_past.copy()
-    for i in range(n_states):
+    N, nu = len(x), noise.t_degrees_of_freedom
+    D = np.zeros((N, 3))
+    S = R.copy()
+    e = y.copy()
+    for i in range(N):
         for j in range(3):
-            residual[j] -= state_mean[i] * rate_sensitivity_by_state[i, j]
-            for k in range(n_states):
-                cross_covariance[i, j] += state_covariance[i, k] * rate_sensitivity_by_state[k, j]
-    for i in range(n_states):
+            e[j] -= x[i] * C[i, j]
+            for k in range(N):
+                D[i, j] += P[i, k] * C[k, j]
+    for i in range(N):
         for j in range(3):
             for k in range(3):
-                residual_covariance[j, k] += rate_sensitivity_by_state[i, j] * cross_covariance[i, k]
-    inverse_residual_covariance, determinant = _invert_symmetric(residual_covariance)
-    kalman_gain = np.zeros((n_states, 3))
-    squared_residual = 0.0
+                S[j, k] += C[i, j] * D[i, k]
+    S_inv, det = _invert(S)
+    K = np.zeros((N, 3))
+    d2 = 0.0
     for j in range(3):
         for k in range(3):
-            squared_residual += residual[j] * inverse_residual_covariance[j, k] * residual[k]
-            for i in range(n_states):
-                kalman_gain[i, j] += cross_covariance[i, k] * inverse_residual_covariance[k, j]
-    kalman_gain *= (
-        min(1.0, (t_degrees_of_freedom + 3.0) / (t_degrees_of_freedom + squared_residual))
-        if squared_residual < noise_parameters.max_squared_residual
-        else 0.0
-    )
+            d2 += e[j] * S_inv[j, k] * e[k]
+            for i in range(N):
+                K[i, j] += D[i, k] * S_inv[k, j]
+    K *= min(1.0, (nu + 3.0) / (nu + d2)) if d2 < noise.max_squared_residual else 0.0
     for j in range(3):
-        for i in range(n_states):
-            state_mean[i] += kalman_gain[i, j] * residual[j]
+        for i in range(N):
+            x[i] += K[i, j] * e[j]
             # symmetric by construction: an asymmetry from rounding would grow without bound
             for k in range(i + 1):
-                state_covariance[i, k] -= kalman_gain[i, j] * cross_covariance[k, j]
-                state_covariance[k, i] = state_covariance[i, k]
-    return squared_residual, np.log(determinant)
+                P[i, k] -= K[i, j] * D[k, j]
+                P[k, i] = P[i, k]
+    return d2, np.log(det)
 
 
 @kernel
-def _invert_symmetric(matrix):
-    """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
-    adjugate = np.empty((3, 3))
+def _invert(S):
+    """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
+    A = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            next_row, previous_row = (i + 1) % 3, (i + 2) % 3
-            next_column, previous_column = (j + 1) % 3, (j + 2) % 3
-            adjugate[j, i] = (
-                matrix[next_row, next_column] * matrix[previous_row, previous_column]
-                - matrix[next_row, previous_column] * matrix[previous_row, next_column]
-            )
-    determinant = (
-        matrix[0, 0] * adjugate[0, 0] + matrix[0, 1] * adjugate[1, 0] + matrix[0, 2] * adjugate[2, 0]
-    )
-    return adjugate / determinant, determinant
+            i1, i2 = (i + 1) % 3, (i + 2) % 3
+            j1, j2 = (j + 1) % 3, (j + 2) % 3
+            A[j, i] = S[i1, j1] * S[i2, j2] - S[i1, j2] * S[i2, j1]
+    det = S[0, 0] * A[0, 0] + S[0, 1] * A[1, 0] + S[0, 2] * A[2, 0]
+    return A / det, det

@@ -1,4 +1,8 @@
-"""The whole of an identification: the fit, its tests on what it did not see, and what is said about both."""
+"""The whole of an identification: the fit, its tests on what it did not see, and what is said about both.
+
+Letters as in `fitting` and `regression`: Z and y regressors and rates of a fit, e and R its residual and the
+covariance, ma and ar the colour of the noise. V0 is the airspeed at which the commands count once, m/s.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,145 +16,109 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import (
-    power_spectral_density,
-    surface_indices_of_each_group,
-    variance_inflation_factors,
-)
+from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
-    UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S,
-    UNFITTED_NOISE_MA_CANDIDATES,
+    UNFITTED_GYROS_RAD_S,
+    UNFITTED_MA,
     Samples,
+    scale_by_airspeed,
     whiten_samples,
-    with_airspeed_scaling_and_products,
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MIN_COLLINEAR_VARIANCE_INFLATION = 10.0
-_SCORE_TITLES = {
-    "classes": "classes", "healthy_or_faulty": "healthy or faulty", "mean_error": "mean error",
-    "held_by_bounds": "held by bounds",
-}  # fmt: skip
-_DECISIVE_BIC_DIFFERENCE = 10.0
+_MIN_COLLINEAR = 10.0
+_SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
+_DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 FREE_RUN_WINDOW_S = 2.0
-_MIN_WINDOWS_AFTER_THINNING = 400
-_AIRSPEED_POWER_CANDIDATES = (0.0, 1.0, 3.0)
-_MAX_WHITENING_ROUNDS = 8
-_MAX_COMMAND_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
+_MIN_FREE_RUNS = 400
+_AIRSPEED_POWERS = (0.0, 1.0, 3.0)
+_MAX_ROUNDS = 8
+_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
-    vehicle, assumption_lines = with_assumed_law_and_air(flights, vehicle)
-    _check_command_units_alike(flights, vehicle)
-    usable_flights = fitting.flights_with_usable_rows(whiten_flights(flights, vehicle))
-    model = fitting.fit_model(usable_flights, vehicle)
-    check_explained_variance(fitting.prediction_quality_by_fold(usable_flights, model), usable_flights, model)
-    model = add_unseen_noise_models(
-        fitting.add_fitted_ranges_and_alarm_threshold(usable_flights, model), flights
-    )
-    fold_entries, credible_mass = fitting.score_folds_and_choose_credible_mass(usable_flights, model)
-    identification_results = {
-        "assumed": assumption_lines,
-        "flights": [_flight_sample_count_entry(usable_flight) for usable_flight in usable_flights],
-        "tests": fold_entries,
-        "another_day": another_day_scores_and_false_alarms(fold_entries, model),
-        "collinear": collinear_regressors(usable_flights, model),
-        "colour": median_standard_error_inflation_by_axis(usable_flights, model),
-        "spectrum": residual_to_white_density_by_band(usable_flights, model),
-        "output_error": fit_output_error(usable_flights, surface_indices_of_each_group(model)),
+    vehicle, lines = assume_law_and_air(flights, vehicle)
+    _check_units(flights, vehicle)
+    parts = fitting.fit_parts(whiten_flights(flights, vehicle))
+    model = fitting.fit_model(parts, vehicle)
+    check_explained(fitting.fold_qualities(parts, model), parts, model)
+    model = add_unseen_noise(fitting.add_ranges_and_threshold(parts, model), flights)
+    folds, mass = fitting.score_folds(parts, model)
+    results = {
+        "assumed": lines,
+        "flights": [
+            {
+                "name": part.samples.name,
+                "samples": int(part.is_usable.sum()),
+                "of": len(part.is_usable),
+                "notes": list(part.samples.notes),
+            }
+            for part in parts
+        ],
+        "tests": folds,
+        "another_day": expect_another_day(folds, model),
+        "collinear": collinear_names(parts, model),
+        "colour": median_inflation(parts, model),
+        "spectrum": density_ratios(parts, model),
+        "output_error": fit_output_error(parts, group_indices(model)),
     }
-    settings = model.settings.model_copy(update={"credible_mass": credible_mass})
-    return model.model_copy(update={"settings": settings, "identification_results": identification_results})
+    settings = model.settings.model_copy(update={"credible_mass": mass})
+    return model.model_copy(update={"settings": settings, "identification_results": results})
 
 
-def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
+def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
-    much of it, the flight itself shows (`filtering.recent_noise_variance_scale`)."""
+    much of it, the flight itself shows (`filtering.recent_scale`)."""
     if not model.noise_models:
         return model
-    known_ma_coefficients = [tuple(noise_model.ma_coefficients) for noise_model in model.noise_models]
-    max_covariance_inflation = max(noise_model.covariance_inflation for noise_model in model.noise_models)
-    quietest_covariance = min(
-        (np.array(noise_model.residual_covariance) for noise_model in model.noise_models), key=np.linalg.det
-    )
-    hidden_gain_errors = [model.hidden_gain_error_sd(known) for known in known_ma_coefficients]
-    max_hidden_gain_error_sd = np.max(hidden_gain_errors, axis=0).tolist()
-    least_usual_power = min(
-        (
-            noise_model.usual_quick_response_power
-            for noise_model in model.noise_models
-            if noise_model.usual_quick_response_power is not None
-        ),
-        default=None,
-    )
-    noise_models = list(model.noise_models)
-    for ma_coefficients in UNFITTED_NOISE_MA_CANDIDATES:
-        if ma_coefficients not in known_ma_coefficients:
-            usable_whitened_flights = fitting.flights_with_usable_rows(
-                [whiten_samples(flight, ma_coefficients) for flight in flights]
-            )
-            residuals = np.vstack(
-                [
-                    fitting.rows_and_one_step_residuals(model, usable_flight)[1]
-                    for usable_flight in usable_whitened_flights
-                ]
-            )
-            noise_models.append(
-                NoiseModel(
-                    average=list(ma_coefficients),
-                    noise=np.cov(residuals.T).tolist(),
-                    wider=max_covariance_inflation,
-                    misreads=max_hidden_gain_error_sd,
-                    quick=least_usual_power,
-                )
-            )
-    for gyro_noise_rad_s in UNFITTED_GYRO_NOISE_CANDIDATES_RAD_S:
-        ar_coefficients, residual_covariance = gyro_noise.residual_predictor_by_yule_walker(
-            model, quietest_covariance, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
-        )
-        ar_and_covariance = {"before": ar_coefficients.tolist(), "noise": residual_covariance.tolist()}
-        noise_models.append(
-            NoiseModel(
-                average=[1.0],
-                wider=max_covariance_inflation,
-                misreads=max_hidden_gain_error_sd,
-                quick=least_usual_power,
-                **ar_and_covariance,
-            )
-        )
-    return model.model_copy(update={"noise_models": noise_models})
+    known = [tuple(noise.ma_coefficients) for noise in model.noise_models]
+    quietest = min((np.array(noise.residual_covariance) for noise in model.noise_models), key=np.linalg.det)
+    powers = [noise.usual_quick_power for noise in model.noise_models if noise.usual_quick_power is not None]
+    same: dict[str, Any] = {
+        "wider": max(noise.covariance_inflation for noise in model.noise_models),
+        "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
+        "quick": min(powers, default=None),
+    }
+    models = list(model.noise_models)
+    for ma in UNFITTED_MA:
+        if ma not in known:
+            parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
+            e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+            models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
+    for gyro_sd in UNFITTED_GYROS_RAD_S:
+        ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
+        models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
+    return model.model_copy(update={"noise_models": models})
 
 
-def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
+def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
     """The vehicle with what its file leaves open of laws and air, and a line on each with the reason.
 
     A log of healthy flight shows neither which law nor which air a later flight has: both are taken to be
     others, which costs power and raises no false alarm. Labelled faults show what they do under the law that
     flies, in the air that there is.
     """
-    has_labels = any(np.isfinite(flight.labels).any() for flight in flights)
-    reason = "labels show faults under it" if has_labels else "logs of healthy flight do not tell"
-    assumption_text_of_key = {"other_laws": "other laws may fly", "moving_air": "the air may move"}
-    assumption_lines = []
-    for key, assumption_text in assumption_text_of_key.items():
+    labelled = any(np.isfinite(flight.labels).any() for flight in flights)
+    reason = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
+    texts = {"other_laws": "other laws may fly", "moving_air": "the air may move"}
+    lines = []
+    for key, text in texts.items():
         if getattr(vehicle, key) is None:
-            vehicle = vehicle.model_copy(update={key: not has_labels})
-            assumption_lines.append(
-                f"{key}: {str(not has_labels).lower()}, "
-                f"{assumption_text if not has_labels else 'as fitted'} ({reason})"
-            )
+            vehicle = vehicle.model_copy(update={key: not labelled})
+            assumed = "as fitted" if labelled else text
+            lines.append(f"{key}: {str(not labelled).lower()}, {assumed} ({reason})")
         else:
-            assumption_lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
+            lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
-        has_airspeed = any(flight.airspeed is not None for flight in flights)
-        no_airspeed_scaling_reason = "explains no more" if has_airspeed else "is not logged"
-        assumption_lines.append(f"reference_airspeed_mps: none, the airspeed {no_airspeed_scaling_reason}")
-    return vehicle, assumption_lines
+        airspeed = any(flight.airspeed is not None for flight in flights)
+        why = "explains no more" if airspeed else "is not logged"
+        lines.append(f"reference_airspeed_mps: none, the airspeed {why}")
+    return vehicle, lines
 
 
 def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
@@ -160,386 +128,218 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
     for what the surface does [Ljung1999, section 13.4].
     """
-    max_n_rate_lags = max(fitting.RATE_LAG_COUNT_CANDIDATES)
-    # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
-    whitening_lag_counts = max_n_rate_lags, max_n_rate_lags
     if not vehicle.moving_air:
         return list(flights)
-    ma_coefficients_by_flight = [
-        _choose_noise_ma_coefficients(flight, vehicle, whitening_lag_counts) for flight in flights
-    ]
-    whitened_flights = [
-        whiten_samples(flight, noise_ma_coefficients)
-        for flight, noise_ma_coefficients in zip(flights, ma_coefficients_by_flight, strict=True)
-    ]
-    for _ in range(_MAX_WHITENING_ROUNDS):
-        regressors, rates, _ = fitting.stacked_regression_data(
-            fitting.flights_with_usable_rows(whitened_flights), vehicle, *whitening_lag_counts
-        )
-        pooled_regression_coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
-        log_determinants_and_ma_coefficients = [
-            _log_determinant_and_best_ma_coefficients(
-                fitting.flights_with_usable_rows([flight]),
-                vehicle,
-                whitening_lag_counts,
-                np.asarray(pooled_regression_coefficients),
-            )
-            for flight in flights
-        ]
-        if (
-            new_ma_coefficients_by_flight := [
-                noise_ma_coefficients for _, noise_ma_coefficients in log_determinants_and_ma_coefficients
-            ]
-        ) == ma_coefficients_by_flight:
+    # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
+    order = max(fitting.RATE_LAGS), max(fitting.RATE_LAGS)
+    colours = [_choose_ma(flight, vehicle, order) for flight in flights]
+    whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, colours, strict=True)]
+    for _ in range(_MAX_ROUNDS):
+        Z, y, _ = fitting.stack_data(fitting.fit_parts(whitened), vehicle, *order)
+        C = np.linalg.lstsq(Z, y, rcond=None)[0]
+        found = [_best_ma(fitting.fit_parts([flight]), vehicle, order, np.asarray(C)) for flight in flights]
+        if (new := [ma for _, ma in found]) == colours:
             break
-        mean_log_determinant = np.mean(
-            [log_determinant for log_determinant, _ in log_determinants_and_ma_coefficients]
-        )
-        ma_coefficients_by_flight = new_ma_coefficients_by_flight
-        whitened_flights = [
-            whiten_samples(
-                flight, noise_ma_coefficients, float(np.exp((mean_log_determinant - log_determinant) / 6.0))
-            )
-            for flight, (log_determinant, noise_ma_coefficients) in zip(
-                flights, log_determinants_and_ma_coefficients, strict=True
-            )
+        mean = np.mean([log_det for log_det, _ in found])
+        colours = new
+        whitened = [
+            whiten_samples(flight, ma, float(np.exp((mean - log_det) / 6.0)))
+            for flight, (log_det, ma) in zip(flights, found, strict=True)
         ]
-    return whitened_flights
+    return whitened
 
 
-def _choose_noise_ma_coefficients(
-    flight: Samples, vehicle: Vehicle, whitening_lag_counts: tuple[int, int]
-) -> tuple[float, ...]:
+def _choose_ma(flight: Samples, vehicle: Vehicle, order: tuple[int, int]) -> tuple[float, ...]:
     """The colour of which a fit to one flight alone leaves least: the likeliest of an ARMAX model, by
     profile likelihood over the moving averages."""
 
-    def residual_log_determinant(noise_ma_coefficients: tuple[float, ...]) -> float:
-        regressors, rates, _ = fitting.stacked_regression_data(
-            fitting.flights_with_usable_rows([whiten_samples(flight, noise_ma_coefficients)]),
-            vehicle,
-            *whitening_lag_counts,
-        )
-        if len(rates) < 2:
-            raise BadInput(
-                f"identify: {flight.name}: {len(rates)} samples known to be healthy, allowed: at least 2"
-            )
-        residual = rates - regressors @ np.linalg.lstsq(regressors, rates, rcond=None)[0]
-        return float(np.linalg.slogdet(np.cov(residual.T))[1]) - 6.0 * float(
-            np.log(sum(noise_ma_coefficients))
-        )
+    def log_det(ma: tuple[float, ...]) -> float:
+        Z, y, _ = fitting.stack_data(fitting.fit_parts([whiten_samples(flight, ma)]), vehicle, *order)
+        if len(y) < 2:
+            known = f"{len(y)} samples known to be healthy"
+            raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
+        e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
+        return float(np.linalg.slogdet(np.cov(e.T))[1]) - 6.0 * float(np.log(sum(ma)))
 
-    return min(NOISE_MA_CANDIDATES, key=residual_log_determinant)
+    return min(NOISE_MA_CANDIDATES, key=log_det)
 
 
-def _log_determinant_and_best_ma_coefficients(
-    usable_flights: list[fitting.FlightWithUsableRows],
-    vehicle: Vehicle,
-    whitening_lag_counts: tuple[int, int],
-    coefficients: Floats,
+def _best_ma(
+    parts: list[fitting.FitPart], vehicle: Vehicle, order: tuple[int, int], C: Floats
 ) -> tuple[float, tuple[float, ...]]:
-    """The colour of a flight, and the log determinant of the residual that it leaves."""
+    """The colour of a flight, and the log determinant of the residual y - Z C that it leaves."""
     from scipy.signal import lfilter
 
-    regressors, rates, _ = fitting.stacked_regression_data(usable_flights, vehicle, *whitening_lag_counts)
-    residual = rates - regressors @ coefficients
-    log_determinant_by_ma = {
-        ma_coefficients: np.linalg.slogdet(np.cov(lfilter([1.0], ma_coefficients, residual, axis=0).T))[1]
-        for ma_coefficients in NOISE_MA_CANDIDATES
-    }
-    best_ma_coefficients = min(
-        log_determinant_by_ma, key=lambda ma_coefficients: float(log_determinant_by_ma[ma_coefficients])
-    )
-    return float(log_determinant_by_ma[best_ma_coefficients]) + 6.0 * float(
-        np.log(sum(best_ma_coefficients))
-    ), best_ma_coefficients
+    Z, y, _ = fitting.stack_data(parts, vehicle, *order)
+    e = y - Z @ C
+    white = {ma: lfilter([1.0], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES}
+    log_dets = {ma: np.linalg.slogdet(np.cov(g.T))[1] for ma, g in white.items()}
+    best = min(log_dets, key=lambda ma: float(log_dets[ma]))
+    return float(log_dets[best]) + 6.0 * float(np.log(sum(best))), best
 
 
-def another_day_scores_and_false_alarms(fold_entries: list[Document], model: Model) -> Document:
+def expect_another_day(folds: list[Document], model: Model) -> Document:
     """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
     merit, false alarms an hour and how sure that is, and how many minutes would show it."""
-    scores = [fold_entry["score"] for fold_entry in fold_entries if "score" in fold_entry]
-    fold_values_by_score_key = {
-        key: [fold_score[key] for fold_score in scores] for key in _SCORE_TITLES if scores
+    scores = [fold["score"] for fold in folds if "score" in fold]
+    values = {key: [score[key] for score in scores] for key in _SCORES if scores}
+    expected: Document = {
+        key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
+        for key, each in values.items()
     }
-    expected_performance: Document = {
-        key: {
-            "mean": float(np.mean(fold_values)),
-            "worst": float((max if key == "mean_error" else min)(fold_values)),
-        }
-        for key, fold_values in fold_values_by_score_key.items()
-    }
-    fitted_ranges, settings = model.fitted_ranges, model.settings
-    if fitted_ranges is None or fitted_ranges.alarm_peak_tail is None or settings.alarm_threshold is None:
-        return expected_performance
-    target_false_alarms_per_hour = settings.false_alarms_per_hour or 0.0
-    return expected_performance | {
-        "false_alarms_per_hour": {
-            "asked": target_false_alarms_per_hour,
-            **asdict(
-                extremes.expected_false_alarms_per_hour(
-                    fitted_ranges.alarm_peak_tail, settings.alarm_threshold
-                )
-            ),
-        },
-        "minutes_left_out": fitted_ranges.alarm_peak_tail.healthy_minutes,
-        "minutes_missing": extremes.missing_healthy_minutes(
-            fitted_ranges.alarm_peak_tail, target_false_alarms_per_hour
-        ),
+    tail = model.fitted_ranges.alarm_peak_tail if model.fitted_ranges is not None else None
+    threshold = model.settings.alarm_threshold
+    if tail is None or threshold is None:
+        return expected
+    target = model.settings.false_alarms_per_hour or 0.0
+    return expected | {
+        "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
+        "minutes_left_out": tail.healthy_minutes,
+        "minutes_missing": extremes.missing_healthy_minutes(tail, target),
         **model.identification_results,
     }
 
 
-def scale_by_dynamic_pressure_if_better(
-    flights: Sequence[Samples], vehicle: Vehicle
-) -> tuple[Sequence[Samples], Vehicle]:
+def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
     known and this explains more; else both as they are."""
-    none_by_unset_vehicle_key = {
-        key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None
-    }
-    scaled_flights, scaled_vehicle = _scale_flights_and_vehicle_if_better(
-        flights, with_assumed_law_and_air(flights, vehicle)[0] if none_by_unset_vehicle_key else vehicle
-    )
-    return scaled_flights, scaled_vehicle.model_copy(
-        update=none_by_unset_vehicle_key
-    ) if none_by_unset_vehicle_key else scaled_vehicle
+    unset = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
+    scaled, other = _scale_flights(flights, assume_law_and_air(flights, vehicle)[0] if unset else vehicle)
+    return scaled, other.model_copy(update=unset) if unset else other
 
 
-def _scale_flights_and_vehicle_if_better(
-    flights: Sequence[Samples], vehicle: Vehicle
-) -> tuple[Sequence[Samples], Vehicle]:
-    airspeeds_by_flight = [
-        flight.airspeed[np.isfinite(flight.airspeed)] for flight in flights if flight.airspeed is not None
-    ]
-    known_airspeeds_mps = np.concatenate(airspeeds_by_flight) if airspeeds_by_flight else np.empty(0)
-    reference_airspeed_mps = float(np.median(known_airspeeds_mps)) if known_airspeeds_mps.size else 0.0
-    if vehicle.reference_airspeed_mps is not None or reference_airspeed_mps <= 0.0:
+def _scale_flights(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
+    known = [flight.airspeed for flight in flights if flight.airspeed is not None]
+    V = np.concatenate([np.empty(0), *known])
+    V = V[np.isfinite(V)]
+    V0 = float(np.median(V)) if V.size else 0.0
+    if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:
         return flights, vehicle
-    scaled_flights = [
-        with_airspeed_scaling_and_products(flight, reference_airspeed_mps, vehicle.surface_airspeed_powers)
-        for flight in flights
-    ]
-    scaled_vehicle = vehicle.model_copy(update={"reference_airspeed_mps": reference_airspeed_mps})
-    if _min_bic(flights, vehicle) - _min_bic(scaled_flights, scaled_vehicle) < _DECISIVE_BIC_DIFFERENCE:
+    other = vehicle.model_copy(update={"reference_airspeed_mps": V0})
+    scaled = _scaled(flights, other)
+    if _min_bic(flights, vehicle) - _min_bic(scaled, other) < _DECISIVE_BIC:
         return flights, vehicle
-    return (
-        _scale_by_best_airspeed_powers(flights, scaled_vehicle)
-        if vehicle.other_laws
-        else (scaled_flights, scaled_vehicle)
-    )
+    return _scale_powers(flights, other) if vehicle.other_laws else (scaled, other)
+
+
+def _scaled(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
+    """Flights with commands times the airspeed over V0 to the power of each surface."""
+    V0 = vehicle.reference_airspeed_mps or 0.0
+    powers = vehicle.surface_airspeed_powers
+    return [scale_by_airspeed(flight, V0, powers) for flight in flights]
 
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     """The least Bayesian information criterion of any order."""
-    return min(fitting.bic_by_order(fitting.flights_with_usable_rows(flights), vehicle).values())
+    return min(fitting.bic_by_order(fitting.fit_parts(flights), vehicle).values())
 
 
-def _scale_by_best_airspeed_powers(
-    flights: Sequence[Samples], vehicle: Vehicle
-) -> tuple[list[Samples], Vehicle]:
+def _scale_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
     """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
     linkages change the square. Another than that must explain decisively more."""
+    # a criterion believes each sample, as only white noise lets it
+    whitened = whiten_flights(_scaled(flights, vehicle), vehicle)
 
-    scaled_flights = [
-        with_airspeed_scaling_and_products(
-            flight, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
-        )
-        for flight in flights
-    ]
-    whitened_flights = whiten_flights(
-        scaled_flights, vehicle
-    )  # a criterion believes each sample, as only white noise lets it
+    def bic_of(other: Vehicle) -> float:
+        scaled = _scaled(flights, other)
+        if vehicle.moving_air:
+            scaled = [
+                whiten_samples(flight, white.noise_ma_coefficients, white.fit_weight)
+                for flight, white in zip(scaled, whitened, strict=True)
+            ]
+        return _min_bic(scaled, other)
 
-    def scale_and_optionally_whiten_flights(
-        scaled_vehicle: Vehicle, whitens_if_air_moves: bool = True
-    ) -> list[Samples]:
-        rescaled_flights = [
-            with_airspeed_scaling_and_products(
-                flight, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
-            )
-            for flight in flights
-        ]
-        if not (whitens_if_air_moves and vehicle.moving_air):
-            return rescaled_flights
-        return [
-            whiten_samples(rescaled_flight, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
-            for rescaled_flight, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
-        ]
-
-    bic_to_beat = _min_bic(scale_and_optionally_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE
-    surface_names = list(vehicle.surfaces)
-    for surface_indices in regression.group_surfaces_by_commands(vehicle):
-        for airspeed_power in _AIRSPEED_POWER_CANDIDATES:
-            candidate_power_by_surface = vehicle.airspeed_powers | {
-                surface_names[i]: airspeed_power for i in surface_indices
-            }
-            candidate_vehicle = vehicle.model_copy(update={"airspeed_powers": candidate_power_by_surface})
-            if (
-                bic := _min_bic(scale_and_optionally_whiten_flights(candidate_vehicle), candidate_vehicle)
-            ) < bic_to_beat:
-                bic_to_beat, vehicle = bic, candidate_vehicle
-    return scale_and_optionally_whiten_flights(vehicle, whitens_if_air_moves=False), vehicle
+    least = bic_of(vehicle) - _DECISIVE_BIC
+    names = list(vehicle.surfaces)
+    for group in regression.group_surfaces(vehicle):
+        for power in _AIRSPEED_POWERS:
+            powers = vehicle.airspeed_powers | {names[i]: power for i in group}
+            candidate = vehicle.model_copy(update={"airspeed_powers": powers})
+            if (bic := bic_of(candidate)) < least:
+                least, vehicle = bic, candidate
+    return _scaled(flights, vehicle), vehicle
 
 
-def check_explained_variance(
-    fold_entries: list[Document], usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
-) -> None:
+def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], model: Model) -> None:
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
-    entries_with_samples = [fold_entry for fold_entry in fold_entries if fold_entry["samples"]]
-    sample_counts = [fold_entry["samples"] for fold_entry in entries_with_samples]
-    explained_shares_by_axis = {
-        axis: [fold_entry["explained"][axis] for fold_entry in entries_with_samples] for axis in "pqr"
-    }
-    mean_explained_share_by_axis = {
-        axis: float(np.average(fold_values, weights=sample_counts))
-        for axis, fold_values in explained_shares_by_axis.items()
-        if entries_with_samples
-    }
-    if explained_share_by_unexplained_axis := {
-        axis: explained_share
-        for axis, explained_share in mean_explained_share_by_axis.items()
-        if explained_share <= 0.0
-    }:
-        usable_minutes = (
-            sum(
-                int(usable_flight.is_usable.sum()) * usable_flight.samples.dt_s
-                for usable_flight in usable_flights
-            )
-            / 60.0
-        )
-        stillest_surface_and_sd = min(
-            _command_sd_by_surface(usable_flights, model).items(), key=lambda pair: pair[1]
-        )
+    known = [fold for fold in folds if fold["samples"]]
+    counts = [fold["samples"] for fold in known]
+    shares = {axis: [fold["explained"][axis] for fold in known] for axis in "pqr"}
+    means = {axis: float(np.average(values, weights=counts)) for axis, values in shares.items() if known}
+    if unexplained := {axis: share for axis, share in means.items() if share <= 0.0}:
+        minutes = sum(int(part.is_usable.sum()) * part.samples.dt_s for part in parts) / 60.0
+        stillest = min(_command_sds(parts, model).items(), key=lambda pair: pair[1])
         raise BadInput(
-            "identify: on parts it was not fitted on the model explains less of "
-            f"{', '.join(explained_share_by_unexplained_axis)} than the "
-            f"mean does ({_values_by_axis_text(explained_share_by_unexplained_axis)}), allowed: a model that "
-            "explains more; what would "
-            f"help: more than these {usable_minutes:.1f} min, commands that move more "
-            f"({stillest_surface_and_sd[0]} has a standard "
-            f"deviation of {stillest_surface_and_sd[1]:.2g}), or the commands that this vehicle follows"
-            f"{_rate_mistakes_text(usable_flights, model)}"
+            f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
+            f"than the mean does ({_axis_text(unexplained)}), allowed: a model that explains more; what "
+            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest[0]} has a "
+            f"standard deviation of {stillest[1]:.2g}), or the commands that this vehicle follows"
+            f"{_mistakes_text(parts, model)}"
         )
 
 
-def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> None:
+def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     """Raise BadInput where a flight's command is in another unit than that of the first."""
-    first_flight_ranges = FittedRanges(
-        commands=trust.central_ranges(flights[0].commands), rates=trust.central_ranges(flights[0].rates)
-    )
+    commands, rates = trust.central_ranges(flights[0].commands), trust.central_ranges(flights[0].rates)
+    first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
-        trust.refuse_commands_in_other_unit(
-            flight.name, flight.commands, flight.rates, first_flight_ranges, list(vehicle.surfaces)
-        )
+        trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
 
-def _rate_mistakes_text(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> str:
+def _mistakes_text(parts: Sequence[fitting.FitPart], model: Model) -> str:
     """Return the mistakes found in the rates when the log was read, each after a semicolon."""
-    rate_column_prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
-    notes = [
-        note
-        for usable_flight in usable_flights
-        for note in usable_flight.samples.notes
-        if note.startswith(rate_column_prefixes)
-    ]
+    prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
+    notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
     return "".join(f"; {note}" for note in notes)
 
 
-def _command_sd_by_surface(
-    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
-) -> dict[str, float]:
+def _command_sds(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """Standard deviation of each surface's command."""
-    commands = np.vstack(
-        [usable_flight.samples.commands[usable_flight.is_usable] for usable_flight in usable_flights]
-    )
+    commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
     return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
-def _flight_sample_count_entry(usable_flight: fitting.FlightWithUsableRows) -> Document:
-    samples, is_usable = usable_flight.samples, usable_flight.is_usable
-    return {
-        "name": samples.name,
-        "samples": int(is_usable.sum()),
-        "of": len(is_usable),
-        "notes": list(samples.notes),
-    }
-
-
-def collinear_regressors(
-    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
-) -> list[Document]:
+def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    regressors, _, _ = fitting.stacked_regression_data(
-        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
-    )
-    inflation_factors = variance_inflation_factors(regressors[:, 1:])
-    names_and_inflation_factors = sorted(
-        zip(regressor_names(model), inflation_factors.tolist(), strict=True), key=lambda pair: -pair[1]
-    )
-    collinear_names_and_factors = [
-        (name, inflation_factor if isfinite(inflation_factor) else None)
-        for name, inflation_factor in names_and_inflation_factors
-        if inflation_factor > _MIN_COLLINEAR_VARIANCE_INFLATION
-    ]
+    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    factors = variance_inflation(Z[:, 1:])
+    pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     return [
-        {"regressor": name, "inflation": inflation_factor}
-        for name, inflation_factor in collinear_names_and_factors
+        {"regressor": name, "inflation": factor if isfinite(factor) else None}
+        for name, factor in pairs
+        if factor > _MIN_COLLINEAR
     ]
 
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    lagged_rate_names = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
-    signal_lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
-    lagged_signal_names = [
-        f"{name}[-{k}]" for k in signal_lags for name in model.vehicle.signal_regressor_names
-    ]
-    command_lags, group_names = range(1, model.n_command_lags + 1), map("+".join, model.groups)
-    return (
-        lagged_rate_names
-        + lagged_signal_names
-        + [f"command of {group}[-{k}]" for group in group_names for k in command_lags]
-    )
+    rates = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
+    lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
+    signals = [f"{name}[-{k}]" for k in lags for name in model.vehicle.regressor_columns]
+    lags = range(1, model.n_command_lags + 1)
+    return rates + signals + [f"command of {'+'.join(group)}[-{k}]" for group in model.groups for k in lags]
 
 
-def median_standard_error_inflation_by_axis(
-    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
-) -> dict[str, float]:
+def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    rate_regression = fitting.fit_least_squares_of_order(
-        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
-    )
-    first_command_row = (
-        len(rate_regression.standard_error_inflation) - len(model.groups) * model.n_command_lags
-    )
-    return dict(
-        zip(
-            "pqr",
-            np.median(rate_regression.standard_error_inflation[first_command_row:], axis=0).tolist(),
-            strict=True,
-        )
-    )
+    fit = fitting.fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    first = len(fit.standard_error_inflation) - len(model.groups) * model.n_command_lags
+    return dict(zip("pqr", np.median(fit.standard_error_inflation[first:], axis=0).tolist(), strict=True))
 
 
-def residual_to_white_density_by_band(
-    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
-) -> list[Document]:
+def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    residual = np.vstack(
-        [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
-    )
-    frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
-    white_density = residual.var(axis=0) / (0.5 * model.rate_hz)
-    band_density_ratio_records = []
-    for low_hz, high_hz in _SPECTRUM_BANDS_HZ:
-        is_in_band = (frequency_hz > low_hz) & (frequency_hz <= high_hz)
-        if is_in_band.any():
-            density_ratio = (density[is_in_band].mean(axis=0) / white_density).tolist()
-            band_density_ratio_records.append(
-                {"from_hz": low_hz, "to_hz": high_hz, **dict(zip("pqr", density_ratio, strict=True))}
-            )
-    return band_density_ratio_records
+    e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+    f, density = spectral_density(e, 1.0 / model.rate_hz)
+    white = e.var(axis=0) / (0.5 * model.rate_hz)
+    bands = []
+    for lo, hi in _SPECTRUM_BANDS_HZ:
+        inside = (f > lo) & (f <= hi)
+        if inside.any():
+            ratio = (density[inside].mean(axis=0) / white).tolist()
+            bands.append({"from_hz": lo, "to_hz": hi, **dict(zip("pqr", ratio, strict=True))})
+    return bands
 
 
 def identification_text(model: Model) -> str:
@@ -552,253 +352,188 @@ def identification_text(model: Model) -> str:
         f"past samples of the rates: {model.n_rate_lags}, of the commands: {model.n_command_lags}",
         *(f"  {line}" for line in results.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
-        *_dynamic_pressure_sentences(model),
-        *dict.fromkeys(
-            f"  noise of the colour {_ma_coefficients_text(noise_model)}: "
-            f"{noise_model.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
-            "differ, and other laws may"
-            for noise_model in model.noise_models
-        ),
-        *(f"  {line}" for line in trust.unknown_effect_sentences(model)),
+        *_pressure_lines(model),
+        *dict.fromkeys(map(_noise_text, model.noise_models)),
+        *(f"  {line}" for line in trust.unknown_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
-        *map(_left_out_test_text, results["tests"]),
-        *_another_day_sentences(results["another_day"], len(results["flights"])),
-        f"  the residual's colour widens standard errors by {_values_by_axis_text(results['colour'])}",
+        *map(_fold_text, results["tests"]),
+        *_day_lines(results["another_day"], len(results["flights"])),
+        f"  the residual's colour widens standard errors by {_axis_text(results['colour'])}",
     ]
-    output_error = results["output_error"]
-    if "delay_s" in output_error:
-        lines.append(
-            f"  output error: servo lag {_servo_lag_or_too_short_text(output_error)}, delay "
-            f"{output_error['delay_s']:.3f} s (sd {output_error['delay_sd_s']:.3f}), explains "
-            "of 2 s free runs not fitted "
-            f"{_values_by_axis_text(output_error['explained_of_windows_not_fitted'])}"
-        )
+    output = results["output_error"]
+    if "delay_s" in output:
+        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
+        explained = _axis_text(output["explained_of_windows_not_fitted"])
+        lag = f"servo lag {_servo_text(output)}"
+        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
     if results["collinear"]:
-        most_collinear_entry, n_collinear = results["collinear"][0], len(results["collinear"])
-        lines.append(
-            f"  {n_collinear} {'regressors are' if n_collinear > 1 else 'regressor is'} "
-            "collinear (variance inflated over "
-            f"{_MIN_COLLINEAR_VARIANCE_INFLATION:g} times), most {most_collinear_entry['regressor']} "
-            f"({_inflation_factor_text(most_collinear_entry['inflation'])})"
-        )
+        most, n = results["collinear"][0], len(results["collinear"])
+        are = "regressors are" if n > 1 else "regressor is"
+        factor = most["inflation"]
+        times = "made up by the others" if factor is None else f"{factor:.0f} times"
+        inflated = f"variance inflated over {_MIN_COLLINEAR:g} times"
+        lines.append(f"  {n} {are} collinear ({inflated}), most {most['regressor']} ({times})")
     return "\n".join(lines)
 
 
-def _ma_coefficients_text(noise_model: NoiseModel) -> str:
-    return ", ".join(f"{coefficient:.3g}" for coefficient in noise_model.ma_coefficients)
-
-
-def _another_day_sentences(expected_performance: Document, n_flights: int) -> list[str]:
-    """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
-    left_out_unit_text = (
-        "another day, each left out in turn"
-        if n_flights > 1
-        else "another half of this day, not of another day"
+def _noise_text(noise: NoiseModel) -> str:
+    colour = ", ".join(f"{c:.3g}" for c in noise.ma_coefficients)
+    return (
+        f"  noise of the colour {colour}: {noise.covariance_inflation:.2g} times as wide, in squares, as "
+        "gains of 10 s left out differ, and other laws may"
     )
+
+
+def _day_lines(expected: Document, n_flights: int) -> list[str]:
+    """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
+    unit = "another half of this day, not of another day"
+    if n_flights > 1:
+        unit = "another day, each left out in turn"
     lines = []
-    if "classes" in expected_performance:
-        mean_and_worst_score_texts = [
-            f"{title} {expected_performance[key]['mean']:.3f} ({expected_performance[key]['worst']:.3f})"
-            for key, title in _SCORE_TITLES.items()
+    if "classes" in expected:
+        scores = [
+            f"{key.replace('_', ' ')} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
+            for key in _SCORES
         ]
+        lines.append(f"  expect of {unit}, mean (worst): {', '.join(scores)}")
+    if "false_alarms_per_hour" in expected:
+        alarms = expected["false_alarms_per_hour"]
+        missing = expected["minutes_missing"]
         lines.append(
-            f"  expect of {left_out_unit_text}, mean (worst): {', '.join(mean_and_worst_score_texts)}"
+            f"  false alarms: {alarms['asked']:g} an hour asked for, "
+            f"{alarms['low']:.2g} to {alarms['high']:.2g} at 90 %, "
+            f"by {expected['minutes_left_out']:.1f} min of health left out"
         )
-    if "false_alarms_per_hour" in expected_performance:
-        false_alarm_entry = expected_performance["false_alarms_per_hour"]
-        missing_minutes = expected_performance["minutes_missing"]
-        lines.append(
-            f"  false alarms: {false_alarm_entry['asked']:g} an hour asked for, "
-            f"{false_alarm_entry['low']:.2g} to {false_alarm_entry['high']:.2g} at 90 %, "
-            f"by {expected_performance['minutes_left_out']:.1f} min of health left out"
-        )
-        if missing_minutes:
-            lines.append(
-                f"  to show this rate without a fitted tail {missing_minutes:.0f} min of health are missing"
-            )
-        if expected_performance.get("parts"):
-            alarmed_text = (
-                f"{expected_performance['alarmed']} of {expected_performance['parts']} parts left out alarm"
-            )
-            lines.append(f"  at the threshold of the others {alarmed_text}")
+        if missing:
+            lines.append(f"  to show this rate without a fitted tail {missing:.0f} min of health are missing")
+        if expected.get("parts"):
+            alarmed = f"{expected['alarmed']} of {expected['parts']} parts left out alarm"
+            lines.append(f"  at the threshold of the others {alarmed}")
     return lines
 
 
-def _dynamic_pressure_sentences(model: Model) -> list[str]:
-    if (reference_airspeed_mps := model.vehicle.reference_airspeed_mps) is None:
+def _pressure_lines(model: Model) -> list[str]:
+    if (V0 := model.vehicle.reference_airspeed_mps) is None:
         return []
-    powers_text = "".join(
+    powers = "".join(
         f", {surface} with airspeed^{power:g}"
         for surface, power in model.vehicle.airspeed_powers.items()
         if power != 2
     )
-    return [f"  surfaces work with the dynamic pressure, 1 at {reference_airspeed_mps:.4g} m/s{powers_text}"]
+    return [f"  surfaces work with the dynamic pressure, 1 at {V0:.4g} m/s{powers}"]
 
 
-def _left_out_test_text(fold_entry: Document) -> str:
-    if not fold_entry["samples"]:
-        return f"  without {fold_entry['left_out']}: nothing in it is known"
-    line = (
-        f"  without {fold_entry['left_out']}: explains {_values_by_axis_text(fold_entry['explained'])} of it"
-    )
-    if "score" not in fold_entry:
+def _fold_text(fold: Document) -> str:
+    if not fold["samples"]:
+        return f"  without {fold['left_out']}: nothing in it is known"
+    line = f"  without {fold['left_out']}: explains {_axis_text(fold['explained'])} of it"
+    if "score" not in fold:
         return line
-    scores = fold_entry["score"]
+    scores = fold["score"]
     return (
         f"{line}; {len(scores['settings'])} classes {scores['classes']:.3f}, healthy or faulty "
         f"{scores['healthy_or_faulty']:.3f}, side {scores['side']:.3f}, mean error {scores['mean_error']:.3f}"
     )
 
 
-def _servo_lag_or_too_short_text(output_error_fit: Document) -> str:
-    if output_error_fit["shorter_than_can_be_told"]:
+def _servo_text(fit: Document) -> str:
+    if fit["shorter_than_can_be_told"]:
         return "shorter than this rate can tell"
-    return f"{output_error_fit['servo_lag_s']:.3f} s (sd {output_error_fit['servo_lag_sd_s']:.3f})"
+    return f"{fit['servo_lag_s']:.3f} s (sd {fit['servo_lag_sd_s']:.3f})"
 
 
-def _inflation_factor_text(inflation_factor: float | None) -> str:
-    return "made up by the others" if inflation_factor is None else f"{inflation_factor:.0f} times"
-
-
-def _values_by_axis_text(values: dict[str, float]) -> str:
+def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def fit_output_error(
-    usable_flights: Sequence[fitting.FlightWithUsableRows], surface_groups: list[list[int]]
-) -> dict[str, Any]:
+def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance explained over free-running windows not fitted, an axis."""
+    and the share of the rates' variance explained over free-running windows not fitted, an axis.
+
+    th: parameters, as in `_simulate`; P: inverse of their information.
+    """
     from scipy.optimize import least_squares
 
-    dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
-    window_commands, window_rates = _cut_free_run_windows(
-        usable_flights,
-        surface_groups,
-        round(FREE_RUN_WINDOW_S / dt_s),
-        round(_MAX_COMMAND_DELAY_S / dt_s) + 1,
-    )
-    if len(window_rates) < 20 or not np.ptp(window_rates, axis=(0, 1)).all():
-        return {"windows": len(window_rates), "says": "too few gap-free windows in which every rate moves"}
-    fitted_window_slice, held_out_window_slice = slice(0, None, 2), slice(1, None, 2)
-    rate_sd = window_rates.std(axis=(0, 1))
-    initial_parameters, min_parameters, max_parameters = _output_error_fixed_guess_and_bounds(
-        len(surface_groups), dt_s
-    )
+    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
+    if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
+        return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
+    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
+    sd = y.std(axis=(0, 1))
+    guess, lower, upper = _guess_and_bounds(len(groups), dt_s)
 
-    def standardized_simulation_error(parameters: Floats, window_slice: slice) -> Floats:
-        simulated_rates = _simulate_free_runs(
-            parameters, window_commands[window_slice], window_rates[window_slice], dt_s
-        )
-        return ((simulated_rates - window_rates[window_slice]) / rate_sd).ravel()
+    def error(th: Floats, rows: slice) -> Floats:
+        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
 
-    optimum = least_squares(
-        standardized_simulation_error,
-        initial_parameters,
-        bounds=(min_parameters, max_parameters),
-        args=(fitted_window_slice,),
-        loss="soft_l1",
-        max_nfev=40,
-    )
-    inverse_information = np.linalg.pinv(optimum.jac.T @ optimum.jac)
-    standard_errors = np.sqrt(
-        np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
-    )
-    held_out_simulation_errors_rad_s = (
-        standardized_simulation_error(optimum.x, held_out_window_slice).reshape(-1, 3) * rate_sd
-    )
-    explained_rate_variance_share = 1.0 - held_out_simulation_errors_rad_s.var(axis=0) / window_rates[
-        held_out_window_slice
-    ].reshape(-1, 3).var(axis=0)
+    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
+    P = np.linalg.pinv(found.jac.T @ found.jac)
+    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
+    e = error(found.x, held_out).reshape(-1, 3) * sd
+    explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
     return {
-        "windows": len(window_rates),
-        "servo_lag_s": float(optimum.x[0]),
-        "servo_lag_sd_s": float(standard_errors[0]),
-        "delay_s": float(optimum.x[1]),
-        "delay_sd_s": float(standard_errors[1]),
-        "shorter_than_can_be_told": bool(optimum.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": dict(
-            zip("pqr", explained_rate_variance_share.tolist(), strict=True)
-        ),
+        "windows": len(y),
+        "servo_lag_s": float(found.x[0]),
+        "servo_lag_sd_s": float(errors[0]),
+        "delay_s": float(found.x[1]),
+        "delay_sd_s": float(errors[1]),
+        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
+        "explained_of_windows_not_fitted": dict(zip("pqr", explained.tolist(), strict=True)),
     }
 
 
-def _cut_free_run_windows(
-    usable_flights: Sequence[fitting.FlightWithUsableRows],
-    surface_groups: list[list[int]],
-    window_samples: int,
-    n_past_samples: int,
+def _cut_windows(
+    parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
 ) -> tuple[Floats, Floats]:
-    """Commands (W, n_past_samples + window_samples, G) with their past, scaled by labels, and rates (W,
-    window_samples, 3)."""
-    window_commands, window_rates = [], []
-    for usable_flight in usable_flights:
-        samples = usable_flight.samples
-        effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        effective_group_commands = np.column_stack(
-            [
-                (samples.commands * effectiveness)[:, surface_indices].sum(axis=1)
-                for surface_indices in surface_groups
-            ]
-        )
-        is_usable = (
-            usable_flight.is_usable
-            & np.isfinite(effective_group_commands).all(axis=1)
-            & np.isfinite(samples.rates).all(axis=1)
-        )
-        for window_end in range(n_past_samples + window_samples, len(is_usable), window_samples):
-            window_rows = slice(window_end - n_past_samples - window_samples, window_end)
-            if (
-                is_usable[window_rows].all()
-                and samples.stretch_number[window_rows.start] == samples.stretch_number[window_end - 1]
-            ):
-                window_commands.append(effective_group_commands[window_rows])
-                window_rates.append(samples.rates[window_end - window_samples : window_end])
-    window_thinning_factor = max(len(window_rates) // _MIN_WINDOWS_AFTER_THINNING, 1)
-    window_commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
-    return np.reshape(window_commands[::window_thinning_factor], window_commands_shape), np.reshape(
-        window_rates[::window_thinning_factor], (-1, window_samples, 3)
-    )
+    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
+    u, y = [], []
+    for part in parts:
+        samples = part.samples
+        effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+        commands = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
+        ok = part.is_usable & np.isfinite(commands).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
+        for end in range(past + n, len(ok), n):
+            rows = slice(end - past - n, end)
+            if ok[rows].all() and samples.stretch_number[rows.start] == samples.stretch_number[end - 1]:
+                u.append(commands[rows])
+                y.append(samples.rates[end - n : end])
+    step = max(len(y) // _MIN_FREE_RUNS, 1)
+    shape = (-1, past + n, len(groups))
+    return np.reshape(u[::step], shape), np.reshape(y[::step], (-1, n, 3))
 
 
-def _output_error_fixed_guess_and_bounds(n_groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
+def _guess_and_bounds(n: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
     """First guess and bounds of lag, delay, A, B and c."""
-    initial_parameters = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n_groups, 0.01), *np.zeros(3)]
-    infinite_bounds = np.full(len(initial_parameters) - 2, np.inf)
-    min_parameters = [_MIN_SERVO_LAG_S, 0.0, *-infinite_bounds]
-    max_parameters = [_MAX_SERVO_LAG_S, _MAX_COMMAND_DELAY_S, *infinite_bounds]
-    return np.array(initial_parameters), np.array(min_parameters), np.array(max_parameters)
+    guess = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n, 0.01), *np.zeros(3)]
+    inf = np.full(len(guess) - 2, np.inf)
+    lower = [_MIN_SERVO_LAG_S, 0.0, *-inf]
+    upper = [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *inf]
+    return np.array(guess), np.array(lower), np.array(upper)
 
 
-def _simulate_free_runs(
-    parameters: Floats, window_commands: Floats, measured_rates: Floats, dt_s: float
-) -> Floats:
-    """Free runs of all windows at once, (W, window_samples, 3)."""
-    n_groups = window_commands.shape[2]
-    servo_lag_s, delay_s = parameters[:2]
-    rate_transition = parameters[2:11].reshape(3, 3)
-    rate_step_per_servo_position = parameters[11 : 11 + 3 * n_groups].reshape(n_groups, 3)
-    constant_rate_step = parameters[11 + 3 * n_groups :]
-    window_samples = measured_rates.shape[1]
-    n_past_samples = window_commands.shape[1] - window_samples
-    whole_delay_samples, delay_fraction = divmod(delay_s / dt_s, 1.0)
-    servo_retention = np.exp(-dt_s / servo_lag_s)
-    current_simulated_rates, servo_positions = measured_rates[:, 0].copy(), window_commands[:, 0].copy()
-    simulated_rates = np.empty_like(measured_rates)
-    for k in range(window_commands.shape[1]):
-        if k >= n_past_samples:
-            simulated_rates[:, k - n_past_samples] = current_simulated_rates
-            current_simulated_rates = (
-                current_simulated_rates @ rate_transition.T
-                + servo_positions @ rate_step_per_servo_position
-                + constant_rate_step
-            )
-        rows_around_delayed_time = (
-            max(k - int(whole_delay_samples), 0),
-            max(k - int(whole_delay_samples) - 1, 0),
-        )
-        delayed_command = (1.0 - delay_fraction) * window_commands[
-            :, rows_around_delayed_time[0]
-        ] + delay_fraction * window_commands[:, rows_around_delayed_time[1]]
-        servo_positions = servo_retention * servo_positions + (1.0 - servo_retention) * delayed_command
-    return simulated_rates
+def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
+    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
+
+        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
+
+    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
+    delay, both s, A (3, 3), B (n, 3), c (3,).
+    """
+    n = u.shape[2]
+    lag_s, delay_s = th[:2]
+    A = th[2:11].reshape(3, 3)
+    B = th[11 : 11 + 3 * n].reshape(n, 3)
+    c = th[11 + 3 * n :]
+    m = y.shape[1]
+    past = u.shape[1] - m
+    whole, f = divmod(delay_s / dt_s, 1.0)
+    a = np.exp(-dt_s / lag_s)
+    x = y[:, 0].copy()
+    s = u[:, 0].copy()
+    X = np.empty_like(y)
+    for k in range(u.shape[1]):
+        if k >= past:
+            X[:, k - past] = x
+            x = x @ A.T + s @ B + c
+        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
+        s = a * s + (1.0 - a) * v
+    return X

@@ -26,8 +26,8 @@ _SURFACE_WORD = (
     r"ailerons?|ail|ailrn|elevators?|elev|elv|rudders?|rud|rudd|elevons?|flaperons?|ruddervators?|v_?tail"
 )
 _SIDE_WORD = r"left|right|l|r|lh|rh|port|starboard|upper|lower|inner|outer|inboard|outboard|\d"
-_PLAIN_COMMAND_WORD = r"cmd|cmds|command|commands|commanded"
-_COMMAND_WORD = rf"{_PLAIN_COMMAND_WORD}|setpoint|sp|demand|servo|pwm"
+_PLAIN_WORD = r"cmd|cmds|command|commands|commanded"
+_COMMAND_WORD = rf"{_PLAIN_WORD}|setpoint|sp|demand|servo|pwm"
 _UNIT_WORD = r"norm|rad|deg|pct|percent|us|%|1"
 
 KNOWN_COMMANDS = (
@@ -85,61 +85,61 @@ def _is_plain_command_name(name: str) -> bool:
     sides, units = rf"(({_SIDE_WORD})_?)*", rf"(_({_UNIT_WORD}))?"
     surface = rf"(delta_|d_)?{sides}({_SURFACE_WORD})(_?({_SIDE_WORD}))*(_({_COMMAND_WORD}))*{units}"
     command_first = rf"({_COMMAND_WORD})_{sides}({_SURFACE_WORD})(_?({_SIDE_WORD}))*{units}"
-    axis = rf"(roll|pitch|yaw)_?({_PLAIN_COMMAND_WORD})(_(norm|pct|percent|%|1))?"
-    command_of_axis = rf"({_PLAIN_COMMAND_WORD})_?(roll|pitch|yaw)(_(norm|pct|percent|%|1))?"
-    output = rf"servo_?\d+(_({_PLAIN_COMMAND_WORD}|pwm))?(_us)?"
+    axis = rf"(roll|pitch|yaw)_?({_PLAIN_WORD})(_(norm|pct|percent|%|1))?"
+    command_of_axis = rf"({_PLAIN_WORD})_?(roll|pitch|yaw)(_(norm|pct|percent|%|1))?"
+    output = rf"servo_?\d+(_({_PLAIN_WORD}|pwm))?(_us)?"
     short = r"d(elta)?_?[aer](_(cmd|rad|deg|norm))?"
     return bool(re.fullmatch("|".join((surface, command_first, axis, command_of_axis, output, short)), text))
 
 
-_PX4_ROTARY_WING_TYPES = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 13: "hexarotor",
+_PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 13: "hexarotor",
                           14: "octorotor", 15: "tricopter", 29: "dodecarotor"}  # fmt: skip
 """MAV_TYPE of vehicles that rotors alone move [MAVLink, common.xml: MAV_TYPE]."""
 _PX4_VTOL_TYPES = range(19, 26)
-_PX4_MULTICOPTER_AUTOSTART = ((4000, 10999, "multicopter"), (11000, 12999, "multicopter"))
-_ARDUPILOT_COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
-_ARDUPILOT_PLANE_PARAMETER = "Q_ENABLE"
+_PX4_COPTERS = ((4000, 10999, "multicopter"), (11000, 12999, "multicopter"))
+_COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
+_PLANE_PARAMETER = "Q_ENABLE"
 _MIN_ROTORS = 3
 
 
-def multicopter_reason(parameters: Parameters, names: Collection[str]) -> str | None:
+def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
     """What in a log says that rotors alone move the vehicle; None where nothing does."""
 
     def last(name: str) -> float | None:
-        values = parameters.get(name)
+        values = params.get(name)
         return values[-1] if values else None
 
     mav_type = last("MAV_TYPE")
-    if mav_type in _PX4_ROTARY_WING_TYPES:
-        return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WING_TYPES[int(mav_type)]}"
+    if mav_type in _PX4_ROTARY_WINGS:
+        return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WINGS[int(mav_type)]}"
     if last("CA_AIRFRAME") == 0:
         return "CA_AIRFRAME 0, multirotor"
-    autostart = last("SYS_AUTOSTART")
-    for low, high, title in _PX4_MULTICOPTER_AUTOSTART:
-        if mav_type is None and autostart is not None and low <= autostart <= high:
-            return f"SYS_AUTOSTART {autostart:g}, {title}"
-    copter_parameter = next((name for name in _ARDUPILOT_COPTER_PARAMETERS if name in parameters), None)
-    if copter_parameter is not None and _ARDUPILOT_PLANE_PARAMETER not in parameters:
-        return f"the parameter {copter_parameter} of ArduCopter"
+    start = last("SYS_AUTOSTART")
+    for low, high, title in _PX4_COPTERS:
+        if mav_type is None and start is not None and low <= start <= high:
+            return f"SYS_AUTOSTART {start:g}, {title}"
+    copter = next((name for name in _COPTER_PARAMETERS if name in params), None)
+    if copter is not None and _PLANE_PARAMETER not in params:
+        return f"the parameter {copter} of ArduCopter"
     stripped = [re.sub(r"\s*\(.*\)$", "", name.strip()).lower() for name in names]
     rotors = [name for name in stripped if re.fullmatch(r"e?motor\[?_?\d\]?", name)]
-    has_commands = any(map(is_command_name, names))
-    if len(set(rotors)) >= _MIN_ROTORS and not has_commands:
+    commanded = any(map(is_command_name, names))
+    if len(set(rotors)) >= _MIN_ROTORS and not commanded:
         return f"{rotors[0]} to {rotors[-1]}, and no output of a servo"
     return None
 
 
-def command_names(names: Sequence[str], parameters: Parameters) -> list[str]:
+def command_names(names: Sequence[str], params: Parameters) -> list[str]:
     """The columns that carry commands of surfaces, those of one message: what several messages say of the
     same surfaces is said once. Of a VTOL only the group of its wing."""
     commands = [name for name in names if is_command_name(name)]
-    if parameters.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES:
+    if params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES:
         hovering = r"(actuator_controls_0|vehicle_torque_setpoint)\."
         commands = [name for name in commands if not re.match(hovering, name)]
-    first_message = next((name.partition(".")[0] for name in commands if "." in name), None)
-    if first_message is None:
+    message = next((name.partition(".")[0] for name in commands if "." in name), None)
+    if message is None:
         return commands
-    return [name for name in commands if name.partition(".")[0] == first_message]
+    return [name for name in commands if name.partition(".")[0] == message]
 
 
 _OUTPUT_PATTERN = r"RCO[2-4U]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_RAW\."
@@ -149,14 +149,12 @@ def missing_commands_text(names: Collection[str]) -> str:
     """Which known command messages are missing, and how a vehicle file names others."""
     examples = ", ".join(dict.fromkeys(f"{known.example} ({known.ecosystem})" for known in KNOWN_COMMANDS))
     outputs = [name for name in names if re.match(_OUTPUT_PATTERN, name)]
-    outputs_text = (
-        f"; {outputs[0]} and its like are outputs to servos and to motors, and the log does not state which "
-        "moves a surface"
-        if outputs
-        else ""
-    )
+    found = ""
+    if outputs:
+        reason = "outputs to servos and to motors, and the log does not state which moves a surface"
+        found = f"; {outputs[0]} and its like are {reason}"
     return (
-        f"no column is known to carry the command of a surface{outputs_text}, allowed: {examples}, words "
+        f"no column is known to carry the command of a surface{found}, allowed: {examples}, words "
         "such as elevator_cmd, or a vehicle file that names it: commands: [COLUMN], "
         "surfaces: {elevator: {COLUMN: 1}}"
     )

@@ -19,12 +19,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
-from beaver_ftc_logs.readers import (
-    NAMES_OF_READERS_OF_WANTED_COLUMNS,
-    check_exists,
-    read_flight,
-    reader_name_for_path,
-)
+from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.recording import Floats, Parameters
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
@@ -49,7 +44,7 @@ _ARDUPILOT_SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, 
 the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it."""
 _FLAPERONS = ("left_flaperon", "right_flaperon")
 _ARDUPILOT_AXIS_COLUMNS, _ARDUPILOT_FULL_COMMAND = ("AETR.Ail", "AETR.Elev", "AETR.Rudd"), 4500.0
-_ARDUPILOT_MESSAGE_BY_LAST_CHANNEL = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
+_ARDUPILOT_MESSAGES = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
 
 _PX4_SURFACES = {
     1: "left_aileron", 2: "right_aileron", 3: "elevator", 4: "rudder", 5: "left_elevon", 6: "right_elevon",
@@ -58,7 +53,7 @@ _PX4_SURFACES = {
 """CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis."""
 _PX4_OUTPUT_PATTERN = r"(PWM_MAIN|PWM_AUX)_FUNC(\d{1,2})"
 _MAX_TORQUE = 1000.0
-_PX4_MAX_SURFACES, _PX4_FIRST_SERVO_FUNCTION, _PX4_FIXED_WING = 8, 201, 1
+_PX4_MAX_SURFACES, _PX4_FIRST_SERVO, _PX4_FIXED_WING = 8, 201, 1
 _PX4_AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
 _ASSUMED_MIN_US, _ASSUMED_MAX_US = 1100.0, 1900.0
@@ -125,20 +120,20 @@ class _Axes:
     problem: str = ""
 
 
-def mixing_of_log(reader_name: str, parameters: Parameters, column_names: Collection[str]) -> Mixing:
+def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing that the parameters of a log say, with commands out of these columns. Without surfaces where
     they say none, or their commands are not in the log."""
-    if reader_name not in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+    if reader not in SELECTIVE_READERS:
         return Mixing()
-    find_mixing = _ardupilot_mixing if reader_name == "ardupilot" else _px4_mixing
-    mixing = find_mixing(_ParametersOfLog(parameters), set(column_names))
+    mixing_by = _ardupilot_mixing if reader == "ardupilot" else _px4_mixing
+    mixing = mixing_by(_Parameters(params), set(column_names))
     if not mixing.surfaces:
         mixing.lines.append("the parameters of the log give no mixing: it stays out")
     return mixing
 
 
 @dataclass
-class _ParametersOfLog:
+class _Parameters:
     """Access to the parameters of a log that says what is wrong with one."""
 
     values_by_name: Parameters
@@ -146,13 +141,13 @@ class _ParametersOfLog:
 
     def number(self, name: str, low: float, high: float, unit: str = "") -> float:
         """The last value of a parameter. Raises _BadParameter for one that is missing or out of range."""
-        allowed_text = f"allowed: {low:g} to {high:g}{unit}"
+        allowed = f"allowed: {low:g} to {high:g}{unit}"
         values = self.values_by_name.get(name, ())
         if not values:
-            raise _BadParameter(f"{name} is not in the log, {allowed_text}")
+            raise _BadParameter(f"{name} is not in the log, {allowed}")
         value = values[-1]
         if not (math.isfinite(value) and low <= value <= high):
-            raise _BadParameter(f"{name} is {value:g}, {allowed_text}")
+            raise _BadParameter(f"{name} is {value:g}, {allowed}")
         if len(values) > 1:
             line = f"{name} changes in the log: its last value, {value:g}, is used"
             self.lines_on_changes += [] if line in self.lines_on_changes else [line]
@@ -170,63 +165,63 @@ class _ParametersOfLog:
         return sorted(int(match[1]) for match in matches if match)
 
 
-def _ardupilot_mixing(parameters: _ParametersOfLog, column_names: set[str]) -> Mixing:
+def _ardupilot_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
     mixing = Mixing()
-    surfaces = _ardupilot_surfaces(parameters, mixing.lines)
+    surfaces = _ardupilot_surfaces(params, mixing.lines)
     columns = [_ardupilot_channel_column(surface.number) for surface in surfaces]
-    readings = [_ardupilot_channel_reading(parameters, surface.number) for surface in surfaces]
+    readings = [_ardupilot_channel_reading(params, surface.number) for surface in surfaces]
     axes = _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
     _add_surfaces(mixing, surfaces, [_Outputs(columns, readings)], axes, column_names)
-    mixing.lines += parameters.lines_on_changes
+    mixing.lines += params.lines_on_changes
     return mixing
 
 
-def _ardupilot_surfaces(parameters: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
+def _ardupilot_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
     """The surfaces by SERVOn_FUNCTION. lines: receives what stays out."""
-    channels = parameters.numbers_in_names(r"SERVO(\d{1,2})_FUNCTION")
+    channels = params.numbers_in_names(r"SERVO(\d{1,2})_FUNCTION")
     if not channels:
         lines.append("SERVOn_FUNCTION is not in the log")
-    function_by_channel: dict[int, int] = {}
+    functions: dict[int, int] = {}
     for channel in channels:
         try:
-            function = parameters.whole_number(f"SERVO{channel}_FUNCTION", -1, 1000)
+            function = params.whole_number(f"SERVO{channel}_FUNCTION", -1, 1000)
         except _BadParameter as problem:
             lines.append(f"channel {channel} stays out: {problem}")
             continue
         if function in _ARDUPILOT_SURFACES:
-            function_by_channel[channel] = function
+            functions[channel] = function
         elif function > 0:
             lines.append(f"channel {channel} stays out: SERVO{channel}_FUNCTION {function} is no surface")
-    mixers = _ardupilot_mixers(parameters, function_by_channel.values(), lines)
-    used_functions = list(function_by_channel.values())
+    mixers = _ardupilot_mixers(params, functions.values(), lines)
+    used = list(functions.values())
     surfaces = []
-    for channel, function in function_by_channel.items():
-        name, axis_shares, is_mixed = _ARDUPILOT_SURFACES[function]
-        factors, mixer_text = mixers if is_mixed else (np.ones(3), "")
+    for channel, function in functions.items():
+        name, shares, is_mixed = _ARDUPILOT_SURFACES[function]
+        factors, mixer = mixers if is_mixed else (np.ones(3), "")
         surfaces.append(
             _Surface(
-                name if used_functions.count(function) == 1 else f"{name}_{channel}",
+                name if used.count(function) == 1 else f"{name}_{channel}",
                 f"channel {channel}",
                 channel,
                 function,
-                None if axis_shares is None or factors is None else np.array(axis_shares) * factors,
+                None if shares is None or factors is None else np.array(shares) * factors,
                 f"SERVO{channel}_FUNCTION {function}",
-                mixer_text,
+                mixer,
             )
         )
     return surfaces
 
 
 def _ardupilot_mixers(
-    parameters: _ParametersOfLog, functions: Collection[int], lines: list[str]
+    params: _Parameters, functions: Collection[int], lines: list[str]
 ) -> tuple[Floats | None, str]:
     """The factors of the mixers on aileron, elevator and rudder, None where they are not known, and the
     parameters that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
     if not any(_ARDUPILOT_SURFACES[function][2] for function in functions):
         return None, ""
     try:
-        gain = parameters.number("MIXING_GAIN", _MIN_MIXING_GAIN, _MAX_MIXING_GAIN)
-        offset = parameters.number("MIXING_OFFSET", -_MAX_MIXING_OFFSET, _MAX_MIXING_OFFSET)
+        gain = params.number("MIXING_GAIN", _MIN_MIXING_GAIN, _MAX_MIXING_GAIN)
+        offset = params.number("MIXING_OFFSET", -_MAX_MIXING_OFFSET, _MAX_MIXING_OFFSET)
     except _BadParameter as problem:
         lines.append(f"the mixer of elevons and V-tail stays out: {problem}")
         return None, ""
@@ -236,32 +231,29 @@ def _ardupilot_mixers(
 
 
 def _ardupilot_channel_column(channel: int) -> str:
-    message = next(
-        (text for last, text in _ARDUPILOT_MESSAGE_BY_LAST_CHANNEL.items() if channel <= last), "RCO?"
-    )
+    message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if channel <= last), "RCO?")
     return f"{message}.C{channel}"
 
 
-def _ardupilot_channel_reading(parameters: _ParametersOfLog, channel: int) -> Reading:
+def _ardupilot_channel_reading(params: _Parameters, channel: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range."""
     prefix = f"SERVO{channel}"
     try:
         low, high, trim = (
-            parameters.number(f"{prefix}_{part}", *limits, " us") for part, limits in _PULSE_RANGE_US.items()
+            params.number(f"{prefix}_{part}", *limits, " us") for part, limits in _PULSE_RANGE_US.items()
         )
         if not low < high or not low <= trim <= high:
-            raise _BadParameter(
-                f"{prefix}_MIN, _TRIM, _MAX are {low:g}, {trim:g}, {high:g} us, allowed: ascending"
-            )
-        is_reversed = parameters.whole_number(f"{prefix}_REVERSED", 0, 1) == 1
+            given = f"{low:g}, {trim:g}, {high:g} us"
+            raise _BadParameter(f"{prefix}_MIN, _TRIM, _MAX are {given}, allowed: ascending")
+        reverse = params.whole_number(f"{prefix}_REVERSED", 0, 1) == 1
     except _BadParameter as problem:
         return _assumed_reading(problem)
-    return _reading(low, high, trim, is_reversed)
+    return _reading(low, high, trim, reverse)
 
 
-def _reading(low: float, high: float, trim: float, is_reversed: bool) -> Reading:
-    scale = (-2.0 if is_reversed else 2.0) / (high - low)
-    reversed_text = ", reversed" if is_reversed else ""
+def _reading(low: float, high: float, trim: float, reverse: bool) -> Reading:
+    scale = (-2.0 if reverse else 2.0) / (high - low)
+    reversed_text = ", reversed" if reverse else ""
     return scale, -trim * scale, f", {low:g} to {high:g} us, neutral at {trim:g} us{reversed_text}"
 
 
@@ -271,57 +263,57 @@ def _assumed_reading(problem: _BadParameter) -> Reading:
     return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
 
 
-def _px4_mixing(parameters: _ParametersOfLog, column_names: set[str]) -> Mixing:
+def _px4_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
     mixing = Mixing()
-    surfaces = _px4_surfaces(parameters, mixing.lines)
+    surfaces = _px4_surfaces(params, mixing.lines)
     outputs = [_px4_servos(surfaces)]
     if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
-        outputs += _px4_pulses(parameters, surfaces)
+        outputs += _px4_pulses(params, surfaces)
     # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
-    is_fixed_wing = parameters.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
+    is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
     axes = _Axes(_PX4_AXIS_COLUMNS, 1.0, "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)")
     _add_surfaces(mixing, surfaces, outputs, axes, column_names)
-    mixing.lines += parameters.lines_on_changes
+    mixing.lines += params.lines_on_changes
     return mixing
 
 
-def _px4_surfaces(parameters: _ParametersOfLog, lines: list[str]) -> list[_Surface]:
+def _px4_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
     """The surfaces by CA_SV_CSn_TYPE, their shares by the torques. lines: receives what stays out."""
     try:
-        n_surfaces = parameters.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)
+        n = params.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)
     except _BadParameter as problem:
         lines.append(str(problem))
         return []
-    kind_by_index: dict[int, int] = {}
-    for i in range(n_surfaces):
+    kinds: dict[int, int] = {}
+    for i in range(n):
         name = f"CA_SV_CS{i}_TYPE"
         try:
-            kind = parameters.whole_number(name, 0, 1000)
+            kind = params.whole_number(name, 0, 1000)
         except _BadParameter as problem:
             lines.append(f"surface {i} stays out: {problem}")
             continue
         if kind in _PX4_SURFACES:
-            kind_by_index[i] = kind
+            kinds[i] = kind
         else:
             lines.append(f"surface {i} stays out: {name} {kind} moves the aircraft about no axis")
-    shares_by_index = _px4_axis_shares(parameters, kind_by_index, lines)
-    used_kinds = list(kind_by_index.values())
+    shares_by_index = _px4_axis_shares(params, kinds, lines)
+    used_kinds = list(kinds.values())
     surfaces = []
-    for i, kind in kind_by_index.items():
-        axis_shares, name = shares_by_index[i], _PX4_SURFACES[kind]
-        if axis_shares is not None and not axis_shares.any():
+    for i, kind in kinds.items():
+        shares, name = shares_by_index[i], _PX4_SURFACES[kind]
+        if shares is not None and not shares.any():
             lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
             continue
-        unique_name = name if used_kinds.count(kind) == 1 else f"{name}_{i}"
-        outputs_text = "".join(f", {output} {_PX4_FIRST_SERVO_FUNCTION + i}"
-                               for output in _px4_output_parameters(parameters, i))  # fmt: skip
-        reason = f"CA_SV_CS{i}_TYPE {kind}{outputs_text}"
-        surfaces.append(_Surface(unique_name, f"surface {i}", i, i, axis_shares, reason))
+        full = name if used_kinds.count(kind) == 1 else f"{name}_{i}"
+        outputs = "".join(f", {output} {_PX4_FIRST_SERVO + i}"
+                               for output in _px4_output_parameters(params, i))  # fmt: skip
+        reason = f"CA_SV_CS{i}_TYPE {kind}{outputs}"
+        surfaces.append(_Surface(full, f"surface {i}", i, i, shares, reason))
     return surfaces
 
 
 def _px4_axis_shares(
-    parameters: _ParametersOfLog, indices: Collection[int], lines: list[str]
+    params: _Parameters, indices: Collection[int], lines: list[str]
 ) -> dict[int, Floats | None]:
     """The share of each torque command in each surface: the pseudo-inverse of the torques of all surfaces
     [PX4, ControlAllocationPseudoInverse]. None of any where a torque is not known."""
@@ -329,7 +321,7 @@ def _px4_axis_shares(
         return {}
     try:
         torques = np.array([
-            [parameters.number(f"CA_SV_CS{i}_TRQ_{axis}", -_MAX_TORQUE, _MAX_TORQUE) for axis in "RPY"]
+            [params.number(f"CA_SV_CS{i}_TRQ_{axis}", -_MAX_TORQUE, _MAX_TORQUE) for axis in "RPY"]
             for i in indices
         ])  # fmt: skip
     except _BadParameter as problem:
@@ -339,13 +331,11 @@ def _px4_axis_shares(
     return dict(zip(indices, np.where(np.abs(shares) < _LEAST_WEIGHT, 0.0, shares), strict=True))
 
 
-def _px4_output_parameters(parameters: _ParametersOfLog, index: int) -> list[str]:
+def _px4_output_parameters(params: _Parameters, index: int) -> list[str]:
     """The parameters that give an output to a surface: PWM_MAIN_FUNC3."""
-    return [
-        name
-        for name, values in parameters.values_by_name.items()
-        if re.fullmatch(_PX4_OUTPUT_PATTERN, name) and values[-1] == _PX4_FIRST_SERVO_FUNCTION + index
-    ]
+    servo = _PX4_FIRST_SERVO + index
+    names = [name for name, values in params.values_by_name.items() if values[-1] == servo]
+    return [name for name in names if re.fullmatch(_PX4_OUTPUT_PATTERN, name)]
 
 
 def _px4_servos(surfaces: Sequence[_Surface]) -> _Outputs:
@@ -353,30 +343,28 @@ def _px4_servos(surfaces: Sequence[_Surface]) -> _Outputs:
     return _Outputs(columns, [(1.0, 0.0, "")] * len(surfaces))
 
 
-def _px4_pulses(parameters: _ParametersOfLog, surfaces: Sequence[_Surface]) -> list[_Outputs]:
+def _px4_pulses(params: _Parameters, surfaces: Sequence[_Surface]) -> list[_Outputs]:
     """The pulses of each surface's first output; none where one has none, or where there are two drivers."""
-    names = [_px4_output_parameters(parameters, surface.number)[:1] for surface in surfaces]
+    names = [_px4_output_parameters(params, surface.number)[:1] for surface in surfaces]
     matches = [re.fullmatch(_PX4_OUTPUT_PATTERN, name) for one in names for name in one]
     outputs = [(match[1], int(match[2])) for match in matches if match]
     if len(outputs) < len(surfaces) or len({driver for driver, _ in outputs}) != 1:
         return []
-    readings = [_px4_output_reading(parameters, *output) for output in outputs]
+    readings = [_px4_output_reading(params, *output) for output in outputs]
     return [_Outputs([f"actuator_outputs.output[{number - 1}]" for _, number in outputs], readings)]
 
 
-def _px4_output_reading(parameters: _ParametersOfLog, driver: str, number: int) -> Reading:
+def _px4_output_reading(params: _Parameters, driver: str, number: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text [PX4, mixer_module.cpp]."""
     try:
-        low, high = (
-            parameters.number(f"{driver}_{part}{number}", *_PULSE_RANGE_US[part], " us")
-            for part in ("MIN", "MAX")
-        )
+        low = params.number(f"{driver}_MIN{number}", *_PULSE_RANGE_US["MIN"], " us")
+        high = params.number(f"{driver}_MAX{number}", *_PULSE_RANGE_US["MAX"], " us")
         if not low < high:
             raise _BadParameter(f"{driver}_MIN{number} is {low:g} us, allowed: less than {high:g} us")
-        reversed_outputs = parameters.whole_number(f"{driver}_REV", 0, 2**16 - 1)
+        mask = params.whole_number(f"{driver}_REV", 0, 2**16 - 1)
     except _BadParameter as problem:
         return _assumed_reading(problem)
-    return _reading(low, high, 0.5 * (low + high), bool(reversed_outputs >> (number - 1) & 1))
+    return _reading(low, high, 0.5 * (low + high), bool(mask >> (number - 1) & 1))
 
 
 def _add_surfaces(
@@ -386,9 +374,9 @@ def _add_surfaces(
     if not surfaces:
         return
     fullest = max(outputs, key=lambda one: len(names.intersection(one.columns)))
-    n_by_output = len(names.intersection(fullest.columns))
-    n_by_axis = sum(not _problem_of_axes(surface, axes, names) for surface in surfaces)
-    if n_by_output > 0 and n_by_output >= n_by_axis:
+    by_output = len(names.intersection(fullest.columns))
+    by_axis = sum(not _problem_of_axes(surface, axes, names) for surface in surfaces)
+    if by_output > 0 and by_output >= by_axis:
         _add_surfaces_by_output(mixing, surfaces, fullest, names)
     else:
         _add_surfaces_by_axis(mixing, surfaces, axes, names)
@@ -410,55 +398,54 @@ def _add_surfaces_by_output(
             readings.append(reading)
         else:
             mixing.lines.append(_stays_out(surface, f"{column} is not in the log"))
-    rows, own_weights = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces, columns)
+    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces, columns)
     basis: list[int] = []
     for k, surface in enumerate(surfaces):
         column, (scale, offset, text) = columns[k], readings[k]
-        weights_of_basis = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
-        if basis and np.allclose(weights_of_basis @ rows[basis], rows[k], atol=1e-6):
-            weights = _sum_of_weights(weights_of_basis, [own_weights[i] for i in basis])
+        factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
+        if basis and np.allclose(factors @ rows[basis], rows[k], atol=1e-6):
+            weights = _sum_of_weights(factors, [own[i] for i in basis])
         else:
             basis.append(k)
-            weights = own_weights[k]
+            weights = own[k]
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column[column] = _command_entry(column, scale, offset)
-        shared_text = "" if column in weights else f"; it moves with {' and '.join(weights)}"
-        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}: {surface.reason}{text}{shared_text}")
+        shared = "" if column in weights else f"; it moves with {' and '.join(weights)}"
+        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}: {surface.reason}{text}{shared}")
 
 
 def _weights_of_own_columns(surfaces: Sequence[_Surface], columns: list[str]) -> list[Weights]:
     """The command of each surface by itself. Flaps are added to one flaperon and taken from the other: half
     the sum of both is the command without flaps."""
     weights = [{column: 1.0} for column in columns]
-    flaperons = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
-    if len(flaperons) == len(_FLAPERONS):
-        for k in flaperons:
-            weights[k] = {columns[i]: 0.5 for i in flaperons}
+    flaps = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
+    if len(flaps) == len(_FLAPERONS):
+        for k in flaps:
+            weights[k] = {columns[i]: 0.5 for i in flaps}
     return weights
 
 
 def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:
     """The shares of roll, pitch and yaw in each surface; where one is not known, a direction of its own for
     each kind."""
-    known_rows = [surface.axis_shares for surface in surfaces if surface.axis_shares is not None]
-    if len(known_rows) == len(surfaces):
-        return np.array(known_rows)
+    known = [surface.axis_shares for surface in surfaces if surface.axis_shares is not None]
+    if len(known) == len(surfaces):
+        return np.array(known)
     kinds = list(dict.fromkeys(surface.kind for surface in surfaces))
     return np.array([[float(kind == surface.kind) for kind in kinds] for surface in surfaces])
 
 
 def _sum_of_weights(factors: Floats, weights: list[Weights]) -> Weights:
     total: Weights = {}
-    for factor, weight_by_column in zip(factors.tolist(), weights, strict=True):
-        for column, weight in weight_by_column.items():
+    for factor, row in zip(factors.tolist(), weights, strict=True):
+        for column, weight in row.items():
             total[column] = total.get(column, 0.0) + factor * weight
     return _tidy(total)
 
 
 def _tidy(weights: Weights) -> Weights:
-    return {
-        column: float(f"{weight:.10g}") for column, weight in weights.items() if abs(weight) > _LEAST_WEIGHT
-    }
+    kept = {column: weight for column, weight in weights.items() if abs(weight) > _LEAST_WEIGHT}
+    return {column: float(f"{weight:.10g}") for column, weight in kept.items()}
 
 
 def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[_Surface], axes: _Axes, names: set[str]) -> None:
@@ -470,10 +457,9 @@ def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[_Surface], axes: _A
         weights = _weights_of_axes(surface, axes)
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column |= {column: _command_entry(column, axes.scale, 0.0) for column in weights}
-        mix_text = " ".join(f"{weight:+.4g} {column}" for column, weight in weights.items())
-        mixing.lines.append(
-            f"{surface.place} is the {_spoken(surface)}, {mix_text}: {surface.reason}{surface.mixer_reason}"
-        )
+        mix = " ".join(f"{weight:+.4g} {column}" for column, weight in weights.items())
+        reason = f"{surface.reason}{surface.mixer_reason}"
+        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}, {mix}: {reason}")
 
 
 def _problem_of_axes(surface: _Surface, axes: _Axes, names: set[str]) -> str:
@@ -498,9 +484,8 @@ def _stays_out(surface: _Surface, reason: str) -> str:
 def _command_entry(column: str, scale: float, offset: float) -> Any:
     if (scale, offset) == (1.0, 0.0):
         return column
-    return {"column": column, "scale": float(f"{scale:.10g}")} | (
-        {"offset": float(f"{offset:.10g}")} if offset else {}
-    )
+    entry = {"column": column, "scale": float(f"{scale:.10g}")}
+    return entry | ({"offset": float(f"{offset:.10g}")} if offset else {})
 
 
 def _spoken(surface: _Surface) -> str:
@@ -508,47 +493,44 @@ def _spoken(surface: _Surface) -> str:
 
 
 def load_vehicle_for_logs(
-    path_or_name: str | Path, logs: Sequence[Path], reader_name: str | None = None
+    vehicle: str | Path, logs: Sequence[Path], reader: str | None = None
 ) -> tuple[Vehicle, list[str]]:
     """The vehicle in a file, and lines on what its logs' parameters say where the file leaves out `commands`
     or `surfaces`: what the file has overrides. Raises ScenarioError and BadInput with one line a mistake."""
-    document, path = read_vehicle_document(path_or_name)
-    missing_keys = [key for key in ("commands", "surfaces") if key not in document.data]
+    document, path = read_vehicle_document(vehicle)
+    missing = [key for key in ("commands", "surfaces") if key not in document.data]
     lines: list[str] = []
-    if missing_keys and logs:
-        first_keys: dict[str, Any] = {}
+    if missing and logs:
+        first: dict[str, Any] = {}
         for log in logs:
-            keys, lines_of_log = _missing_keys_of_log(log, reader_name, document.data, missing_keys)
-            if first_keys and keys != first_keys:
-                raise BadInput(
-                    f"{log}: its parameters give another mixing than those of {logs[0]}, allowed: one for "
-                    f"all, or {' and '.join(missing_keys)} in {path}"
-                )
-            first_keys, lines = keys, lines or [f"{log}: {line}" for line in lines_of_log]
-        document.data.update(first_keys)
+            keys, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
+            if first and keys != first:
+                allowed = f"one for all, or {' and '.join(missing)} in {path}"
+                reason = f"its parameters give another mixing than those of {logs[0]}"
+                raise BadInput(f"{log}: {reason}, allowed: {allowed}")
+            first, lines = keys, lines or [f"{log}: {line}" for line in lines_of_log]
+        document.data.update(first)
     return validate(Vehicle, document, path), lines
 
 
 def _missing_keys_of_log(
-    log: Path, reader_name: str | None, data: Mapping[str, Any], missing_keys: Sequence[str]
+    log: Path, reader: str | None, data: Mapping[str, Any], missing: Sequence[str]
 ) -> tuple[dict[str, Any], list[str]]:
     """The keys that a vehicle file leaves out, by a log's parameters; none in a format without parameters."""
     check_exists(log)
-    used_reader = reader_name or data.get("reader") or reader_name_for_path(log)
-    if used_reader not in NAMES_OF_READERS_OF_WANTED_COLUMNS:
+    used_reader = reader or data.get("reader") or reader_name_for_path(log)
+    if used_reader not in SELECTIVE_READERS:
         return {}, []
     recording = read_flight(log, used_reader, columns=())
-    own_columns = _columns_in_file(data)
-    column_names = set(recording.columns) if own_columns is None else own_columns & set(recording.columns)
+    own = _columns_in_file(data)
+    column_names = set(recording.columns) if own is None else own & set(recording.columns)
     mixing = mixing_of_log(used_reader, recording.parameters, column_names)
     if not mixing.surfaces:
-        raise BadInput(f"{log}: {'; '.join(mixing.lines)}, allowed: {' and '.join(missing_keys)} in the file")
-    keys_of_log = {"commands": mixing.commands, "surfaces": mixing.surfaces}
-    if own_columns is not None and "commands" in missing_keys:
-        keys_of_log["commands"] = [
-            mixing.entry_by_column.get(column, column) for column in sorted(own_columns)
-        ]
-    return {key: keys_of_log[key] for key in missing_keys}, mixing.lines
+        raise BadInput(f"{log}: {'; '.join(mixing.lines)}, allowed: {' and '.join(missing)} in the file")
+    keys = {"commands": mixing.commands, "surfaces": mixing.surfaces}
+    if own is not None and "commands" in missing:
+        keys["commands"] = [mixing.entry_by_column.get(column, column) for column in sorted(own)]
+    return {key: keys[key] for key in missing}, mixing.lines
 
 
 def _columns_in_file(data: Mapping[str, Any]) -> set[str] | None:

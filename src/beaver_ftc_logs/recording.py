@@ -61,7 +61,7 @@ class RecordedFlight:
     parameters: Parameters = field(default_factory=dict)
     unread_column_names: tuple[str, ...] = ()
 
-    def nearest_column_names_text(self, wanted_name: str) -> str:
+    def nearest_columns_text(self, wanted_name: str) -> str:
         """The names of the log's columns that are nearest to one that it has not, read or not."""
         return nearest_names_text(wanted_name, {*self.columns, *self.unread_column_names})
 

@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document, Metrics, read_metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
-from beaver_ftc_logs.readers.table import check_row_count_and_time, read_numbers
+from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 
 
@@ -33,97 +33,73 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    column_names_of_each_input = [*stepped.log_column_names_of_each_input(aircraft), ["altitude_m"]]
-    log_columns = _read_columns(path, ["t_s", *chain.from_iterable(column_names_of_each_input)])
-    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_error_sections(scenario))
-    ordered_input_arrays = [
-        np.column_stack([log_columns[name] for name in names]) for names in column_names_of_each_input
-    ]
-    replayed_verdicts = stepped.replay_samples(diagnosis, ordered_input_arrays, scenario.rate_hz)
-    diagnosis_rows = stepped.diagnosis_rows_from_replay(
-        log_columns["t_s"], replayed_verdicts, aircraft.surfaces, scenario.fdi
-    )
-    return diagnosis_columns(diagnosis_rows, aircraft.surfaces), _replay_verdict(
-        path, scenario, log_columns, replayed_verdicts.verdicts
-    )
+    groups = [*stepped.input_columns(aircraft), ["altitude_m"]]
+    log = _read_columns(path, ["t_s", *chain.from_iterable(groups)])
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
+    arrays = [np.column_stack([log[name] for name in names]) for names in groups]
+    replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
+    rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
+    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
 
 
 def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
     """These columns of a log, and what it says of its own detection if it does."""
-    log_columns = read_numbers(path, [*names, "detected"])
-    missing_names = [name for name in names if name not in log_columns]
-    if missing_names:
-        raise BadInput(f"{path}: no column {missing_names[0]}, allowed: a log.parquet as `run` writes it")
-    check_row_count_and_time(path, log_columns["t_s"])
-    return log_columns
+    log = read_numbers(path, [*names, "detected"])
+    missing = [name for name in names if name not in log]
+    if missing:
+        raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
+    check_time(path, log["t_s"])
+    return log
 
 
-def diagnosis_columns(diagnosis_rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
+def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
-    columns: dict[str, Any] = {
-        "t_s": diagnosis_rows.t_s,
-        "faulty": diagnosis_rows.faulty,
-        "named": diagnosis_rows.isolated_surfaces.tolist(),
-    }
+    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty}
+    columns["named"] = rows.isolated_surfaces.tolist()
     for i, surface in enumerate(surfaces):
-        columns[f"{surface}_effectiveness"] = diagnosis_rows.effectiveness[:, i]
-        columns[f"{surface}_low"], columns[f"{surface}_high"] = (
-            diagnosis_rows.effectiveness_low[:, i],
-            diagnosis_rows.effectiveness_high[:, i],
-        )
-    return columns | {"credible": diagnosis_rows.credible}
+        columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
+        columns[f"{surface}_low"] = rows.effectiveness_low[:, i]
+        columns[f"{surface}_high"] = rows.effectiveness_high[:, i]
+    return columns | {"credible": rows.credible}
 
 
-def _replay_verdict(
-    path: Path, scenario: Any, log_columns: dict[str, Floats], verdicts: list[Any]
-) -> Document:
+def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
-    t_s = log_columns["t_s"]
-    detected_row_times_s = [
-        float(row_t_s) for row_t_s, row_verdict in zip(t_s, verdicts, strict=True) if row_verdict.detected
-    ]
-    isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
-    logged_flags_and_verdicts = zip(log_columns.get("detected", []), verdicts, strict=False)
+    t_s = log["t_s"]
+    detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
+    isolation_s, name = _last_isolation(t_s, verdicts)
+    pairs = zip(log.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
         "replay": True,
         "duration_s": float(t_s[-1] - t_s[0]),
-        "faulty": bool(detected_row_times_s),
+        "faulty": bool(detected),
         "credible": {"share": 1.0, "reasons": []},
-        "detection_s": detected_row_times_s[0] if detected_row_times_s else None,
+        "detection_s": detected[0] if detected else None,
         "isolation_s": isolation_s,
         "isolated": name,
-        "rows_that_differ": sum(
-            bool(logged_flag) != row_verdict.detected
-            for logged_flag, row_verdict in logged_flags_and_verdicts
-        ),
-        "left_out": _unreplayed_input_texts(scenario),
+        "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
+        "left_out": _lacking_inputs(scenario),
     }
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
 
 
-def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
+def _last_isolation(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
     """Since when what is named at last has been named: what was withdrawn before does not count."""
-    named_since_s, name = None, None
-    for row_t_s, row_verdict in zip(t_s, verdicts, strict=True):
-        if row_verdict.isolated != name:
-            named_since_s, name = float(row_t_s) if row_verdict.isolated else None, row_verdict.isolated
-    return named_since_s, name
+    since_s, name = None, None
+    for time_s, verdict in zip(t_s, verdicts, strict=True):
+        if verdict.isolated != name:
+            since_s, name = float(time_s) if verdict.isolated else None, verdict.isolated
+    return since_s, name
 
 
-def _unreplayed_input_texts(scenario: Any) -> list[str]:
+def _lacking_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
-    ideal_sensors = type(scenario.sensors)()
-    sensors_with_declared_errors = [
-        name for name, sensor_settings in scenario.sensors if sensor_settings != getattr(ideal_sensors, name)
-    ]
-    sensors_logged_without_errors = [
-        name for name in sensors_with_declared_errors if name not in ("p", "q", "r")
-    ]
-    return [
-        f"the declared errors of {name}: the log has the true value" for name in sensors_logged_without_errors
-    ]
+    ideal = type(scenario.sensors)()
+    declared = [name for name, settings in scenario.sensors if settings != getattr(ideal, name)]
+    lacking = [name for name in declared if name not in ("p", "q", "r")]
+    return [f"the declared errors of {name}: the log has the true value" for name in lacking]
 
 
 def _is_as_flown(path: Path, verdict: Document) -> bool | None:
@@ -135,30 +111,23 @@ def _is_as_flown(path: Path, verdict: Document) -> bool | None:
         metrics = Metrics.of(read_metrics(metrics_path))
     except (OSError, ValueError):
         raise BadInput(f"{metrics_path}: cannot be read, allowed: the metrics.json of the flight") from None
-    flown_times_s = metrics.detection.time_s, metrics.isolation.time_s
-    return all(map(_is_same_time, flown_times_s, (verdict["detection_s"], verdict["isolation_s"])))
+    flown = metrics.detection.time_s, metrics.isolation.time_s
+    return all(map(_is_same_time, flown, (verdict["detection_s"], verdict["isolation_s"])))
 
 
-def _is_same_time(flown_s: float | None, replayed_s: float | None) -> bool:
+def _is_same_time(flown_s: float | None, now_s: float | None) -> bool:
     """The log's times are rounded otherwise than those of metrics.json."""
-    if flown_s is None or replayed_s is None:
-        return flown_s is replayed_s
-    return abs(flown_s - replayed_s) < TIME_TOLERANCE_S
+    if flown_s is None or now_s is None:
+        return flown_s is now_s
+    return abs(flown_s - now_s) < TIME_TOLERANCE_S
 
 
 def as_text(verdict: Document) -> str:
     """The verdict of a replay in lines for people."""
-    outcome = (
-        "nothing detected"
-        if verdict["detection_s"] is None
-        else f"detected at {verdict['detection_s']:.2f} s"
-    )
+    at_s = verdict["detection_s"]
+    outcome = "nothing detected" if at_s is None else f"detected at {at_s:.2f} s"
     if verdict["isolated"]:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
-    comparison_text_by_as_flown = {
-        True: "as flown",
-        False: "not as flown",
-        None: "nothing beside it to compare with",
-    }
-    lines = [f"{verdict['flight']}: {outcome}; {comparison_text_by_as_flown[verdict['as_flown']]}"]
-    return "\n".join([*lines, *(f"  left out: {input_text}" for input_text in verdict["left_out"])])
+    texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
+    lines = [f"{verdict['flight']}: {outcome}; {texts[verdict['as_flown']]}"]
+    return "\n".join([*lines, *(f"  left out: {text}" for text in verdict["left_out"])])

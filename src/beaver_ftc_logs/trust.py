@@ -6,6 +6,15 @@ is said: no name, and bounds of 0 and 1. The size of the residual does not count
 too: where it is larger than in the flights of the model, the filter takes the noise to be as much larger, and
 a sample counts for less. A log is refused only where a mistake in its columns explains it.
 A row uses nothing later than its time.
+
+    flights, used   each flight, and its samples that were used
+    y, F            unexplained rates (n, 3), rad/s, and responses (n, G, 3), as in `regression`
+    Z, v            regressors (3 n, 3 + G) of trim and responses, and what they explain, whitened (3 n,)
+    W, share        whitening matrix (3, 3), and as how many white samples one counts
+    lo, hi          least and largest gain of a group, 1 in the model
+    ll              log likelihood of a sample
+    known           which groups have an effect that is known (G,)
+    reasons         rows that are not credible, by reason
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +27,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
-from beaver_ftc_logs.column_mistakes import log_without_signal, logs_with_one_mistake_corrected
+from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
@@ -28,20 +37,20 @@ Mask = NDArray[np.bool_]
 
 _RANGE_MARGIN_SHARE = 0.5
 """Share of its span by which a range is passed before a row is outside."""
-_AIRSPEED_MARGIN_SHARE_OF_LIMIT = 0.15
+_AIRSPEED_MARGIN = 0.15
 _RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
-_MAX_UNCHANGED_TIME_FACTOR = 3.0
-_MAX_FALSE_MISTAKE_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
+_MAX_STILL_FACTOR = 3.0
+_FALSE_MISTAKE_CHANCE, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
-_DISTRUST_AFTER_CLIPPING_S = 30.0
-_MIN_MOVED_EFFECT_POWER_RATIO = 1e-6
-_MAX_SHARE_EXPLAINED_BY_OTHERS, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
+_CLIPPING_MEMORY_S = 30.0
+_MIN_EFFECT_POWER = 1e-6
+_MAX_TIED_SHARE, _EFFECT_POWER_CAP = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
-_MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR_ROOT = 10.0, 1.6
-_MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
+_MAX_AXIS_RATIO, _UNIT_FACTOR_ROOT = 10.0, 1.6
+_MAX_ALIKE_FACTOR, _MIN_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RANGE_QUANTILES = (0.001, 0.999)
-_MEDIAN_CHI_SQUARE_3_DOF = 2.366
+_MEDIAN_CHI2 = 2.366
 """The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
 """Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
@@ -51,310 +60,180 @@ _REVERSED_GAIN_LIMIT = -0.5
 
 
 def compute_fitted_ranges(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
-    model: Model,
-    held_out_gain_standard_errors: Floats,
+    flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats
 ) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
-    used; held_out_gain_standard_errors (G,): of parts not fitted."""
-    rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
-    commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
-    used_airspeeds = [
-        samples.airspeed[is_used]
-        for samples, is_used in flights_with_used_rows
-        if samples.airspeed is not None
-    ]
+    """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
+    rates = np.vstack([samples.rates[used] for samples, used in flights])
+    commands = np.vstack([samples.commands[used] for samples, used in flights])
+    airspeeds = [samples.airspeed[used] for samples, used in flights if samples.airspeed is not None]
     return FittedRanges(
         commands=central_ranges(commands),
         rates=central_ranges(rates),
-        airspeed=central_ranges(np.concatenate(used_airspeeds)[:, None])[0] if used_airspeeds else None,
+        airspeed=central_ranges(np.concatenate(airspeeds)[:, None])[0] if airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        tied=effect_share_explained_by_other_regressors(flights_with_used_rows, model).tolist(),
-        gain_sd=held_out_gain_standard_errors.tolist(),
-        still_s=_longest_unchanged_time_s_by_column(flights_with_used_rows),
-        energy_climb=_estimate_unpowered_energy_height_rate_mps(flights_with_used_rows),
+        tied=tied_shares(flights, model).tolist(),
+        gain_sd=gain_sd.tolist(),
+        still_s=_longest_still(flights),
+        energy_climb=_unpowered_climb(flights),
     )
 
 
-def _estimate_unpowered_energy_height_rate_mps(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
-) -> float | None:
+def _unpowered_climb(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
-    used_energy_height_rates_mps = [
-        flight.energy_height_rate_mps[is_used]
-        for flight, is_used in flights_with_used_rows
-        if flight.energy_height_rate_mps is not None
-    ]
-    energy_height_rates_mps = (
-        np.concatenate(used_energy_height_rates_mps) if used_energy_height_rates_mps else np.empty(0)
-    )
-    energy_height_rates_mps = energy_height_rates_mps[np.isfinite(energy_height_rates_mps)]
-    return (
-        float(np.quantile(energy_height_rates_mps, energy.UNPOWERED_SHARE_OF_HEALTHY_FLIGHT))
-        if energy_height_rates_mps.size
-        else None
-    )
+    pairs = [(flight.energy_height_rate_mps, used) for flight, used in flights]
+    climb = np.concatenate([np.empty(0), *(rate[used] for rate, used in pairs if rate is not None)])
+    climb = climb[np.isfinite(climb)]
+    return float(np.quantile(climb, energy.UNPOWERED_SHARE)) if climb.size else None
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
     """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
     if not values.shape[1]:
         return []
-    values_with_unknown_columns_zero = np.where(np.isfinite(values).any(axis=0), values, 0.0)
-    return np.nanquantile(values_with_unknown_columns_zero, _RANGE_QUANTILES, axis=0).T.tolist()
+    known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
+    return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
-def _longest_unchanged_time_s_by_column(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
-) -> dict[str, float]:
-    column_names = dict.fromkeys(
-        column_name
-        for samples, _ in flights_with_used_rows
-        for column_name in samples.time_since_change_s_by_column
-    )
-    return {
-        column_name: max(
-            (
-                float(flight.time_since_change_s_by_column[column_name].max(initial=0.0))
-                for flight, _ in flights_with_used_rows
-                if column_name in flight.time_since_change_s_by_column
-            )
-        )
-        for column_name in column_names
-    }
+def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+    longest: dict[str, float] = {}
+    for flight, _ in flights:
+        for name, still_s in flight.unchanged_s.items():
+            longest[name] = max(longest.get(name, 0.0), float(still_s.max(initial=0.0)))
+    return longest
 
 
-def effect_share_explained_by_other_regressors(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
-) -> Floats:
+def tied_shares(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    effect_power, power_unexplained_by_other_regressors = _effect_and_unexplained_powers(
-        flights_with_used_rows, model
-    )
-    has_moved = effect_power > _MIN_MOVED_EFFECT_POWER_RATIO
-    share_explained_by_other_regressors = 1.0 - power_unexplained_by_other_regressors / np.minimum(
-        np.where(has_moved, effect_power, 1.0), _EFFECT_NOISE_POWER_RATIO_CAP
-    )
-    return np.where(has_moved, np.maximum(share_explained_by_other_regressors, 0.0), 1.0)
+    power, rest = _effect_powers(flights, model)
+    moved = power > _MIN_EFFECT_POWER
+    share = 1.0 - rest / np.minimum(np.where(moved, power, 1.0), _EFFECT_POWER_CAP)
+    return np.where(moved, np.maximum(share, 0.0), 1.0)
 
 
-def effect_power_unexplained_by_other_regressors(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
-) -> Floats:
+def untied_power(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
     sample, (G,)."""
-    return _effect_and_unexplained_powers(flights_with_used_rows, model)[1]
+    return _effect_powers(flights, model)[1]
 
 
-def _effect_and_unexplained_powers(
-    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
-) -> tuple[Floats, Floats]:
-    """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
-    signals and the other groups do not make up of it, (G,)."""
-    surface_indices_by_group = regression.surface_indices_of_each_group(model)
-    lag_counts_and_label_scaling = (
-        model.n_rate_lags,
-        model.n_command_lags,
-        True,
-        model.vehicle.n_signal_lags(model.n_rate_lags),
-    )
-    regressors_and_predictability_by_flight = [
-        regression.build_regressors(flight, surface_indices_by_group, *lag_counts_and_label_scaling)
-        for flight, _ in flights_with_used_rows
-    ]
-    is_row_used_by_flight = [
-        is_used & is_predictable
-        for (_, is_used), (_, _, is_predictable) in zip(
-            flights_with_used_rows, regressors_and_predictability_by_flight, strict=True
-        )
-    ]
-    past_regressors = np.vstack(
-        [
-            regressors[0][is_row_used]
-            for regressors, is_row_used in zip(
-                regressors_and_predictability_by_flight, is_row_used_by_flight, strict=True
-            )
-        ]
-    )
-    lagged_group_commands = np.vstack(
-        [
-            regressors[1][is_row_used]
-            for regressors, is_row_used in zip(
-                regressors_and_predictability_by_flight, is_row_used_by_flight, strict=True
-            )
-        ]
-    )
-    response_coefficients = np.array(model.command_response)
-    residual_covariance = np.array(model.residual_covariance)
-    whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
-    effect_power = np.zeros(len(surface_indices_by_group))
-    power_unexplained_by_other_regressors = np.zeros(len(surface_indices_by_group))
-    for group_index in range(len(surface_indices_by_group)):
-        other_lagged_commands = [
-            lagged_group_commands[:, other_group_index]
-            for other_group_index in range(len(surface_indices_by_group))
-            if other_group_index != group_index
-        ]
-        other_regressors = np.column_stack(
-            [np.ones(len(past_regressors)), past_regressors, *other_lagged_commands]
-        )
-        whitened_effect = (
-            lagged_group_commands[:, group_index] @ response_coefficients[group_index] @ whitening_matrix
-        )
-        whitened_effect = whitened_effect - whitened_effect.mean(axis=0)
-        effect_power[group_index] = float((whitened_effect**2).sum()) / len(whitened_effect)
-        if effect_power[group_index] > _MIN_MOVED_EFFECT_POWER_RATIO:
-            effect_unexplained_by_other_regressors = (
-                whitened_effect
-                - other_regressors @ np.linalg.lstsq(other_regressors, whitened_effect, rcond=None)[0]
-            )
-            power_unexplained_by_other_regressors[group_index] = float(
-                (effect_unexplained_by_other_regressors**2).sum()
-            ) / len(whitened_effect)
-    return effect_power, power_unexplained_by_other_regressors
+def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tuple[Floats, Floats]:
+    """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
+    of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
+    groups = regression.group_indices(model)
+    h, L = model.n_rate_lags, model.n_command_lags
+    past, commands = [], []
+    for flight, used in flights:
+        X, U, ok = regression.build_regressors(flight, groups, h, L, True, model.vehicle.n_signal_lags(h))
+        past.append(X[used & ok])
+        commands.append(U[used & ok])
+    X, U = np.vstack(past), np.vstack(commands)
+    B = np.array(model.command_response)
+    W = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))).T
+    power = np.zeros(len(groups))
+    rest = np.zeros(len(groups))
+    for g in range(len(groups)):
+        others = [U[:, k] for k in range(len(groups)) if k != g]
+        Z = np.column_stack([np.ones(len(X)), X, *others])
+        y = U[:, g] @ B[g] @ W
+        y = y - y.mean(axis=0)
+        power[g] = float((y**2).sum()) / len(y)
+        if power[g] > _MIN_EFFECT_POWER:
+            e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
+            rest[g] = float((e**2).sum()) / len(y)
+    return power, rest
 
 
-def is_group_effect_known(model: Model) -> list[bool]:
+def known_effects(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
-    if model.fitted_ranges is None or not model.fitted_ranges.effect_share_explained_by_other_regressors:
+    if model.fitted_ranges is None or not model.fitted_ranges.tied_shares:
         return [True] * len(model.groups)
-    return [
-        explained_share_of_group < _MAX_SHARE_EXPLAINED_BY_OTHERS
-        for explained_share_of_group in model.fitted_ranges.effect_share_explained_by_other_regressors
-    ]
+    return [share < _MAX_TIED_SHARE for share in model.fitted_ranges.tied_shares]
 
 
-def is_group_gain_known(model: Model) -> list[bool]:
+def known_gains(model: Model) -> list[bool]:
     """Whether the effect of each group is known under any law: the model may not err by all of it."""
-    group_has_known_effect = is_group_effect_known(model)
-    if (
-        model.fitted_ranges is None
-        or not model.fitted_ranges.group_gain_standard_error
-        or not model.vehicle.other_laws
-    ):
-        return group_has_known_effect
-    return [
-        is_effect_known and regression.BOUND_MARGIN_STANDARD_ERRORS * gain_standard_error < 1.0
-        for is_effect_known, gain_standard_error in zip(
-            group_has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
-        )
-    ]
+    known = known_effects(model)
+    if model.fitted_ranges is None or not model.fitted_ranges.group_gain_sd or not model.vehicle.other_laws:
+        return known
+    pairs = zip(known, model.fitted_ranges.group_gain_sd, strict=True)
+    return [effect and regression.BOUND_MARGIN * sd < 1.0 for effect, sd in pairs]
 
 
-def surfaces_of_unknown_effect(model: Model) -> set[str]:
+def unknown_surfaces(model: Model) -> set[str]:
     """The surfaces of which nothing is said."""
-    groups_and_flags = zip(model.groups, is_group_effect_known(model), strict=True)
-    return {
-        name
-        for group, group_has_known_effect in groups_and_flags
-        if not group_has_known_effect
-        for name in group
-    }
+    pairs = zip(model.groups, known_effects(model), strict=True)
+    return {name for group, known in pairs if not known for name in group}
 
 
-def unknown_effect_sentences(model: Model) -> list[str]:
+def unknown_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
     if model.fitted_ranges is None:
         return []
-    sentence_start_template = (
-        "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
-    )
+    start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
+    rows = zip(model.groups, model.fitted_ranges.tied_shares, known_effects(model), strict=False)
     return [
-        f"{sentence_start_template.format('+'.join(group), explained_share_of_group)}: its effect cannot "
-        "be told, nothing is said of it"
-        for group, explained_share_of_group, group_has_known_effect in zip(
-            model.groups,
-            model.fitted_ranges.effect_share_explained_by_other_regressors,
-            is_group_effect_known(model),
-            strict=False,
-        )
-        if not group_has_known_effect
+        f"{start.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
+        for group, share, known in rows
+        if not known
     ]
 
 
-def refuse_rates_in_other_unit(samples: Samples, fitted_ranges: FittedRanges | None) -> None:
+def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if fitted_ranges is None or not fitted_ranges.rate_sd_rad_s:
+    if ranges is None or not ranges.rate_sd_rad_s:
         return
     if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
         return
-    rate_sd_ratios = np.nanstd(samples.rates, axis=0) / np.maximum(fitted_ranges.rate_sd_rad_s, MIN_DIVISOR)
-    geometric_mean_sd_ratio = float(np.exp(np.mean(np.log(np.maximum(rate_sd_ratios, MIN_DIVISOR)))))
-    for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        is_ratio_alike_on_axes = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
-        if (
-            is_ratio_alike_on_axes
-            and 1.0 / _UNIT_TOLERANCE_FACTOR_ROOT**2
-            < geometric_mean_sd_ratio / units_per_rad
-            < _UNIT_TOLERANCE_FACTOR_ROOT**2
-        ):
-            raise BadInput(
-                f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
-                "flights of the model, "
-                f"allowed: rates in rad/s; a factor of {1.0 / units_per_rad:.4g} (`unit: {unit}`) fits"
-            )
-        if (
-            is_ratio_alike_on_axes
-            and 1.0 / _UNIT_TOLERANCE_FACTOR_ROOT**2
-            < geometric_mean_sd_ratio * units_per_rad
-            < _UNIT_TOLERANCE_FACTOR_ROOT**2
-        ):
-            raise BadInput(
-                f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
-                "flights of the model, "
-                f"allowed: rates in rad/s; a factor of {units_per_rad:.4g} fits: the model's "
-                f"own were in {unit}?"
-            )
+    ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.rate_sd_rad_s, MIN_DIVISOR)
+    ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
+    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
+        return
+    most = _UNIT_FACTOR_ROOT**2
+    for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
+        fits = None
+        if 1.0 / most < ratio / per_rad < most:
+            fits = f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"
+        elif 1.0 / most < ratio * per_rad < most:
+            fits = f"{per_rad:.4g} fits: the model's own were in {unit}?"
+        if fits:
+            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {fits}")
 
 
-def refuse_commands_in_other_unit(
-    flight_name: str, commands: Floats, rates: Floats, fitted_ranges: FittedRanges, surfaces: Sequence[str]
+def refuse_command_unit(
+    name: str, commands: Floats, rates: Floats, ranges: FittedRanges, surfaces: Sequence[str]
 ) -> None:
     """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
     rate moves alike, that it is in another unit; or so much more than any rate does.
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    rate_width_ratios = _range_widths(central_ranges(rates)) / np.maximum(
-        _range_widths(fitted_ranges.rate_ranges_rad_s), MIN_DIVISOR
-    )
-    is_rate_motion_as_fitted = (
-        rate_width_ratios.min() > 1.0 / _MAX_ALIKE_MOTION_FACTOR
-        and rate_width_ratios.max() < _MAX_ALIKE_MOTION_FACTOR
-    )
-    allowed_command_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
-        1.0 if is_rate_motion_as_fitted else max(rate_width_ratios.max(), 1.0)
-    )
-    command_width_ratios = _range_widths(central_ranges(commands)) / np.maximum(
-        _range_widths(fitted_ranges.command_ranges), MIN_DIVISOR
-    )
-    for surface, width_ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
-        if allowed_command_width_ratio < width_ratio < 1e4 or (
-            is_rate_motion_as_fitted and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
-        ):
+    rate_ratios = _spans(central_ranges(rates)) / np.maximum(_spans(ranges.rate_ranges_rad_s), MIN_DIVISOR)
+    alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
+    allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
+    ratios = _spans(central_ranges(commands)) / np.maximum(_spans(ranges.command_ranges), MIN_DIVISOR)
+    for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
+        if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
-                f"{flight_name}: the command of {surface} moves {width_ratio:.3g} times as much as "
-                "in the other flights, "
-                f"the rates {rate_width_ratios.max():.2g} times at most, allowed: one unit "
-                "(57.3 is deg for rad, 100 "
-                "percent: `unit`, `scale`)"
+                f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
+                f"the rates {rate_ratios.max():.2g} times at most, allowed{_COMMAND_UNIT_HINT}"
             )
 
 
-class _GainBoundsOverFlight(NamedTuple):
+class _GainBounds(NamedTuple):
     """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
     command, (G,), there is; and the log likelihood of a sample of each part, (4,), but for what all colours
     have alike."""
 
-    largest_group_gain_upper_bounds: list[float]
-    smallest_group_gain_lower_bounds: list[float]
-    sample_log_likelihood_by_part: Floats
+    upper_gains: list[float]
+    lower_gains: list[float]
+    part_likelihoods: Floats
 
 
-def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
+def refuse_columns(samples: Samples, model: Model) -> None:
     """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
     flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
     since no fault has always been there and changes what is not its own.
@@ -362,162 +241,89 @@ def refuse_columns_not_as_identified(samples: Samples, model: Model) -> None:
     What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
     answer is refused only where it is wrong by each colour of the noise that is likelier, too. A model that
     knows the effect of no surface says nothing of any flight, and refuses none."""
-    if not any(is_group_effect_known(model)):
+    if not any(known_effects(model)):
         return
-    if (whitened_flight_and_model := _whiten_by_likeliest_noise(samples, model)) is None:
+    if (pair := _whiten_likeliest(samples, model)) is None:
         return
-    likeliest_whitened_flight, likeliest_model = whitened_flight_and_model
-    gain_bounds = _bound_gains_over_flight_parts(likeliest_whitened_flight, likeliest_model)
-    if gain_bounds is None:
+    flight, likeliest = pair
+    bounds = _bound_gains(flight, likeliest)
+    if bounds is None:
         return
-    mistakes = _column_mistake_texts(samples, model, gain_bounds)
-    for noise_ma_coefficients in NOISE_MA_CANDIDATES if mistakes else ():
-        other_gain_bounds = _bound_gains_over_flight_parts(
-            whiten_samples(samples, noise_ma_coefficients), model
-        )
-        if (
-            other_gain_bounds is not None
-            and other_gain_bounds.sample_log_likelihood_by_part.mean()
-            > gain_bounds.sample_log_likelihood_by_part.mean()
-        ):
-            mistakes_by_likelier_noise = _column_mistake_texts(samples, model, other_gain_bounds)
-            mistakes = {
-                mistake_key: mistake_text
-                for mistake_key, mistake_text in mistakes.items()
-                if mistake_key in mistakes_by_likelier_noise
-            }
-    mistake_text = next(iter(mistakes.values()), None) or _likelier_column_mistake_text(
-        likeliest_whitened_flight, likeliest_model
-    )
-    if mistake_text is not None:
-        allowed_columns_text = "allowed: columns, signs and units as in the flights of the model"
-        raise BadInput(f"{samples.name}: {mistake_text}, {allowed_columns_text}")
+    mistakes = _mistake_texts(samples, model, bounds)
+    for ma in NOISE_MA_CANDIDATES if mistakes else ():
+        other = _bound_gains(whiten_samples(samples, ma), model)
+        if other is not None and other.part_likelihoods.mean() > bounds.part_likelihoods.mean():
+            likelier = _mistake_texts(samples, model, other)
+            mistakes = {key: text for key, text in mistakes.items() if key in likelier}
+    text = next(iter(mistakes.values()), None) or _likelier_mistake(flight, likeliest)
+    if text is not None:
+        allowed = "allowed: columns, signs and units as in the flights of the model"
+        raise BadInput(f"{samples.name}: {text}, {allowed}")
 
 
-def _whiten_by_likeliest_noise(samples: Samples, model: Model) -> tuple[Samples, Model] | None:
+def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model] | None:
     """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
     noise alone; None where a part of the flight is too short."""
-    whitened_flights_and_models = [
-        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
-        for noise_model in model.noise_models
+    pairs = [
+        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
+        for noise in model.noise_models
     ]
-    flights_and_log_likelihoods = [
-        (whitened_flight_and_model, log_likelihoods_and_sample_count)
-        for whitened_flight_and_model in whitened_flights_and_models or [(samples, model)]
-        if (
-            log_likelihoods_and_sample_count := _part_log_likelihoods_and_sample_count(
-                *whitened_flight_and_model
-            )
-        )
-    ]
-    if not flights_and_log_likelihoods:
-        return None
-    return max(flights_and_log_likelihoods, key=lambda one: one[1][0].mean())[0]
+    known = [(pair, found) for pair in pairs or [(samples, model)] if (found := _likelihoods_and_size(*pair))]
+    return max(known, key=lambda one: one[1][0].mean())[0] if known else None
 
 
-def groups_with_reversed_gain(samples: Samples, model: Model) -> list[list[str]]:
+def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     """The groups of known effect to whose command the rates answer the other way round, by least squares
     over all of a flight: a gain nearer to -1 than to 0, which is that of a lost surface."""
-    if (whitened_flight_and_model := _whiten_by_likeliest_noise(samples, model)) is None:
+    if (pair := _whiten_likeliest(samples, model)) is None:
         return []
-    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
-        *whitened_flight_and_model
-    )
-    regressors, targets = _trim_and_gain_regression_data(
-        np.flatnonzero(is_predictable),
-        rates_unexplained_by_past,
-        group_responses,
-        _whitening_sample_share_and_log_noise(*whitened_flight_and_model)[0],
-    )
-    group_gains = np.linalg.lstsq(regressors, targets, rcond=None)[0][3:]
-    return [
-        group
-        for group, gain, has_known_effect in zip(
-            model.groups, group_gains, is_group_effect_known(model), strict=True
-        )
-        if has_known_effect and gain < _REVERSED_GAIN_LIMIT
-    ]
+    ok, y, F = regression.whitened_rates(*pair)
+    Z, v = _gain_data(np.flatnonzero(ok), y, F, _whitening(*pair)[0])
+    gains = np.linalg.lstsq(Z, v, rcond=None)[0][3:]
+    rows = zip(model.groups, gains, known_effects(model), strict=True)
+    return [group for group, gain, known in rows if known and gain < _REVERSED_GAIN_LIMIT]
 
 
-def _column_mistake_texts(
-    samples: Samples, model: Model, gain_bounds: _GainBoundsOverFlight
-) -> dict[str, str]:
+def _mistake_texts(samples: Samples, model: Model, bounds: _GainBounds) -> dict[str, str]:
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
-    mistakes, gain_is_known_by_group = {}, is_group_gain_known(model)
-    for group, has_known_gain, gain_upper_bound, gain_lower_bound in zip(
-        model.groups,
-        gain_is_known_by_group,
-        gain_bounds.largest_group_gain_upper_bounds,
-        gain_bounds.smallest_group_gain_lower_bounds,
-        strict=True,
-    ):
-        surface_group_name = "+".join(group)
-        relative_motion = _relative_group_command_motion(samples, model, group)
-        command_text = f"the command of {surface_group_name}"
-        motion_text = f"moves {relative_motion:.3g} times as much as in the flights of the"
-        if gain_upper_bound < MAX_REVERSED_GAIN:
-            mistake_text = (
-                f"the rates answer {command_text} the other way round in all of it (does `scale: -1` fit?)"
-            )
-            mistakes[f"sign {surface_group_name}"] = mistake_text
-        elif (
-            has_known_gain
-            and gain_upper_bound < _MIN_COMMAND_GAIN
-            and relative_motion > _MAX_ALIKE_MOTION_FACTOR
-        ):
-            effect_size_text = f"does at most {gain_upper_bound:.2g} of what it did"
-            mistakes[f"unit {surface_group_name}"] = (
-                f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
-            )
-        elif (
-            has_known_gain
-            and gain_lower_bound > 1.0 / _MIN_COMMAND_GAIN
-            and 0.0 < relative_motion < 1.0 / _MAX_ALIKE_MOTION_FACTOR
-        ):
-            effect_size_text = f"does at least {gain_lower_bound:.3g} times what it did"
-            mistakes[f"unit {surface_group_name}"] = (
-                f"{command_text} {motion_text} model, and {effect_size_text}{_COMMAND_UNIT_HINT}"
-            )
+    mistakes = {}
+    known = known_gains(model)
+    for group, sure, hi, lo in zip(model.groups, known, bounds.upper_gains, bounds.lower_gains, strict=True):
+        name = "+".join(group)
+        motion = _relative_motion(samples, model, group)
+        command = f"the command of {name}"
+        moves = f"{command} moves {motion:.3g} times as much as in the flights of the model, and does"
+        if hi < MAX_REVERSED_GAIN:
+            text = f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
+            mistakes[f"sign {name}"] = text
+        elif sure and hi < _MIN_COMMAND_GAIN and motion > _MAX_ALIKE_FACTOR:
+            mistakes[f"unit {name}"] = f"{moves} at most {hi:.2g} of what it did{_COMMAND_UNIT_HINT}"
+        elif sure and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / _MAX_ALIKE_FACTOR:
+            mistakes[f"unit {name}"] = f"{moves} at least {lo:.3g} times what it did{_COMMAND_UNIT_HINT}"
     return mistakes
 
 
-def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
+def _likelier_mistake(samples: Samples, model: Model) -> str | None:
     """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
-    inequality for a likelihood ratio); all readings together have the chance
-    `_MAX_FALSE_MISTAKE_PROBABILITY`. That holds for a correct model. The flight must be likelier by as much
-    more as flights were that the model was not fitted on, whose columns are right, and by as much again for
-    another law (`FittedRanges.misread`).
+    inequality for a likelihood ratio); all readings together have the chance `_FALSE_MISTAKE_CHANCE`. That
+    holds for a correct model. The flight must be likelier by as much more as flights were that the model was
+    not fitted on, whose columns are right, and by as much again for another law (`misread_gain`).
     """
-    min_sample_log_likelihood_gain_by_correction, n_effective_part_samples = (
-        min_log_likelihood_gains_and_part_size(samples, model)
-    )
-    if not min_sample_log_likelihood_gain_by_correction:
+    gains, n = mistake_gains(samples, model)
+    if not gains:
         return None
-    correction_text, max_log_likelihood_gain_per_sample = max(
-        min_sample_log_likelihood_gain_by_correction.items(), key=lambda one: one[1]
-    )
-    allowed_log_likelihood_gain_per_sample = (
-        2.0 * model.fitted_ranges.max_column_mistake_log_likelihood_gain
-        if model.fitted_ranges is not None
-        else 0.0
-    )
-    if (
-        max_log_likelihood_gain_per_sample * n_effective_part_samples
-        <= np.log(len(min_sample_log_likelihood_gain_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
-        + allowed_log_likelihood_gain_per_sample * n_effective_part_samples
-    ):
+    text, gain = max(gains.items(), key=lambda one: one[1])
+    allowed = 2.0 * model.fitted_ranges.misread_gain if model.fitted_ranges is not None else 0.0
+    if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE) + allowed * n:
         return None
-    log10_likelihood_ratio = max_log_likelihood_gain_per_sample * n_effective_part_samples / np.log(10.0)
-    return (
-        f"each part of the flight is at least 10^{log10_likelihood_ratio:.0f} times as likely with "
-        f"{correction_text}"
-    )
+    log10 = gain * n / np.log(10.0)
+    return f"each part of the flight is at least 10^{log10:.0f} times as likely with {text}"
 
 
-def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
+def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts.
 
@@ -525,299 +331,190 @@ def min_log_likelihood_gains_and_part_size(samples: Samples, model: Model) -> tu
     errs in a signal's effect, a smaller or reversed effect may be likelier than the modelled one, while none
     is likelier still.
     """
-    log_likelihoods_and_sample_count = _part_log_likelihoods_and_sample_count(samples, model)
-    if log_likelihoods_and_sample_count is None:
+    found = _likelihoods_and_size(samples, model)
+    if found is None:
         return {}, 0.0
-    logged_log_likelihoods, n_effective_part_samples = log_likelihoods_and_sample_count
-    log_likelihoods_without_signal = {
-        signal: _part_log_likelihoods(log_without_signal(samples, model.vehicle, signal), model)
-        for signal in model.vehicle.signal_column_names
+    logged, n = found
+    without = {
+        signal: _likelihoods(log_without_signal(samples, model.vehicle, signal), model)
+        for signal in model.vehicle.signal_columns
     }
-    min_sample_log_likelihood_gain_by_correction = {}
-    for corrected_log in logs_with_one_mistake_corrected(
-        samples, model.vehicle, surfaces_of_unknown_effect(model)
-    ):
-        corrected_log_likelihoods = (
-            _part_log_likelihoods(corrected_log.samples, model) + corrected_log.log_jacobian
-        )
-        gain = float((corrected_log_likelihoods - logged_log_likelihoods).min())
-        if signal := corrected_log.scaled_signal:
-            gain_over_no_signal = corrected_log_likelihoods - log_likelihoods_without_signal[signal]
-            gain = min(gain, float(gain_over_no_signal.sum()))
-        min_sample_log_likelihood_gain_by_correction[corrected_log.correction_text] = gain
-    return min_sample_log_likelihood_gain_by_correction, n_effective_part_samples
+    gains = {}
+    for log in corrected_logs(samples, model.vehicle, unknown_surfaces(model)):
+        ll = _likelihoods(log.samples, model) + log.log_jacobian
+        gain = float((ll - logged).min())
+        if signal := log.scaled_signal:
+            gain = min(gain, float((ll - without[signal]).sum()))
+        gains[log.correction_text] = gain
+    return gains, n
 
 
-def _part_log_likelihoods(samples: Samples, model: Model) -> Floats:
+def _likelihoods(samples: Samples, model: Model) -> Floats:
     """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
-    found = _part_log_likelihoods_and_sample_count(samples, model)
+    found = _likelihoods_and_size(samples, model)
     return np.array(-np.inf) if found is None else found[0]
 
 
-def _part_log_likelihoods_and_sample_count(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
-    number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
-    short."""
-    whitening_matrix, effective_sample_share, log_unfiltered_noise_sd_product = (
-        _whitening_sample_share_and_log_noise(samples, model)
-    )
-    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
-        samples, model
-    )
-    predictable_rows = np.flatnonzero(is_predictable)
-    if (
-        rows_by_part := regression.split_into_parts_for_bounds(
-            predictable_rows[:: max(len(predictable_rows) // _MAX_COMPARED_SAMPLES, 1)]
-        )
-    ) is None:
+def _likelihoods_and_size(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+    """Log likelihood of a sample of each part of the flight, as in `_GainBounds`, and the effective number of
+    white samples of a part; of a long flight every k-th sample is taken. None where a part is too short."""
+    W, share, log_sd = _whitening(samples, model)
+    ok, y, F = regression.whitened_rates(samples, model)
+    rows = np.flatnonzero(ok)
+    if (parts := regression.split_parts(rows[:: max(len(rows) // _MAX_COMPARED_SAMPLES, 1)])) is None:
         return None
-    regressors_and_targets_by_part = [
-        _trim_and_gain_regression_data(
-            part_rows, rates_unexplained_by_past, group_responses, whitening_matrix
-        )
-        for part_rows in rows_by_part
-    ]
-    noise_variance_scales = [
-        noise_variance_scale(
-            regression.coefficient_upper_bounds_and_squared_residuals(
-                regressors, targets, effective_sample_share
-            )[1]
-        )
-        for regressors, targets in regressors_and_targets_by_part
-    ]
-    return -log_unfiltered_noise_sd_product - 1.5 * np.log(
-        noise_variance_scales
-    ), effective_sample_share * min(map(len, rows_by_part))
+    pairs = [_gain_data(part, y, F, W) for part in parts]
+    scales = [residual_scale(regression.bound_above(Z, v, share)[1]) for Z, v in pairs]
+    return -log_sd - 1.5 * np.log(scales), share * min(map(len, parts))
 
 
-def _whitening_sample_share_and_log_noise(samples: Samples, model: Model) -> tuple[Floats, float, float]:
+def _whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
     """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    covariance_inflation_of_fitted_noise = model.covariance_inflation_of_noise_model(
-        samples.noise_ma_coefficients
-    )
-    noise_covariance_root = np.linalg.cholesky(
-        model.with_inflated_covariance_of_noise_model(
-            samples.noise_ma_coefficients
-        ).intercept_past_response_noise()[3]
-        / covariance_inflation_of_fitted_noise
-    )
-    log_unfiltered_noise_sd_product = float(
-        np.log(np.diag(noise_covariance_root)).sum()
-        - 3.0 * np.log(sum(samples.noise_ma_coefficients or (1.0,)))
-    )
-    return (
-        np.linalg.inv(noise_covariance_root).T,
-        model.settings.effective_sample_share / covariance_inflation_of_fitted_noise,
-        log_unfiltered_noise_sd_product,
-    )
+    ma = samples.noise_ma_coefficients
+    inflation = model.inflation_of(ma)
+    root = np.linalg.cholesky(model.with_noise_of(ma).as_arrays()[3] / inflation)
+    log_sd = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(ma or (1.0,))))
+    return np.linalg.inv(root).T, model.settings.effective_sample_share / inflation, log_sd
 
 
-def _trim_and_gain_regression_data(
-    part_rows: NDArray[np.int64],
-    rates_unexplained_by_past: Floats,
-    responses: Floats,
-    whitening_matrix: Floats,
-) -> tuple[Floats, Floats]:
-    """Regressors (3 n, 3 + K) of trim and responses (n, K, 3), and what they are to explain, (3 n,)."""
-    trim_regressors = np.broadcast_to(np.eye(3), (len(part_rows), 3, 3))
-    regressors = np.concatenate([trim_regressors, responses[part_rows]], axis=1) @ whitening_matrix
-    return regressors.transpose(0, 2, 1).reshape(3 * len(part_rows), -1), (
-        rates_unexplained_by_past[part_rows] @ whitening_matrix
-    ).ravel()
+def _gain_data(rows: NDArray[np.int64], y: Floats, F: Floats, W: Floats) -> tuple[Floats, Floats]:
+    """Z (3 n, 3 + G) of trim and responses F, and v (3 n,) of y, at these rows."""
+    trim = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
+    Z = np.concatenate([trim, F[rows]], axis=1) @ W
+    return Z.transpose(0, 2, 1).reshape(3 * len(rows), -1), (y[rows] @ W).ravel()
 
 
-def noise_variance_scale(squared_residuals: Floats) -> float:
+def residual_scale(e2: Floats) -> float:
     """The scale of the noise by the squares of what is left, (3 n,)."""
-    return float(np.median(squared_residuals.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3_DOF)
+    return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
-def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:
-    """None where a part is too short."""
-    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
-        samples, model
-    )
-    if (rows_by_part := regression.split_into_parts_for_bounds(np.flatnonzero(is_predictable))) is None:
+def _bound_gains(samples: Samples, model: Model) -> _GainBounds | None:
+    """The answers to each group's command in all parts of a flight; None where a part is too short."""
+    ok, y, F = regression.whitened_rates(samples, model)
+    if (parts := regression.split_parts(np.flatnonzero(ok))) is None:
         return None
-    (whitening_matrix, effective_sample_share, log_unfiltered_noise_sd_product), n_groups = (
-        _whitening_sample_share_and_log_noise(samples, model),
-        len(model.groups),
-    )
-    gain_upper_bounds = np.full(n_groups, -np.inf)
-    gain_lower_bounds = np.full(n_groups, np.inf)
-    noise_variance_scales = []
-    for part_rows in rows_by_part:
-        regressors, whitened_targets = _trim_and_gain_regression_data(
-            part_rows, rates_unexplained_by_past, group_responses, whitening_matrix
-        )
-        part_coefficient_upper_bounds, squared_residuals = (
-            regression.coefficient_upper_bounds_and_squared_residuals(
-                regressors, whitened_targets, effective_sample_share
-            )
-        )
-        negated_part_coefficient_lower_bounds, _ = regression.coefficient_upper_bounds_and_squared_residuals(
-            -regressors, whitened_targets, effective_sample_share
-        )
-        gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
-        gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
-        noise_variance_scales.append(noise_variance_scale(squared_residuals))
-    return _GainBoundsOverFlight(
-        gain_upper_bounds.tolist(),
-        gain_lower_bounds.tolist(),
-        -log_unfiltered_noise_sd_product - 1.5 * np.log(noise_variance_scales),
-    )
+    W, share, log_sd = _whitening(samples, model)
+    hi = np.full(len(model.groups), -np.inf)
+    lo = np.full(len(model.groups), np.inf)
+    scales = []
+    for rows in parts:
+        Z, v = _gain_data(rows, y, F, W)
+        above, e2 = regression.bound_above(Z, v, share)
+        below, _ = regression.bound_above(-Z, v, share)
+        hi = np.maximum(hi, above[3:])
+        lo = np.minimum(lo, -below[3:])
+        scales.append(residual_scale(e2))
+    return _GainBounds(hi.tolist(), lo.tolist(), -log_sd - 1.5 * np.log(scales))
 
 
-def _relative_group_command_motion(samples: Samples, model: Model, group: list[str]) -> float:
+def _relative_motion(samples: Samples, model: Model, group: list[str]) -> float:
     """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
     not known."""
     if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
         return 0.0
-    width_ratios = _range_widths(central_ranges(samples.commands)) / np.maximum(
-        _range_widths(model.fitted_ranges.command_ranges), MIN_DIVISOR
-    )
-    return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
+    fitted = np.maximum(_spans(model.fitted_ranges.command_ranges), MIN_DIVISOR)
+    ratios = _spans(central_ranges(samples.commands)) / fitted
+    return max(float(ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
 
-def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:
+def _spans(ranges: Sequence[Sequence[float]]) -> Floats:
     return np.ptp(np.array(ranges, dtype=float).reshape(-1, 2), axis=1)
 
 
-def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mask]:
+def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
-    rows_by_reason: dict[str, Mask] = {}
-    for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
-        rows_by_reason[f"{column_name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
-            samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
-        )
+    reasons: dict[str, Mask] = {}
+    for name, limit_s in _max_still_s(samples, model).items():
+        reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = samples.unchanged_s[name] > limit_s
     if samples.is_rate_clipped is not None:
-        rows_by_reason[f"a rate was clipped in the last {_DISTRUST_AFTER_CLIPPING_S:g} s"] = (
-            _was_clipped_recently(samples.is_rate_clipped, samples.dt_s)
-        )
-    if model.fitted_ranges is None:
-        return _drop_empty_reasons(rows_by_reason)
-    return _drop_empty_reasons(
-        rows_by_reason | _rows_out_of_fitted_ranges_by_reason(samples, model, model.fitted_ranges)
-    )
+        clipped = _clipped_recently(samples.is_rate_clipped, samples.dt_s)
+        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = clipped
+    if model.fitted_ranges is not None:
+        reasons |= _rows_out_of_range(samples, model, model.fitted_ranges)
+    return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
-def _was_clipped_recently(is_clipped: Mask, dt_s: float) -> Mask:
+def _clipped_recently(clipped: Mask, dt_s: float) -> Mask:
     """Whether a condition held in the last half minute."""
-    row_index = np.arange(len(is_clipped))
-    n_rows_since_clipping = row_index - np.maximum.accumulate(
-        np.where(is_clipped, row_index, -len(is_clipped) - round(_DISTRUST_AFTER_CLIPPING_S / dt_s))
-    )
-    return np.asarray(n_rows_since_clipping * dt_s <= _DISTRUST_AFTER_CLIPPING_S)
+    k = np.arange(len(clipped))
+    since = k - np.maximum.accumulate(np.where(clipped, k, -len(clipped) - round(_CLIPPING_MEMORY_S / dt_s)))
+    return np.asarray(since * dt_s <= _CLIPPING_MEMORY_S)
 
 
-def _drop_empty_reasons(rows_by_reason: dict[str, Mask]) -> dict[str, Mask]:
-    return {reason: rows for reason, rows in rows_by_reason.items() if rows.any()}
-
-
-def _rows_out_of_fitted_ranges_by_reason(
-    samples: Samples, model: Model, fitted_ranges: FittedRanges
-) -> dict[str, Mask]:
-    command_names = [f"command of {surface}" for surface in model.vehicle.surfaces]
-    names_values_and_ranges = [
-        *zip(command_names, samples.commands.T, fitted_ranges.command_ranges, strict=False),
-        *zip(_rate_column_names(model), samples.rates.T, fitted_ranges.rate_ranges_rad_s, strict=False),
+def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
+    commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
+    channels = [
+        *zip(commands, samples.commands.T, ranges.command_ranges, strict=False),
+        *zip(_rate_columns(model), samples.rates.T, ranges.rate_ranges_rad_s, strict=False),
     ]
-    rows_by_reason = {}
-    for name, values, (low, high) in names_values_and_ranges:
-        margin = _RANGE_MARGIN_SHARE * (high - low) + MIN_DIVISOR
-        rows_by_reason[_outside_range_text(name, low, high)] = _mostly_true_recently(
-            ~_is_within_or_unknown(values, low - margin, high + margin), samples
-        )
-    if fitted_ranges.airspeed_range_mps is not None and samples.airspeed is not None:
-        low, high = fitted_ranges.airspeed_range_mps
-        is_airspeed_out_of_range = ~_is_within_or_unknown(
-            samples.airspeed,
-            (1.0 - _AIRSPEED_MARGIN_SHARE_OF_LIMIT) * low,
-            (1.0 + _AIRSPEED_MARGIN_SHARE_OF_LIMIT) * high,
-        )
-        rows_by_reason[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(
-            is_airspeed_out_of_range, samples
-        )
-    return rows_by_reason
+    reasons = {}
+    for name, values, (lo, hi) in channels:
+        margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
+        outside = ~_in_range(values, lo - margin, hi + margin)
+        reasons[_outside_text(name, lo, hi)] = _mostly_recently(outside, samples)
+    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
+        lo, hi = ranges.airspeed_range_mps
+        outside = ~_in_range(samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * lo, (1.0 + _AIRSPEED_MARGIN) * hi)
+        reasons[_outside_text("airspeed", lo, hi)] = _mostly_recently(outside, samples)
+    return reasons
 
 
-def _outside_range_text(name: str, low: float, high: float) -> str:
-    return f"{name} is outside {low:.3g} to {high:.3g}, where the model was fitted"
+def _outside_text(name: str, lo: float, hi: float) -> str:
+    return f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
 
 
-def _is_within_or_unknown(values: Floats, low: float, high: float) -> Mask:
-    return np.asarray(~np.isfinite(values) | ((values >= low) & (values <= high)))
+def _in_range(values: Floats, lo: float, hi: float) -> Mask:
+    return np.asarray(~np.isfinite(values) | ((values >= lo) & (values <= hi)))
 
 
-def _mostly_true_recently(is_true: Mask, samples: Samples) -> Mask:
+def _mostly_recently(held: Mask, samples: Samples) -> Mask:
     """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
-    window_samples = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
-    cumulated_true = np.concatenate([[0], np.cumsum(is_true)])
-    window_end_rows = np.arange(1, len(is_true) + 1)
-    window_begin_rows = np.maximum(window_end_rows - window_samples, 0)
-    return np.asarray(
-        cumulated_true[1:] - cumulated_true[window_begin_rows]
-        > _MIN_OUTSIDE_SHARE * (window_end_rows - window_begin_rows)
-    )
+    n = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
+    sums = np.concatenate([[0], np.cumsum(held)])
+    end = np.arange(1, len(held) + 1)
+    begin = np.maximum(end - n, 0)
+    return np.asarray(sums[1:] - sums[begin] > _MIN_OUTSIDE_SHARE * (end - begin))
 
 
-def _rate_column_names(model: Model) -> list[str]:
+def _rate_columns(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str, float]:
+def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
-    fitted_unchanged_time_s_by_column = (
-        model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
-    )
-    fitted_or_default_unchanged_time_s_by_column = {
-        column_name: 0.0 if column_name in _rate_column_names(model) else np.inf
-        for column_name in samples.time_since_change_s_by_column
-    } | fitted_unchanged_time_s_by_column
-    min_unchanged_time_limit_s_by_column = {
-        column_name: MIN_STILL_S / 3.0
-        if column_name in fitted_unchanged_time_s_by_column and column_name in _rate_column_names(model)
-        else MIN_STILL_S
-        for column_name in fitted_or_default_unchanged_time_s_by_column
-    }
-    return {
-        column_name: max(
-            min_unchanged_time_limit_s_by_column[column_name],
-            _MAX_UNCHANGED_TIME_FACTOR * fitted_or_default_unchanged_time_s_by_column[column_name],
-        )
-        for column_name in samples.time_since_change_s_by_column
-    }
+    fitted = model.fitted_ranges.longest_still_s if model.fitted_ranges else {}
+    rates = _rate_columns(model)
+    limits_s = {}
+    for name in samples.unchanged_s:
+        still_s = fitted.get(name, 0.0 if name in rates else np.inf)
+        least_s = MIN_STILL_S / 3.0 if name in fitted and name in rates else MIN_STILL_S
+        limits_s[name] = max(least_s, _MAX_STILL_FACTOR * still_s)
+    return limits_s
 
 
-def is_row_frozen_or_clipped(samples: Samples, model: Model) -> Mask:
+def dead_rows(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
-    is_any_column_frozen = np.zeros(len(samples.t_s), dtype=bool)
-    for column_name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
-        is_any_column_frozen |= samples.time_since_change_s_by_column[column_name] > max_unchanged_time_s
-    return (
-        is_any_column_frozen
-        if samples.is_rate_clipped is None
-        else is_any_column_frozen | samples.is_rate_clipped
-    )
+    dead = np.zeros(len(samples.t_s), dtype=bool)
+    for name, limit_s in _max_still_s(samples, model).items():
+        dead |= samples.unchanged_s[name] > limit_s
+    return dead if samples.is_rate_clipped is None else dead | samples.is_rate_clipped
 
 
-def with_rates_unknown_where_frozen_or_clipped(samples: Samples, model: Model) -> Samples:
+def without_dead_rows(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live."""
-    is_frozen_or_clipped = is_row_frozen_or_clipped(samples, model)
-    if not is_frozen_or_clipped.any():
+    dead = dead_rows(samples, model)
+    if not dead.any():
         return samples
-    return replace(samples, rates=np.where(is_frozen_or_clipped[:, None], np.nan, samples.rates))
+    return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))
 
 
-def credibility_entry(rows_by_reason: Mapping[str, Mask], is_credible: NDArray[np.int64]) -> Document:
+def credibility_entry(reasons: Mapping[str, Mask], credible: NDArray[np.int64]) -> Document:
     """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
     their shares."""
-    share_of_reason = {reason: float(rows.mean()) for reason, rows in rows_by_reason.items()}
-    reasons_largest_share_first = sorted(share_of_reason, key=lambda reason: -share_of_reason[reason])
-    return {
-        "share": float(is_credible.mean()) if len(is_credible) else 0.0,
-        "reasons": [
-            {"says": reason, "share": share_of_reason[reason]} for reason in reasons_largest_share_first
-        ],
-    }
+    shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}
+    ordered = sorted(shares, key=lambda reason: -shares[reason])
+    entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
+    return {"share": float(credible.mean()) if len(credible) else 0.0, "reasons": entries}

@@ -8,7 +8,7 @@ RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
     "rate", "angle", "speed", "acceleration", "length", "share", "time",
 )  # fmt: skip
 _RAD_PER_DEG = pi / 180.0
-KIND_AND_SI_FACTOR_OF_UNIT: dict[str, tuple[str, float]] = {
+SI_UNITS: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),
     "mrad/s": (RATE, 1e-3),
     "rad": (ANGLE, 1.0), "deg": (ANGLE, _RAD_PER_DEG), "cdeg": (ANGLE, 0.01 * _RAD_PER_DEG),
@@ -21,24 +21,20 @@ KIND_AND_SI_FACTOR_OF_UNIT: dict[str, tuple[str, float]] = {
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
 """Kind of each unit, and its size in the SI unit."""
-SECONDS_PER_TIME_UNIT = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of the time column."""
-SIGN_AND_UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
+UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 """What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse."""
 
 
 def units_of_kind(kind: str) -> list[str]:
     """The units of one kind, the SI unit first."""
-    return [name for name, (unit_kind, _) in KIND_AND_SI_FACTOR_OF_UNIT.items() if unit_kind == kind]
+    return [name for name, (unit_kind, _) in SI_UNITS.items() if unit_kind == kind]
 
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratio_of_unit = {
-        name: max(
-            si_factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / si_factor
-        )
-        for name in units_of_kind(kind)
-    }
-    nearest = min(ratio_of_unit, key=lambda name: ratio_of_unit[name])
-    return nearest if ratio_of_unit[nearest] <= max_ratio else None
+    sizes = {name: size for name, (one, size) in SI_UNITS.items() if one == kind}
+    ratios = {name: max(si_factor / size, size / si_factor) for name, size in sizes.items()}
+    nearest = min(ratios, key=lambda name: ratios[name])
+    return nearest if ratios[nearest] <= max_ratio else None

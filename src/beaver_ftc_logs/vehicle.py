@@ -29,17 +29,17 @@ from beaver_ftc.scenario import looks_like_a_path
 from beaver_ftc_logs.units import (
     ACCELERATION,
     ANGLE,
-    KIND_AND_SI_FACTOR_OF_UNIT,
     LENGTH,
     RATE,
-    SECONDS_PER_TIME_UNIT,
+    SI_UNITS,
     SPEED,
+    TIME_UNITS,
     units_of_kind,
 )
 
 _MAX_FILE_BYTES = 1_000_000
-MAX_SETTABLE_FALSE_ALARMS_PER_HOUR = 1000.0
-STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
+MAX_ALARMS_PER_HOUR = 1000.0
+STILL_AIR_HZ, _MOVING_AIR_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -53,7 +53,7 @@ class QuantityColumn(Section):
     numbers in the log are in the SI unit, write only the name of the column instead of this section."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
-    unit: Literal[tuple(KIND_AND_SI_FACTOR_OF_UNIT)] | None = Field(  # type: ignore[valid-type]
+    unit: Literal[tuple(SI_UNITS)] | None = Field(  # type: ignore[valid-type]
         default=None, description="unit of the numbers; left out: the SI unit", examples=["deg/s"]
     )
     scale: Number = number(
@@ -75,7 +75,7 @@ class QuantityColumn(Section):
         return self
 
     @model_serializer(mode="wrap")
-    def _serialize_plain_as_name(self, serialize: Any) -> Any:
+    def _serialize_plain(self, serialize: Any) -> Any:
         """A name is enough where nothing else is said."""
         is_plain = self.unit is None and self.scale == 1.0 and self.offset == 0.0
         return self.column if is_plain else serialize(self)
@@ -83,7 +83,7 @@ class QuantityColumn(Section):
     @property
     def si_factor(self) -> float:
         """Return the factor from the column's numbers to SI."""
-        return self.scale * (KIND_AND_SI_FACTOR_OF_UNIT[self.unit][1] if self.unit else 1.0)
+        return self.scale * (SI_UNITS[self.unit][1] if self.unit else 1.0)
 
     def to_si(self, values: Any) -> Any:
         """The column's numbers in SI."""
@@ -92,18 +92,18 @@ class QuantityColumn(Section):
         return values * self.si_factor + self.offset * self.si_factor / self.scale
 
 
-def _expand_column_name(name_or_section: Any) -> Any:
-    return {"column": name_or_section} if isinstance(name_or_section, str) else name_or_section
+def _expand_column_name(value: Any) -> Any:
+    return {"column": value} if isinstance(value, str) else value
 
 
-QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
+ColumnSpec = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
 
 
 class TimeColumn(Section):
     """The column that contains the time, if the log is a table."""
 
     column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
-    unit: Literal[tuple(SECONDS_PER_TIME_UNIT)] = Field(  # type: ignore[valid-type]
+    unit: Literal[tuple(TIME_UNITS)] = Field(  # type: ignore[valid-type]
         default="s", description="unit of the numbers", examples=["us"]
     )
 
@@ -111,20 +111,20 @@ class TimeColumn(Section):
 class RateColumns(Section):
     """The columns of the three body rates. Without `unit`, the numbers are in rad/s."""
 
-    p: QuantityColumnOrName = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
-    q: QuantityColumnOrName = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
-    r: QuantityColumnOrName = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+    p: ColumnSpec = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
+    q: ColumnSpec = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
+    r: ColumnSpec = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
 
 
 class AttitudeColumns(Section):
     """Columns of the attitude angles. With these angles, wrong units and signs of the body rates are found.
     If turbulence is declared, `diagnose --aircraft` requires these columns."""
 
-    roll: QuantityColumnOrName = Field(description="column of the roll angle, rad", examples=["roll_rad"])
-    pitch: QuantityColumnOrName | None = Field(
+    roll: ColumnSpec = Field(description="column of the roll angle, rad", examples=["roll_rad"])
+    pitch: ColumnSpec | None = Field(
         default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
     )
-    yaw: QuantityColumnOrName | None = Field(
+    yaw: ColumnSpec | None = Field(
         default=None, description="column of the yaw angle, rad", examples=["yaw_rad"]
     )
 
@@ -132,10 +132,8 @@ class AttitudeColumns(Section):
 class EnergyColumns(Section):
     """Columns that show an engine failure. After an engine failure, altitude and airspeed fall together."""
 
-    altitude: QuantityColumnOrName = Field(description="column of the altitude, m", examples=["altitude_m"])
-    airspeed: QuantityColumnOrName = Field(
-        description="column of the airspeed, m/s", examples=["airspeed_m_s"]
-    )
+    altitude: ColumnSpec = Field(description="column of the altitude, m", examples=["altitude_m"])
+    airspeed: ColumnSpec = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
 
 
 class Vehicle(Section):
@@ -152,7 +150,7 @@ class Vehicle(Section):
         description="column with the time. Only a table without the column `t_s` needs this section",
     )
     rates: RateColumns = Field(description="columns of the three body rates")
-    commands: list[QuantityColumnOrName] = Field(
+    commands: list[ColumnSpec] = Field(
         min_length=1,
         max_length=20,
         description="columns of the commands that the autopilot sends to the servos. Do not use measured "
@@ -160,7 +158,7 @@ class Vehicle(Section):
         "can leave out this key, if the parameters in the log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
-    signals: list[QuantityColumnOrName] = Field(
+    signals: list[ColumnSpec] = Field(
         default=[],
         max_length=12,
         description="columns of other measured quantities. With rates and commands, the model predicts the "
@@ -177,7 +175,7 @@ class Vehicle(Section):
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
-    labels: dict[str, QuantityColumnOrName] = Field(
+    labels: dict[str, ColumnSpec] = Field(
         default={},
         description="columns with the true effectiveness of each surface, for test flights with known "
         "faults. 1: the surface is healthy. `identify` and `diagnose --score` read these columns",
@@ -187,14 +185,14 @@ class Vehicle(Section):
         default=None,
         description="columns of the attitude angles. They show wrong units and signs of the body rates",
     )
-    acceleration: QuantityColumnOrName | None = Field(
+    acceleration: ColumnSpec | None = Field(
         default=None,
         description="column of the specific force along the z axis. It shows a wrong unit, because the "
         "median of its magnitude must be about 1 g. Its sign does not matter",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
-    airspeed: QuantityColumnOrName | None = Field(
+    airspeed: ColumnSpec | None = Field(
         default=None,
         description="column of the airspeed. With it, the diagnosis draws conclusions only in the range of "
         "airspeeds that the fit used",
@@ -206,7 +204,7 @@ class Vehicle(Section):
         description="columns that show an engine failure. While altitude and airspeed fall as after an "
         "engine failure, the diagnosis names no surface",
     )
-    flow: dict[str, QuantityColumnOrName] = Field(
+    flow: dict[str, ColumnSpec] = Field(
         default={},
         description="columns of further inputs of the design model, for `diagnose --aircraft`. The keys are "
         "`alpha_rad`, `beta_rad`, `qdyn_pa` and the signals in the aircraft file",
@@ -235,7 +233,7 @@ class Vehicle(Section):
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
-    outputs: dict[str, QuantityColumnOrName] = Field(
+    outputs: dict[str, ColumnSpec] = Field(
         default={},
         description="columns of the servo outputs. Only `compare --flights` uses them, for a published "
         "detector called the freeze rule",
@@ -244,7 +242,7 @@ class Vehicle(Section):
     false_alarms_per_hour: Number | None = number(
         None,
         gt=0,
-        le=MAX_SETTABLE_FALSE_ALARMS_PER_HOUR,
+        le=MAX_ALARMS_PER_HOUR,
         unit="1/h",
         says="accepted number of false alarms in each hour of healthy flight; left out: 1 for logs without "
         "labels. For logs with labels no rate is set",
@@ -280,87 +278,73 @@ class Vehicle(Section):
     )
 
     @model_validator(mode="after")
-    def _check_names_units_and_columns(self) -> "Vehicle":
-        reason = (
-            "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
-        )
-        bad_names = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
-        mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
-        for surface, weight_by_command in self.surfaces.items():
-            mistakes += _unknown_name_conflicts(
-                ("surfaces", surface), weight_by_command, "command", self.command_column_names
-            )
-        surface_tables_by_key: dict[str, Collection[str]] = {
+    def _check_names(self) -> "Vehicle":
+        # the name of a surface is part of a column's
+        reason = "a surface's name has letters, digits, - and _ only, allowed: one"
+        bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
+        mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
+        for surface, weights in self.surfaces.items():
+            at = ("surfaces", surface)
+            mistakes += _unknown_name_conflicts(at, weights, "command", self.command_columns)
+        tables: dict[str, Collection[str]] = {
             "labels": self.labels,
             "outputs": self.outputs,
             "full_deflection_rad": self.full_deflection_rad,
             "airspeed_powers": self.airspeed_powers,
         }
-        for key, value_by_surface in surface_tables_by_key.items():
-            mistakes += _unknown_name_conflicts((key,), value_by_surface, "surface", self.surfaces)
-        for location, kind, quantity in self.quantities_of_known_kind():
-            if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
+        for key, values in tables.items():
+            mistakes += _unknown_name_conflicts((key,), values, "surface", self.surfaces)
+        for location, kind, quantity in self.typed_quantities():
+            if quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._column_reading_conflicts()
+        mistakes += self._reading_conflicts()
         refuse(mistakes)
         return self
 
-    def quantities_of_known_kind(self) -> list[tuple[Location, str, QuantityColumn]]:
+    def typed_quantities(self) -> list[tuple[Location, str, QuantityColumn]]:
         """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        locations_kinds_and_quantities: list[tuple[Location, str, QuantityColumn]] = [
-            (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
+        kinds: list[tuple[str, str, Any]] = [
+            *((f"rates {axis}", RATE, getattr(self.rates, axis)) for axis in "pqr"),
+            *(
+                (f"attitude {axis}", ANGLE, getattr(self.attitude, axis, None))
+                for axis in ("roll", "pitch", "yaw")
+            ),
+            ("acceleration", ACCELERATION, self.acceleration),
+            ("airspeed", SPEED, self.airspeed),
+            ("energy altitude", LENGTH, getattr(self.energy, "altitude", None)),
+            ("energy airspeed", SPEED, getattr(self.energy, "airspeed", None)),
+            *((f"flow {name}", ANGLE, self.flow.get(name)) for name in ("alpha_rad", "beta_rad")),
         ]
-        if self.attitude is not None:
-            locations_kinds_and_quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
-            for angle_name in ("pitch", "yaw"):
-                if (angle_column := getattr(self.attitude, angle_name)) is not None:
-                    locations_kinds_and_quantities.append((("attitude", angle_name), ANGLE, angle_column))
-        if self.acceleration is not None:
-            locations_kinds_and_quantities.append((("acceleration",), ACCELERATION, self.acceleration))
-        if self.airspeed is not None:
-            locations_kinds_and_quantities.append((("airspeed",), SPEED, self.airspeed))
-        if self.energy is not None:
-            locations_kinds_and_quantities.append((("energy", "altitude"), LENGTH, self.energy.altitude))
-            locations_kinds_and_quantities.append((("energy", "airspeed"), SPEED, self.energy.airspeed))
-        for name in ("alpha_rad", "beta_rad"):
-            if name in self.flow:
-                locations_kinds_and_quantities.append((("flow", name), ANGLE, self.flow[name]))
-        return locations_kinds_and_quantities
+        return [
+            (tuple(keys.split()), kind, quantity) for keys, kind, quantity in kinds if quantity is not None
+        ]
 
-    def _column_reading_conflicts(self) -> list[Conflict]:
+    def _reading_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
-        first_quantity_of_column: dict[str, QuantityColumn] = {}
-        for location, quantity in [
-            *self.located_model_quantities(),
-            *((location, quantity) for location, _, quantity in self.quantities_of_known_kind()),
-        ]:
-            if first_quantity_of_column.setdefault(quantity.column, quantity) != quantity:
-                return [
-                    (
-                        location,
-                        f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset",
-                    )
-                ]
+        first: dict[str, QuantityColumn] = {}
+        typed = [(location, quantity) for location, _, quantity in self.typed_quantities()]
+        for location, quantity in [*self.located_model_quantities(), *typed]:
+            if first.setdefault(quantity.column, quantity) != quantity:
+                reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"
+                return [(location, reason)]
         return []
 
     def located_model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
-        locations_and_quantities: list[tuple[Location, QuantityColumn]] = [
+        found: list[tuple[Location, QuantityColumn]] = [
             (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
         ]
-        locations_and_quantities += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
-        return locations_and_quantities + [
-            (("signals", i), quantity) for i, quantity in enumerate(self.signals)
-        ]
+        found += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
+        return found + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
 
     @property
-    def command_column_names(self) -> list[str]:
+    def command_columns(self) -> list[str]:
         """The commands' columns."""
         return [command.column for command in self.commands]
 
     @property
-    def signal_column_names(self) -> list[str]:
+    def signal_columns(self) -> list[str]:
         """The further signals' columns."""
         return [signal.column for signal in self.signals]
 
@@ -368,8 +352,8 @@ class Vehicle(Section):
     def max_sample_rate_hz(self) -> float:
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
-        is_air_still = self.moving_air is False or (self.moving_air is None and self.labels)
-        default_hz = STILL_AIR_MAX_RATE_HZ if is_air_still else _MOVING_AIR_MAX_RATE_HZ
+        still = self.moving_air is False or (self.moving_air is None and self.labels)
+        default_hz = STILL_AIR_HZ if still else _MOVING_AIR_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:
@@ -383,35 +367,27 @@ class Vehicle(Section):
         return [float(self.airspeed_powers.get(name, 2.0)) for name in self.surfaces]
 
     @property
-    def signal_regressor_names(self) -> list[str]:
+    def regressor_columns(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
-        airspeed (`samples.with_airspeed_scaling_and_products`)."""
-        rate_column_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        column_names_multiplied_by_airspeed = (
-            rate_column_names + self.signal_column_names if self.reference_airspeed_mps is not None else []
-        )
-        return self.signal_column_names + [
-            f"{name} by airspeed" for name in column_names_multiplied_by_airspeed
-        ]
+        airspeed (`samples.scale_by_airspeed`)."""
+        rate_names = [getattr(self.rates, axis).column for axis in "pqr"]
+        scaled = rate_names + self.signal_columns if self.reference_airspeed_mps is not None else []
+        return self.signal_columns + [f"{name} by airspeed" for name in scaled]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [quantity for _, quantity in self.located_model_quantities()] + [
-            quantity for _, _, quantity in self.quantities_of_known_kind()
-        ]
+        quantities = [quantity for *_, quantity in self.located_model_quantities()]
+        quantities += [quantity for *_, quantity in self.typed_quantities()]
         quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 
 def _unknown_name_conflicts(
-    location: Location, names: Iterable[str], name_kind: str, known_names: Collection[str]
+    location: Location, names: Iterable[str], name_kind: str, known: Collection[str]
 ) -> list[Conflict]:
     """One mistake for each name below a location that is not known."""
-    unknown_names = [name for name in names if name not in known_names]
-    return [
-        ((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known_names)}")
-        for name in unknown_names
-    ]
+    unknown = [name for name in names if name not in known]
+    return [((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known)}") for name in unknown]
 
 
 def unused_keys_as_comments(used_keys: Collection[str]) -> str:
@@ -419,36 +395,34 @@ def unused_keys_as_comments(used_keys: Collection[str]) -> str:
     lines = ["# Further keys:"]
     for name, field in Vehicle.model_fields.items():
         if name not in used_keys:
-            example_text = f"   for example {field.examples[0]}" if field.examples else ""
-            lines.append(f"# {name}: {field.description}{example_text}")
+            example = f"   for example {field.examples[0]}" if field.examples else ""
+            lines.append(f"# {name}: {field.description}{example}")
     return "\n".join(lines) + "\n"
 
 
-def load_vehicle(path_or_name: str | Path) -> Vehicle:
+def load_vehicle(vehicle: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
-    document, path = read_vehicle_document(path_or_name)
+    document, path = read_vehicle_document(vehicle)
     return validate(Vehicle, document, path)
 
 
-def read_vehicle_document(path_or_name: str | Path) -> tuple[Document, str]:
+def read_vehicle_document(vehicle: str | Path) -> tuple[Document, str]:
     """The text of a vehicle file as data that is not checked yet, and its path. Raises ScenarioError."""
-    file_or_name = str(path_or_name)
-    built_in_names = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
-    if looks_like_a_path(file_or_name):
-        text = text_of(file_or_name, _MAX_FILE_BYTES)
+    given = str(vehicle)
+    built_in = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
+    if looks_like_a_path(given):
+        text = text_of(given, _MAX_FILE_BYTES)
     else:
-        file_or_name = (
-            str(_BUILT_IN_FOLDER / f"{file_or_name}.yaml") if file_or_name in built_in_names else file_or_name
-        )
-        unknown_name_text = f"no such file or built-in vehicle{suggestion(file_or_name, built_in_names)}"
-        text = text_of(file_or_name, _MAX_FILE_BYTES, lambda: unknown_name_text)
-    path = str(Path(file_or_name))
+        given = str(_BUILT_IN_FOLDER / f"{given}.yaml") if given in built_in else given
+        unknown = f"no such file or built-in vehicle{suggestion(given, built_in)}"
+        text = text_of(given, _MAX_FILE_BYTES, lambda: unknown)
+    path = str(Path(given))
     return parse_document(text, path), path
 
 
-def with_false_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
+def with_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
     """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
-    if not 0.0 < false_alarms_per_hour <= MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:
-        allowed_text = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
-        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed_text}")
+    if not 0.0 < false_alarms_per_hour <= MAX_ALARMS_PER_HOUR:
+        allowed = f"allowed: more than 0, up to {MAX_ALARMS_PER_HOUR:g} an hour"
+        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed}")
     return vehicle.model_copy(update={"false_alarms_per_hour": false_alarms_per_hour})

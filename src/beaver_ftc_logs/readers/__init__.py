@@ -16,12 +16,12 @@ ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
 SAMPLES_PER_PART = 400_000
 """Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000."""
-MAX_LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
+LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
 READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
-NAMES_OF_READERS_OF_WANTED_COLUMNS = ("ulog", "ardupilot")
+SELECTIVE_READERS = ("ulog", "ardupilot")
 """Of an autopilot's logs the columns that are wanted, the names alone where there are none of these."""
-_READER_NAME_BY_SUFFIX = {
+_READER_OF_SUFFIX = {
     ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
     ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
 }  # fmt: skip
@@ -30,7 +30,7 @@ _READER_NAME_BY_SUFFIX = {
 _BLACKBOX_PHRASE = (
     "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
 )
-_WAY_TO_TABLE_BY_SUFFIX = {
+_WAYS_TO_TABLE = {
     ".tlog": "a telemetry log (MAVLink messages that a ground station received), allowed: the autopilot's "
     "own log (.bin, .ulg), or a table of the telemetry, which pymavlink writes: `mavlogdump.py --format csv "
     "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
@@ -44,103 +44,76 @@ _LARGE_FILE_STORES = {
 }
 """How pointers begin: the name of the store, and the command that fetches the file."""
 
-_TIME_COLUMN_AND_UNIT_BY_READER = {
-    "alfa": ("%time", "ns"),
-    "ulog": ("timestamp", "us"),
-    "ardupilot": ("TimeUS", "us"),
-}
+_OWN_TIMES = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilot": ("TimeUS", "us")}
 """Time column and its unit in formats that define them."""
 
 
 def read_flight(
     path: Path,
-    reader_name: str | None = None,
-    time_column_and_unit: tuple[str, str] | None = None,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
-    reader_name: one of READER_NAMES; by the path's own form where None. time_column_and_unit: of a table.
+    reader: one of READER_NAMES; by the path's own form where None. time: of a table.
     columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
     why the log cannot be used.
     """
-    return next(
-        _read_with_reader(
-            path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": None}
-        )
-    )
+    return next(_read_with_reader(path, reader, time, {"columns": columns, "part_rows": None}))
 
 
 def read_parts(
     path: Path,
-    reader_name: str | None = None,
-    time_column_and_unit: tuple[str, str] | None = None,
+    reader: str | None = None,
+    time: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read_with_reader(
-        path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": ROWS_PER_PART}
-    )
+    return _read_with_reader(path, reader, time, {"columns": columns, "part_rows": ROWS_PER_PART})
 
 
 def _read_with_reader(
-    path: Path,
-    reader_name: str | None,
-    time_column_and_unit: tuple[str, str] | None,
-    columns_and_rows_per_part: dict[str, Any],
+    path: Path, reader: str | None, time: tuple[str, str] | None, options: dict[str, Any]
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
-    reader_name = reader_name or reader_name_for_path(path)
-    if reader_name not in READER_NAMES:
-        raise BadInput(f"--reader {reader_name}: is not known, allowed: {', '.join(READER_NAMES)}")
-    module = import_module(f"beaver_ftc_logs.readers.{reader_name}")
-    if reader_name == "table":
-        yield from module.read_parts(path, *(time_column_and_unit or ()), **columns_and_rows_per_part)
+    reader = reader or reader_name_for_path(path)
+    if reader not in READER_NAMES:
+        raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READER_NAMES)}")
+    module = import_module(f"beaver_ftc_logs.readers.{reader}")
+    if reader == "table":
+        yield from module.read_parts(path, *(time or ()), **options)
         return
-    if (
-        time_column_and_unit is not None
-        and time_column_and_unit != _TIME_COLUMN_AND_UNIT_BY_READER[reader_name]
-    ):
-        format_time_column, format_time_unit = _TIME_COLUMN_AND_UNIT_BY_READER[reader_name]
-        raise BadInput(
-            f"{path}: time: {' in '.join(time_column_and_unit)} is not its time, "
-            f"allowed: {format_time_column} in {format_time_unit}"
-        )
-    yield (
-        module.read(path, columns_and_rows_per_part["columns"])
-        if reader_name in NAMES_OF_READERS_OF_WANTED_COLUMNS
-        else module.read(path)
-    )
+    if time is not None and time != _OWN_TIMES[reader]:
+        column, unit = _OWN_TIMES[reader]
+        raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
+    yield (module.read(path, options["columns"]) if reader in SELECTIVE_READERS else module.read(path))
 
 
-def split_long_recording(
-    recording: RecordedFlight, row_stamps_s: Floats, rows_per_sample: float
-) -> Iterator[RecordedFlight]:
-    """A recording in parts as those of a long table: numbered, each begins with the end of the one before.
+def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> Iterator[RecordedFlight]:
+    """A log in parts as those of a long table: numbered, each begins with the end of the one before.
 
-    row_stamps_s: of the rows that are counted, increasing, of which so many are one sample later. A column of
+    stamps: of the rows that are counted, increasing, of which so many are one sample later. A column of
     a part begins with its last value before, if it has no value at the first of these rows.
     """
-    rows_per_part = round(SAMPLES_PER_PART * rows_per_sample)
-    if len(row_stamps_s) <= MAX_LAST_PART_FACTOR * rows_per_part:
-        yield recording
+    part_rows = round(SAMPLES_PER_PART * ratio)
+    if len(stamps) <= LAST_PART_FACTOR * part_rows:
+        yield log
         return
-    begin, part_number, is_last = 0, 1, False
+    begin, part, is_last = 0, 1, False
     while not is_last:
-        is_last = len(row_stamps_s) - begin <= MAX_LAST_PART_FACTOR * rows_per_part
-        end = len(row_stamps_s) if is_last else begin + rows_per_part
-        columns = {
-            name: _select_period(column, row_stamps_s[begin], row_stamps_s[end - 1])
-            for name, column in recording.columns.items()
-        }
-        yield replace(recording, name=f"{recording.name}-part-{part_number}", columns=columns)
-        begin, part_number = end - round(PART_OVERLAP_SHARE * rows_per_part), part_number + 1
+        is_last = len(stamps) - begin <= LAST_PART_FACTOR * part_rows
+        end = len(stamps) if is_last else begin + part_rows
+        period = stamps[begin], stamps[end - 1]
+        columns = {name: _select_period(column, *period) for name, column in log.columns.items()}
+        yield replace(log, name=f"{log.name}-part-{part}", columns=columns)
+        begin, part = end - round(PART_OVERLAP_SHARE * part_rows), part + 1
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
-    first_row = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
+    first = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
     end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
-    return Column(column.t_s[first_row:end_row], column.values[first_row:end_row], column.note)
+    return Column(column.t_s[first:end_row], column.values[first:end_row], column.note)
 
 
 def check_exists(path: Path) -> None:
@@ -155,12 +128,12 @@ def check_is_log_itself(path: Path) -> None:
     if not path.is_file():
         return
     with path.open("rb") as file:
-        first_bytes = file.read(_POINTER_BYTES)
+        head = file.read(_POINTER_BYTES)
     for pattern, (store, command) in _LARGE_FILE_STORES.items():
-        if re.match(pattern, first_bytes):
+        if re.match(pattern, head):
+            allowed = f"the log itself, which `{command}` fetches"
             raise BadInput(
-                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: the log "
-                f"itself, which `{command}` fetches"
+                f"{path}: is a pointer of a large-file store ({store}), not the log, allowed: {allowed}"
             )
 
 
@@ -168,12 +141,10 @@ def reader_name_for_path(path: Path) -> str:
     """The reader that a path asks for by its form. Raises BadInput where none does."""
     if path.is_dir():
         return "alfa"
-    if path.suffix.lower() in _WAY_TO_TABLE_BY_SUFFIX:
-        raise BadInput(f"{path}: is {_WAY_TO_TABLE_BY_SUFFIX[path.suffix.lower()]}")
-    reader_name = _READER_NAME_BY_SUFFIX.get(path.suffix.lower())
-    if reader_name is None:
-        raise BadInput(
-            f"{path}: what kind of log this is cannot be seen, allowed: "
-            f"{', '.join(sorted(_READER_NAME_BY_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
-        )
-    return reader_name
+    if path.suffix.lower() in _WAYS_TO_TABLE:
+        raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
+    reader = _READER_OF_SUFFIX.get(path.suffix.lower())
+    if reader is None:
+        allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
+        raise BadInput(f"{path}: what kind of log this is cannot be seen, allowed: {allowed}")
+    return reader

@@ -24,79 +24,68 @@ from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFli
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"
 _GYRO_TOPIC = "mavros-imu-data_raw"
-_FAILURE_TOPIC_PREFIX = "failure_status-"
+_FAILURE_PREFIX = "failure_status-"
 
 TopicTable = dict[str, Floats]
 
 
-def _half_travel_share_of_pulse_width(pulse_width_us: Floats) -> Floats:
+def _share_of_travel(us: Floats) -> Floats:
     """Pulse width about its neutral, as a share of the half range of 400 us."""
-    return (pulse_width_us - 1500.0) / 400.0
+    return (us - 1500.0) / 400.0
 
 
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
     "": np.asarray,
     "deg": np.deg2rad,
-    "us": _half_travel_share_of_pulse_width,
+    "us": _share_of_travel,
 }
 
 
 @cache
-def _load_column_sources_and_failure_names() -> dict[str, dict[str, Any]]:
+def _alfa_names() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
-    description_by_section: dict[str, dict[str, Any]] = json.loads(
-        Path(__file__).with_name("alfa.json").read_text("utf-8")
-    )
-    return description_by_section
+    sections: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
+    return sections
 
 
 def read(path: Path) -> RecordedFlight:
     """The flight in a folder of topics. Raises BadInput if it has none of the gyro."""
     if not path.is_dir():
         raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
-    table_by_topic = dict(_read_topic_tables(path))
-    if _GYRO_TOPIC not in table_by_topic:
+    tables = dict(_read_topic_tables(path))
+    if _GYRO_TOPIC not in tables:
         raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
-    kept_row_indices_and_note_by_topic = {
-        topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in table_by_topic.items()
-    }
-    origin_ns = float(
-        table_by_topic[_GYRO_TOPIC][_TIME_FIELD][kept_row_indices_and_note_by_topic[_GYRO_TOPIC][0][0]]
-    )
-    columns = dict(_read_columns(table_by_topic, kept_row_indices_and_note_by_topic, origin_ns))
-    _add_commanded_less_measured_attitude(columns)
+    kept = {topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in tables.items()}
+    zero_ns = float(tables[_GYRO_TOPIC][_TIME_FIELD][kept[_GYRO_TOPIC][0][0]])
+    columns = dict(_read_columns(tables, kept, zero_ns))
+    _add_attitude_errors(columns)
     _add_airspeed_from_wind(columns)
-    failures = sorted(_failure_events(table_by_topic, origin_ns), key=lambda failure: failure.t_s)
+    failures = sorted(_failure_events(tables, zero_ns), key=lambda failure: failure.t_s)
     return RecordedFlight(path.name, columns, tuple(failures))
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    wanted_topics = {topic for topic, _, _ in _load_column_sources_and_failure_names()["columns"].values()}
+    wanted = {topic for topic, _, _ in _alfa_names()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
-        if topic in wanted_topics or topic.startswith(_FAILURE_TOPIC_PREFIX):
+        if topic in wanted or topic.startswith(_FAILURE_PREFIX):
             table = read_numbers(file)
             if np.isfinite(table.get(_TIME_FIELD, np.empty(0))).any():
                 yield topic, table
 
 
 def _read_columns(
-    table_by_topic: dict[str, TopicTable],
-    kept_row_indices_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
-    origin_ns: float,
+    tables: dict[str, TopicTable], kept: dict[str, tuple[NDArray[np.int64], str]], zero_ns: float
 ) -> Iterator[tuple[str, Column]]:
-    for name, (topic, field, unit) in _load_column_sources_and_failure_names()["columns"].items():
-        if field in table_by_topic.get(topic, {}):
-            kept_row_indices, note = kept_row_indices_and_note_by_topic[topic]
-            t_s = (table_by_topic[topic][_TIME_FIELD][kept_row_indices] - origin_ns) * _S_PER_NS
-            yield (
-                name,
-                Column(t_s, _CONVERSION_OF_UNIT[unit](table_by_topic[topic][field])[kept_row_indices], note),
-            )
+    for name, (topic, field, unit) in _alfa_names()["columns"].items():
+        if field in tables.get(topic, {}):
+            rows, note = kept[topic]
+            t_s = (tables[topic][_TIME_FIELD][rows] - zero_ns) * _S_PER_NS
+            yield (name, Column(t_s, _CONVERSION_OF_UNIT[unit](tables[topic][field])[rows], note))
 
 
-def _add_commanded_less_measured_attitude(columns: dict[str, Column]) -> None:
+def _add_attitude_errors(columns: dict[str, Column]) -> None:
     """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
     for axis in ("roll", "pitch"):
         command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
@@ -115,24 +104,17 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
         column = columns[name]
         return column.values[np.maximum(np.searchsorted(column.t_s, stamps, side="right") - 1, 0)]
 
-    airspeed_north_mps, airspeed_east_mps = (
-        held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2)
-    )
-    columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(airspeed_north_mps, airspeed_east_mps))
+    north, east = (held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2))
+    columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))
 
 
-def _failure_events(table_by_topic: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
-    for topic, table in table_by_topic.items():
-        if topic.startswith(_FAILURE_TOPIC_PREFIX):
-            failed_part = topic.removeprefix(_FAILURE_TOPIC_PREFIX)
+def _failure_events(tables: dict[str, TopicTable], zero_ns: float) -> Iterator[LoggedFailure]:
+    for topic, table in tables.items():
+        if topic.startswith(_FAILURE_PREFIX):
+            part = topic.removeprefix(_FAILURE_PREFIX)
             stamps = table[_TIME_FIELD]
             codes = np.where(np.isfinite(stamps), table.get("field.data", np.nan), np.nan)
             for code in sorted(set(codes[np.isfinite(codes)])):
-                first_row = int(np.argmax(codes == code))
-                t_s = float((stamps[first_row] - origin_ns) * _S_PER_NS)
-                yield LoggedFailure(
-                    t_s,
-                    _load_column_sources_and_failure_names()["failures"].get(
-                        f"{failed_part} {int(code)}", failed_part
-                    ),
-                )
+                first = int(np.argmax(codes == code))
+                t_s = float((stamps[first] - zero_ns) * _S_PER_NS)
+                yield LoggedFailure(t_s, _alfa_names()["failures"].get(f"{part} {int(code)}", part))

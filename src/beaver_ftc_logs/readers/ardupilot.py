@@ -68,14 +68,11 @@ class _Messages:
         """The fields of a kind of message that any instance of it is read for."""
         if kind in _IGNORED_MESSAGES or _TIME_FIELD not in fields:
             return []
-        name_of_instance = re.compile(re.escape(kind) + r"(-?\d+)?")
-        wanted_fields = {
-            column.partition(".")[2]
-            for column in self.wanted_columns or ()
-            if name_of_instance.fullmatch(column.partition(".")[0])
-        }
-        wanted_fields |= {_TIME_FIELD, *_INSTANCE_FIELDS}
-        return [name for name in fields if self.wanted_columns is None or name in wanted_fields]
+        instance = re.compile(re.escape(kind) + r"(-?\d+)?")
+        parts = (column.partition(".") for column in self.wanted_columns or ())
+        wanted = {name for message, _, name in parts if instance.fullmatch(message)}
+        wanted |= {_TIME_FIELD, *_INSTANCE_FIELDS}
+        return [name for name in fields if self.wanted_columns is None or name in wanted]
 
     def add(self, message: str, fields: list[str], numbers: Mapping[str, float]) -> None:
         if message not in self.fields_by_message:
@@ -89,47 +86,40 @@ class _Messages:
     def _begin_message(self, message: str, fields: list[str], stamp: float) -> None:
         self.fields_by_message[message] = fields
         wanted = self.wanted_columns
-        kept_fields = [name for name in fields if wanted is None or f"{message}.{name}" in wanted]
-        if kept_fields or message in self.wanted_messages:
-            self.values_by_message[message] = {name: array("d") for name in (_TIME_FIELD, *kept_fields)}
+        kept = [name for name in fields if wanted is None or f"{message}.{name}" in wanted]
+        if kept or message in self.wanted_messages:
+            self.values_by_message[message] = {name: array("d") for name in (_TIME_FIELD, *kept)}
         else:
             self.stamps_by_message[message] = _Stamps(stamp)
 
 
-def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
-    wanted_columns: the columns that are kept in memory, all where None. Where the log has none of them, all
+    wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
     columns are returned, without numbers: their names are known then.
     """
-    messages = _read_messages(path, wanted_columns)
+    messages = _read_messages(path, wanted)
     if not messages.fields_by_message:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
     if not messages.values_by_message:
-        return RecordedFlight(
-            path.stem,
-            columns_without_numbers(messages.fields_by_message, _TIME_FIELD),
-            parameters=messages.parameters,
-        )
-    damaged_messages = [name for name, stamps in messages.stamps_by_message.items() if not stamps.in_order]
-    if damaged_messages:  # which of their stamps is the first depends on all of them
-        messages = _read_messages(path, wanted_columns, damaged_messages)
-    first_stamps_us = [stamps.first for stamps in messages.stamps_by_message.values()]
-    column_names = column_names_of_topics(messages.fields_by_message, _TIME_FIELD)
-    columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_stamps_us)
-    return RecordedFlight(
-        path.stem,
-        columns,
-        parameters=messages.parameters,
-        unread_column_names=tuple(name for name in column_names if name not in columns),
-    )
+        empty = columns_without_numbers(messages.fields_by_message, _TIME_FIELD)
+        return RecordedFlight(path.stem, empty, parameters=messages.parameters)
+    damaged = [name for name, stamps in messages.stamps_by_message.items() if not stamps.in_order]
+    if damaged:  # which of their stamps is the first depends on all of them
+        messages = _read_messages(path, wanted, damaged)
+    first_us = [stamps.first for stamps in messages.stamps_by_message.values()]
+    names = column_names_of_topics(messages.fields_by_message, _TIME_FIELD)
+    columns, _ = columns_and_time_origin(messages.values_by_message, _TIME_FIELD, first_us)
+    unread = tuple(name for name in names if name not in columns)
+    return RecordedFlight(path.stem, columns, parameters=messages.parameters, unread_column_names=unread)
 
 
 def _read_messages(
-    path: Path, wanted_columns: Collection[str] | None, wanted_messages: Collection[str] = ()
+    path: Path, wanted: Collection[str] | None, wanted_messages: Collection[str] = ()
 ) -> _Messages:
     """The messages with a stamp. wanted_messages: those whose stamps are kept, whatever else is wanted."""
-    found = _Messages(wanted_columns, wanted_messages)
+    found = _Messages(wanted, wanted_messages)
     with (
         package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
@@ -147,19 +137,19 @@ def _read_messages(
 
 
 def _message_name(kind: str, numbers: Mapping[str, Any]) -> str:
-    instance_number = next((numbers[key] for key in _INSTANCE_FIELDS if isinstance(numbers.get(key), int)), 0)
-    return kind if instance_number == 0 else f"{kind}{instance_number}"
+    instance = next((numbers[key] for key in _INSTANCE_FIELDS if isinstance(numbers.get(key), int)), 0)
+    return kind if instance == 0 else f"{kind}{instance}"
 
 
 @contextmanager
 def _silence_stderr() -> Iterator[None]:
     """Nothing on standard error: pymavlink, and its indexer in C, print what they skip."""
     sys.stderr.flush()
-    saved_stderr, null_device = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null_device, 2)
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
     try:
         yield
     finally:
-        os.dup2(saved_stderr, 2)
-        os.close(saved_stderr)
-        os.close(null_device)
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)

@@ -14,7 +14,7 @@ from typing import Any
 
 from pymavlink.DFReader import FORMAT_TO_STRUCT, DFFormat, DFReader_binary, DFReader_text, null_term
 
-_BYTES_BETWEEN_RELEASES = 8_000_000
+_RELEASE_BYTES = 8_000_000
 """Bytes of a log that are read until their pages are released."""
 _HEADER, _HEADER_BYTES, _TYPE_OF_FORMATS = b"\xa3\x95", 3, 0x80
 
@@ -33,46 +33,40 @@ def read_messages(
 
     fields_to_read: gives these fields, by the type of a message and all its numeric fields.
     """
-    is_text_log = path.suffix.lower() == ".log"
+    as_text = path.suffix.lower() == ".log"
 
     @cache
-    def numeric_fields_of_format(message_format: Any) -> list[str]:
-        return _numeric_fields(message_format, is_text_log)
+    def numeric_fields_of(fmt: Any) -> list[str]:
+        return _numeric_fields(fmt, as_text)
 
     @cache
-    def fields_of_format(message_format: Any) -> list[str]:
-        if _is_format_of_parameter(message_format):
+    def fields_of_format(fmt: Any) -> list[str]:
+        if _is_format_of_parameter(fmt):
             return list(PARAMETER_FIELDS)
-        return fields_to_read(message_format.name, numeric_fields_of_format(message_format))
+        return fields_to_read(fmt.name, numeric_fields_of(fmt))
 
-    log = (_TextLog if is_text_log else _BinaryLog)(str(path))
+    log = (_TextLog if as_text else _BinaryLog)(str(path))
     try:
-        for message_format, numbers in log.messages_with_numbers(fields_of_format):
-            yield message_format.name, numeric_fields_of_format(message_format), numbers
+        for fmt, numbers in log.messages_with_numbers(fields_of_format):
+            yield fmt.name, numeric_fields_of(fmt), numbers
     finally:
         log.data_map.close()
         log.filehandle.close()
 
 
-def _is_format_of_parameter(message_format: Any) -> bool:
-    if message_format.name != PARAMETER_MESSAGE or not set(PARAMETER_FIELDS) <= set(message_format.colhash):
+def _is_format_of_parameter(fmt: Any) -> bool:
+    if fmt.name != PARAMETER_MESSAGE or not set(PARAMETER_FIELDS) <= set(fmt.colhash):
         return False
-    indices = [message_format.colhash[name] for name in PARAMETER_FIELDS]
-    types = message_format.msg_types
+    indices = [fmt.colhash[name] for name in PARAMETER_FIELDS]
+    types = fmt.msg_types
     return max(indices) < len(types) and types[indices[0]] is str and types[indices[1]] in (int, float)
 
 
-def _numeric_fields(message_format: Any, is_text_log: bool) -> list[str]:
+def _numeric_fields(fmt: Any, as_text: bool) -> list[str]:
     """The fields that hold numbers, in their order; in text a flight mode (M) is a word."""
-    is_number = [
-        kind in (int, float) and not (is_text_log and code == "M")
-        for kind, code in zip(message_format.msg_types, message_format.msg_fmts, strict=True)
-    ]
-    return [
-        field
-        for field, index in message_format.colhash.items()
-        if index < len(is_number) and is_number[index]  # a damaged format may have more fields than types
-    ]
+    kinds = enumerate(zip(fmt.msg_types, fmt.msg_fmts, strict=True))
+    numbers = {i for i, (kind, code) in kinds if kind in (int, float) and not (as_text and code == "M")}
+    return [field for field, index in fmt.colhash.items() if index in numbers]
 
 
 class _MappedLog:
@@ -88,43 +82,43 @@ class _MappedLog:
     def init_clock(self) -> None:
         """No time of day is wanted, for which all of a log without GPS would be read."""
 
-    def messages_with_numbers(self, fields_of_format: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
+    def messages_with_numbers(self, fields_of: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
         """Of each message its format, and the numbers of the fields of that format."""
         while (message := self.recv_msg()) is not None:
-            yield message.fmt, _numbers_of_message(message, fields_of_format)
-            self._release_pages_before(self.offset)
+            yield message.fmt, _numbers_of_message(message, fields_of)
+            self._release_before(self.offset)
 
-    def _release_pages_before(self, offset: int) -> None:
+    def _release_before(self, offset: int) -> None:
         """From time to time, and where the system can."""
-        if abs(offset - self._released_offset) >= _BYTES_BETWEEN_RELEASES:
+        if abs(offset - self._released_offset) >= _RELEASE_BYTES:
             self._released_offset = offset
             if hasattr(mmap, "MADV_DONTNEED"):
                 self.data_map.madvise(mmap.MADV_DONTNEED)
 
 
-def _numbers_of_message(message: Any, fields_of_format: FieldsOfFormat) -> Numbers:
-    return {field: message.__getattr__(field) for field in fields_of_format(message.fmt)}
+def _numbers_of_message(message: Any, fields_of: FieldsOfFormat) -> Numbers:
+    return {field: message.__getattr__(field) for field in fields_of(message.fmt)}
 
 
 class _TextLog(_MappedLog, DFReader_text):
     def init_arrays(self, progress_callback: Any = None) -> None:
         """Read the formats alone, wherever they are: a message may stand before its own."""
-        line_offset = self.offset
-        while line_offset >= 0:
-            self.offset = line_offset
+        line = self.offset
+        while line >= 0:
+            self.offset = line
             self._parse_next()
-            line_offset = self._find_line_of_format(line_offset)
+            line = self._find_line_of_format(line)
         self.offset = 0
 
     def _find_line_of_format(self, begin: int) -> int:
         """Where the next line with a format begins, -1 if there is none."""
         begin_of_line = b"\nFMT,"
-        for block in range(begin, self.data_len, _BYTES_BETWEEN_RELEASES):
-            end = block + _BYTES_BETWEEN_RELEASES + len(begin_of_line) - 1
+        for block in range(begin, self.data_len, _RELEASE_BYTES):
+            end = block + _RELEASE_BYTES + len(begin_of_line) - 1
             found = self.data_map.find(begin_of_line, block, end)
             if found >= 0:
                 return found + 1
-            self._release_pages_before(end)
+            self._release_before(end)
         return -1
 
 
@@ -133,12 +127,12 @@ class _BinaryLog(_MappedLog, DFReader_binary):
         """Read the formats alone, wherever they are: a message may stand before its own."""
         offset = 0
         while offset + _HEADER_BYTES <= self.data_len:
-            message_format = self._format_at(offset)
-            end = offset + (message_format.len if message_format else 1)
-            if message_format and message_format.type == _TYPE_OF_FORMATS and end <= self.data_len:
+            fmt = self._format_at(offset)
+            end = offset + (fmt.len if fmt else 1)
+            if fmt and fmt.type == _TYPE_OF_FORMATS and end <= self.data_len:
                 self._read_format(self.data_map[offset + _HEADER_BYTES : end])
             offset = end
-            self._release_pages_before(offset)
+            self._release_before(offset)
         self.offset = 0
 
     def _read_format(self, body: bytes) -> None:
@@ -151,23 +145,23 @@ class _BinaryLog(_MappedLog, DFReader_binary):
 
     def _format_at(self, offset: int) -> Any:
         """The format of the message that begins here, None if none does."""
-        header = self.data_map[offset : offset + _HEADER_BYTES]
-        return self.formats.get(header[2]) if header[:2] == _HEADER and len(header) == _HEADER_BYTES else None
+        head = self.data_map[offset : offset + _HEADER_BYTES]
+        return self.formats.get(head[2]) if head[:2] == _HEADER and len(head) == _HEADER_BYTES else None
 
-    def messages_with_numbers(self, fields_of_format: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
+    def messages_with_numbers(self, fields_of: FieldsOfFormat) -> Iterator[tuple[Any, Numbers]]:
         """The same; pymavlink reads what is damaged, and the formats, which it keeps."""
-        layout_of_format = cache(lambda message_format: _Layout(message_format, fields_of_format))
+        layouts = cache(lambda fmt: _Layout(fmt, fields_of))
         while True:
-            message_format = self._format_at(self.offset)
-            layout = None if message_format is None else layout_of_format(message_format)
-            if layout and layout.is_plain and self.offset + message_format.len <= self.data_len:
-                yield message_format, layout.read_numbers(self.data_map, self.offset)
-                self.offset += message_format.len
+            fmt = self._format_at(self.offset)
+            layout = None if fmt is None else layouts(fmt)
+            if layout and layout.is_plain and self.offset + fmt.len <= self.data_len:
+                yield fmt, layout.read_numbers(self.data_map, self.offset)
+                self.offset += fmt.len
             elif (message := self.recv_msg()) is not None:
-                yield message.fmt, _numbers_of_message(message, fields_of_format)
+                yield message.fmt, _numbers_of_message(message, fields_of)
             else:
                 return
-            self._release_pages_before(self.offset)
+            self._release_before(self.offset)
 
 
 class _Layout:
@@ -176,23 +170,18 @@ class _Layout:
     is_plain: whether the message is as long as its fields, and no format itself.
     """
 
-    def __init__(self, message_format: Any, fields_of_format: FieldsOfFormat) -> None:
-        field_of_index = {message_format.colhash[field]: field for field in fields_of_format(message_format)}
-        codes = [FORMAT_TO_STRUCT[code][0] for code in message_format.msg_fmts]
-        self._struct = struct.Struct(
-            f"<{_HEADER_BYTES}x"
-            + "".join(
-                code if index in field_of_index else f"{struct.calcsize(f'<{code}')}x"
-                for index, code in enumerate(codes)
-            )
-        )
-        self._fields = [field_of_index[index] for index in sorted(field_of_index)]
-        self._divisors = {
-            field_of_index[index]: 1.0 / factor
-            for index, factor in enumerate(message_format.msg_mults)
-            if factor is not None and index in field_of_index
-        }
-        self.is_plain = self._struct.size == message_format.len and message_format.name != "FMT"
+    def __init__(self, fmt: Any, fields_of: FieldsOfFormat) -> None:
+        fields = {fmt.colhash[field]: field for field in fields_of(fmt)}
+        codes = [FORMAT_TO_STRUCT[code][0] for code in fmt.msg_fmts]
+        skipped = [f"{struct.calcsize(f'<{code}')}x" for code in codes]
+        parts = [code if i in fields else skipped[i] for i, code in enumerate(codes)]
+        self._struct = struct.Struct(f"<{_HEADER_BYTES}x{''.join(parts)}")
+        self._fields = [fields[index] for index in sorted(fields)]
+        factors = [
+            (i, factor) for i, factor in enumerate(fmt.msg_mults) if factor is not None and i in fields
+        ]
+        self._divisors = {fields[i]: 1.0 / factor for i, factor in factors}
+        self.is_plain = self._struct.size == fmt.len and fmt.name != "FMT"
 
     def read_numbers(self, data: Any, offset: int) -> Numbers:
         numbers = dict(zip(self._fields, self._struct.unpack_from(data, offset), strict=True))

@@ -4,11 +4,11 @@ import re
 from datetime import UTC, datetime
 from math import nan
 
-_NUMBER_WITH_UNIT_PATTERN = re.compile(
+_UNIT_PATTERN = re.compile(
     r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(s|secs?|seconds?|ms|msecs?|milliseconds?|us|usecs?|"
     r"microseconds?|ns|min|minutes?)\.?"
 )
-_SECONDS_PER_UNIT_BEGINNING = {
+_UNIT_SECONDS = {
     "ms": 1e-3, "mil": 1e-3, "us": 1e-6, "mic": 1e-6, "ns": 1e-9, "min": 60.0, "s": 1.0,
 }  # fmt: skip
 _CLOCK_PATTERN = re.compile(r"(?:(\d{1,2}):)?(\d{1,2}):(\d{2}(?:[.,]\d+)?)")
@@ -22,10 +22,8 @@ def seconds_of_text(text: str) -> float:
     """The time that a cell states, s: `0.05 sec`; `12:30:01.5` since midnight; an ISO date since 1970, UTC
     where it names no zone. nan where it states none."""
     text = text.strip()
-    if match := _NUMBER_WITH_UNIT_PATTERN.fullmatch(text):
-        factors = (
-            factor for unit, factor in _SECONDS_PER_UNIT_BEGINNING.items() if match[2].startswith(unit)
-        )
+    if match := _UNIT_PATTERN.fullmatch(text):
+        factors = (factor for unit, factor in _UNIT_SECONDS.items() if match[2].startswith(unit))
         return float(match[1]) * next(factors)
     if match := _CLOCK_PATTERN.fullmatch(text):
         hours, minutes, seconds = int(match[1] or 0), int(match[2]), float(match[3].replace(",", "."))

@@ -24,69 +24,58 @@ _MAX_MESSAGE_BYTES = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
 
-def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted_columns: the columns that are kept in memory, all where None. Where the log has none of them, all
+    wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
     columns are returned, without numbers. Where it lacks one, the log is read once more for the names of all.
     """
-    parameters: dict[str, tuple[float, ...]] = {}
-    fields_by_topic, kept_by_topic = _read_topics(path, wanted_columns, parameters)
-    column_names = column_names_of_topics(fields_by_topic, _TIME_FIELD)
-    lacks_wanted = wanted_columns is not None and not {*wanted_columns} <= {*column_names}
-    if lacks_wanted:
-        fields_by_topic, _ = _read_topics(path, (), {})
-        column_names = column_names_of_topics(fields_by_topic, _TIME_FIELD)
-    if not fields_by_topic:
+    params: dict[str, tuple[float, ...]] = {}
+    fields, kept = _read_topics(path, wanted, params)
+    names = column_names_of_topics(fields, _TIME_FIELD)
+    lacks = wanted is not None and not {*wanted} <= {*names}
+    if lacks:
+        fields, _ = _read_topics(path, (), {})
+        names = column_names_of_topics(fields, _TIME_FIELD)
+    if not fields:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    if wanted_columns is not None and not {*wanted_columns} & {*column_names}:
-        return RecordedFlight(
-            path.stem, columns_without_numbers(fields_by_topic, _TIME_FIELD), parameters=parameters
-        )
-    columns, origin_s = columns_and_time_origin(kept_by_topic, _TIME_FIELD)
-    return RecordedFlight(
-        path.stem,
-        columns,
-        notes=(f"time counts from {origin_s:.3f} s of the autopilot's clock",),
-        parameters=parameters,
-        unread_column_names=tuple(name for name in column_names if name not in columns),
-    )
+    if wanted is not None and not {*wanted} & {*names}:
+        return RecordedFlight(path.stem, columns_without_numbers(fields, _TIME_FIELD), parameters=params)
+    columns, origin_s = columns_and_time_origin(kept, _TIME_FIELD)
+    unread = tuple(name for name in names if name not in columns)
+    notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
+    return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
 
 
 def _read_topics(
-    path: Path, wanted_columns: Collection[str] | None, parameters: dict[str, tuple[float, ...]]
+    path: Path, wanted: Collection[str] | None, params: dict[str, tuple[float, ...]]
 ) -> tuple[dict[str, list[str]], dict[str, dict[str, Floats]]]:
     """All fields and the numbers of the kept ones, by topic: of the topics of the wanted columns, of any
     instance; where none of these is in the log, the fields of all topics, and no numbers.
 
-    parameters: receives those of the log.
+    params: receives those of the log.
     """
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
         import_module("pyulog")  # here, since the module below may have been imported before
         from beaver_ftc_logs.readers import ulog_blocks
 
-        topic_names = _check_formats_and_select_topics(path, wanted_columns)
-        is_any_wanted = wanted_columns is None or bool(topic_names)
+        topics = _select_topics(path, wanted)
+        any_wanted = wanted is None or bool(topics)
 
         def kept_fields(topic: str, fields: list[str]) -> list[str]:
-            return [
-                field
-                for field in fields
-                if is_any_wanted
-                and (field == _TIME_FIELD or wanted_columns is None or f"{topic}.{field}" in wanted_columns)
-            ]
+            if not any_wanted or wanted is None:
+                return list(fields) if any_wanted else []
+            return [field for field in fields if field == _TIME_FIELD or f"{topic}.{field}" in wanted]
 
         fields_by_topic: dict[str, list[str]] = {}
         kept_by_topic: dict[str, dict[str, Floats]] = {}
-        for topic, fields, kept in ulog_blocks.read_topics(
-            path, topic_names or None, kept_fields, parameters
-        ):
+        for topic, fields, kept in ulog_blocks.read_topics(path, topics or None, kept_fields, params):
             if _TIME_FIELD in fields:
                 fields_by_topic[topic], kept_by_topic[topic] = fields, kept
     return fields_by_topic, kept_by_topic
 
 
-def _check_formats_and_select_topics(path: Path, wanted_columns: Collection[str] | None) -> list[str]:
+def _select_topics(path: Path, wanted: Collection[str] | None) -> list[str]:
     """The topics in a log that a wanted column may be of. Raises ValueError for a message too large."""
     from pyulog import ULog
 
@@ -94,18 +83,16 @@ def _check_formats_and_select_topics(path: Path, wanted_columns: Collection[str]
     for name in formats:
         if _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES:  # pyulog writes every field of one out
             raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
-    wanted_topics = {column.partition(".")[0] for column in wanted_columns or ()}
-    wanted_topics |= {re.sub(r"_\d+$", "", topic) for topic in wanted_topics}
-    return sorted(wanted_topics & set(formats))
+    topics = {column.partition(".")[0] for column in wanted or ()}
+    topics |= {re.sub(r"_\d+$", "", topic) for topic in topics}
+    return sorted(topics & set(formats))
 
 
-def _min_message_bytes(formats: dict[str, Any], name: str, enclosing_messages: tuple[str, ...]) -> int:
+def _min_message_bytes(formats: dict[str, Any], name: str, outer: tuple[str, ...]) -> int:
     """Bytes of a message at least, its nested messages in it."""
-    if name in enclosing_messages:
+    if name in outer:
         raise ValueError(f"a message {name} holds itself")
     if name not in formats:  # a number, or a type that pyulog complains about
         return 1
-    return sum(
-        max(n_elements, 1) * _min_message_bytes(formats, field_type, (*enclosing_messages, name))
-        for field_type, n_elements, _ in formats[name].fields
-    )
+    fields, outer = formats[name].fields, (*outer, name)
+    return sum(max(count, 1) * _min_message_bytes(formats, kind, outer) for kind, count, _ in fields)

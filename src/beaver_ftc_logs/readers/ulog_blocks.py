@@ -5,6 +5,7 @@ block is reduced to the kept fields, in the numbers' own types.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,32 +23,27 @@ KeptFields = Callable[[str, list[str]], list[str]]
 
 
 def read_topics(
-    path: Path,
-    topic_names: list[str] | None,
-    kept_fields: KeptFields,
-    parameters: dict[str, tuple[float, ...]],
+    path: Path, topics: list[str] | None, kept: KeptFields, params: dict[str, tuple[float, ...]]
 ) -> Iterator[tuple[str, list[str], dict[str, Floats]]]:
     """Of each topic with a message: its name in columns, all its fields, and the numbers of the kept ones.
 
-    topic_names: the topics that are read, of any instance, all where None. parameters: receives those of the
+    topics: the topics that are read, of any instance, all where None. params: receives those of the
     log.
     """
-    log = _read_log(path, topic_names, kept_fields)
+    log = _read_log(path, topics, kept)
     changes = [(name, value) for _, name, value in log.changed_parameters]
     for name, value in [*log.initial_parameters.items(), *changes]:
         if isinstance(value, int | float):
-            add_parameter(parameters, name, value)
+            add_parameter(params, name, value)
     while log.data_list:
         topic = log.data_list.pop(0)
         name, fields = _column_topic_name(topic.name, topic.multi_id), list(topic.data)
-        blocks = [
-            block for messages in log.messages_of_topics if messages.is_of(topic) for block in messages.blocks
-        ]
-        numbers_by_field: dict[str, Floats] = {}
-        for field in kept_fields(name, fields):
+        blocks = [*chain(*(messages.blocks for messages in log.messages_of_topics if messages.is_of(topic)))]
+        numbers: dict[str, Floats] = {}
+        for field in kept(name, fields):
             parts = [*(block.pop(field) for block in blocks), topic.data[field]]
-            numbers_by_field[field] = np.concatenate(parts, dtype=float, casting="unsafe")
-        yield name, fields, numbers_by_field
+            numbers[field] = np.concatenate(parts, dtype=float, casting="unsafe")
+        yield name, fields, numbers
 
 
 def _column_topic_name(name: str, instance: int) -> str:
@@ -60,12 +56,12 @@ class _MessagesOfTopic(bytearray):
     The last message always stays here, since pyulog leaves out a topic that has none.
     """
 
-    def __init__(self, subscription: Any, kept_fields: KeptFields) -> None:
+    def __init__(self, source: Any, kept: KeptFields) -> None:
         super().__init__()
         self.blocks: list[dict[str, NDArray[Any]]] = []
-        self._subscription = subscription
-        name = _column_topic_name(subscription.message_name, subscription.multi_id)
-        self._kept_fields = kept_fields(name, list(subscription.dtype.names))
+        self._subscription = source
+        name = _column_topic_name(source.message_name, source.multi_id)
+        self._kept_fields = kept(name, list(source.dtype.names))
 
     def __iadd__(self, message: Any) -> "_MessagesOfTopic":  # type: ignore[misc]
         if len(self) >= _BLOCK_BYTES:
@@ -80,16 +76,16 @@ class _MessagesOfTopic(bytearray):
         return topic.field_data is self._subscription.field_data
 
 
-def _read_log(path: Path, topic_names: list[str] | None, kept_fields: KeptFields) -> Any:
-    messages_of_topics: list[_MessagesOfTopic] = []
+def _read_log(path: Path, topics: list[str] | None, kept_fields: KeptFields) -> Any:
+    kept: list[_MessagesOfTopic] = []
 
     class LogInBlocks(ULog):
         class _MessageAddLogged(ULog._MessageAddLogged):
             def __init__(self, *arguments: Any) -> None:
                 super().__init__(*arguments)
                 self.buffer = _MessagesOfTopic(self, kept_fields)
-                messages_of_topics.append(self.buffer)
+                kept.append(self.buffer)
 
-    log = LogInBlocks(str(path), topic_names)
-    log.messages_of_topics = messages_of_topics
+    log = LogInBlocks(str(path), topics)
+    log.messages_of_topics = kept
     return log

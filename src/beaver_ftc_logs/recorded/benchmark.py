@@ -20,23 +20,23 @@ from beaver_ftc.studies.engine import poisson
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with_detector
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.fitting import (
-    FlightWithUsableRows,
-    add_fitted_ranges_and_alarm_threshold,
+    FitPart,
+    add_ranges_and_threshold,
     fit_model,
-    flights_with_usable_rows,
-    score_folds_and_choose_credible_mass,
+    fit_parts,
+    score_folds,
     validation_folds,
 )
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
-from beaver_ftc_logs.samples import Samples, read_columns_of_vehicle, resample
+from beaver_ftc_logs.samples import Samples, read_vehicle_columns, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
-LABEL_SCORE_TITLES = {
+LABEL_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
@@ -45,19 +45,19 @@ MAX_SHORT_DELAY_S = 5.0
 SURFACE_KINDS = ("aileron", "rudder", "elevator")
 _KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OUR_METHOD_TITLE = "bank of filters (ours)"
-FROZEN_OUTPUT_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
-METHOD_TITLE_BY_DETECTOR_NAME = {
+FREEZE_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
+METHOD_TITLES = {
     "bank-of-filters": OUR_METHOD_TITLE,
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
 }
-_MAX_SHOWN_DELAY_S = 30.0
+_SHOWN_DELAY_S = 30.0
 VEHICLE_FILE = "vehicle.yaml"
-_ALFA_GYRO_FILE_PATTERN = "*-mavros-imu-data_raw.csv"
+_ALFA_GYRO_FILES = "*-mavros-imu-data_raw.csv"
 
 
 @dataclass(frozen=True)
-class FlightDataSet:
+class DataSet:
     """Flights of one vehicle: as they were logged, and on one time base."""
 
     name: str
@@ -66,49 +66,35 @@ class FlightDataSet:
     flights: tuple[Samples, ...]
 
 
-def load_data_sets(folder: Path) -> list[FlightDataSet]:
+def load_data_sets(folder: Path) -> list[DataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
-    data_sets = [
-        data_set for path in (folder, *sorted(folder.iterdir())) if (data_set := _load_data_set(path))
-    ]
+    data_sets = [data for path in (folder, *sorted(folder.iterdir())) if (data := _load_data_set(path))]
     if not data_sets:
-        raise BadInput(
-            f"compare: --flights {folder}: holds no data set, allowed: folders with tables and a "
-            f"{VEHICLE_FILE}, or with processed folders of the ALFA data set"
-        )
+        allowed = f"folders with tables and a {VEHICLE_FILE}, or with processed folders of the ALFA data set"
+        raise BadInput(f"compare: --flights {folder}: holds no data set, allowed: {allowed}")
     return data_sets
 
 
-def _load_data_set(path: Path) -> FlightDataSet | None:
+def _load_data_set(path: Path) -> DataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
-        table_paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
-        return (
-            _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), table_paths) if table_paths else None
-        )
-    alfa_flight_folders = sorted(
-        flight_folder
-        for flight_folder in path.iterdir()
-        if flight_folder.is_dir() and any(flight_folder.glob(_ALFA_GYRO_FILE_PATTERN))
-    )
-    return (
-        _read_data_set(path.name, load_vehicle("alfa"), alfa_flight_folders) if alfa_flight_folders else None
-    )
+        paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
+        return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
+    folders = sorted(each for each in path.iterdir() if each.is_dir() and any(each.glob(_ALFA_GYRO_FILES)))
+    return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
 
 
-def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
-    recordings = tuple(read_columns_of_vehicle(path, vehicle) for path in paths)
-    return FlightDataSet(
-        name, vehicle, recordings, tuple(resample(recording, vehicle) for recording in recordings)
-    )
+def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
+    recordings = tuple(read_vehicle_columns(path, vehicle) for path in paths)
+    return DataSet(name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings))
 
 
 def run_benchmark(folder: Path) -> Document:
     """The document of the benchmark: a part a data set, a row a method."""
-    return {"sets": [_compare_methods(data_set) for data_set in load_data_sets(folder)]}
+    return {"sets": [_compare_methods(data) for data in load_data_sets(folder)]}
 
 
 def result_files(document: Document) -> Files:
@@ -120,251 +106,188 @@ def result_files(document: Document) -> Files:
     }
 
 
-def _compare_methods(data_set: FlightDataSet) -> Document:
-    flights_with_usable_mask = flights_with_usable_rows(data_set.flights)
-    is_single_flight = len(data_set.flights) == 1
+def _compare_methods(data: DataSet) -> Document:
+    usable = fit_parts(data.flights)
+    is_single = len(data.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    whole_flight_settings = (
-        settings_of_whole_flight(flights_with_usable_mask, data_set) if is_single_flight else None
-    )
-    flight_entries: list[Document] = []
-    for fitted_flights, held_out, held_out_name in validation_folds(flights_with_usable_mask):
-        model = add_fitted_ranges_and_alarm_threshold(
-            fitted_flights, fit_model(fitted_flights, data_set.vehicle, whole_flight_settings)
-        )
-        recording = next(
-            recording for recording in data_set.recordings if recording.name == held_out.samples.name
-        )
-        flight_entries += [
-            {"left_out": held_out_name, "method": method_title, **_score_against_log(held_out, rows, model)}
-            for method_title, rows in _diagnose_with_each_method(recording, held_out, model)
-        ]
-    is_scored_by_labels = "classes" in flight_entries[0]
-    summarize = summarize_label_scores if is_scored_by_labels else summarize_failure_scores
-    method_titles = dict.fromkeys(entry["method"] for entry in flight_entries)
-    flight_entries_by_method = {
-        method_title: [entry for entry in flight_entries if entry["method"] == method_title]
-        for method_title in method_titles
-    }
+    settings = whole_settings(usable, data) if is_single else None
+    entries: list[Document] = []
+    for fitted, held_out, name in validation_folds(usable):
+        model = add_ranges_and_threshold(fitted, fit_model(fitted, data.vehicle, settings))
+        log = next(log for log in data.recordings if log.name == held_out.samples.name)
+        for title, rows in _diagnose_each(log, held_out, model):
+            scores = _score_against_log(held_out, rows, model)
+            entries.append({"left_out": name, "method": title, **scores})
+    by_labels = "classes" in entries[0]
+    summarize = summarize_labels if by_labels else summarize_failures
+    titles = dict.fromkeys(entry["method"] for entry in entries)
+    by_method = {title: [entry for entry in entries if entry["method"] == title] for title in titles}
     return {
-        "set": data_set.name,
-        "vehicle": data_set.vehicle.name,
-        "scored_by": "labels" if is_scored_by_labels else "events",
-        "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
-        "rows": [
-            {"method": method_title, **summarize(scores)}
-            for method_title, scores in flight_entries_by_method.items()
-        ],
-        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data_set.name, []),
-        "flights": flight_entries,
+        "set": data.name,
+        "vehicle": data.vehicle.name,
+        "scored_by": "labels" if by_labels else "events",
+        "left_out": "halves of the one flight in turn" if is_single else "each flight in turn",
+        "rows": [{"method": title, **summarize(scores)} for title, scores in by_method.items()],
+        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
+        "flights": entries,
     }
 
 
-def _diagnose_with_each_method(
-    recording: RecordedFlight, held_out: FlightWithUsableRows, model: Model
-) -> Iterator[tuple[str, DiagnosisRows]]:
+def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iterator[tuple[str, LogRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
-        yield (
-            METHOD_TITLE_BY_DETECTOR_NAME.get(name, f"{name}, of the loop"),
-            diagnose_with_detector(name, held_out.samples, model),
-        )
-    frozen_output_rule_rows = diagnose_by_freeze_rule(recording, held_out.samples, model)
-    if frozen_output_rule_rows is not None:
-        yield FROZEN_OUTPUT_RULE_TITLE, frozen_output_rule_rows
+        title = METHOD_TITLES.get(name, f"{name}, of the loop")
+        yield title, diagnose_with_detector(name, held_out.samples, model)
+    frozen = diagnose_by_freeze_rule(log, held_out.samples, model)
+    if frozen is not None:
+        yield FREEZE_RULE_TITLE, frozen
 
 
-def settings_of_whole_flight(
-    flights_with_usable_mask: list[FlightWithUsableRows], data_set: FlightDataSet
-) -> FilterSettings:
+def whole_settings(usable: list[FitPart], data: DataSet) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
-    model = fit_model(flights_with_usable_mask, data_set.vehicle)
-    if len(flights_with_usable_mask) > 1:
+    model = fit_model(usable, data.vehicle)
+    if len(usable) > 1:
         return model.settings
-    return model.settings.model_copy(
-        update={"credible_mass": score_folds_and_choose_credible_mass(flights_with_usable_mask, model)[1]}
-    )
+    return model.settings.model_copy(update={"credible_mass": score_folds(usable, model)[1]})
 
 
-def _score_against_log(held_out: FlightWithUsableRows, rows: DiagnosisRows, model: Model) -> Document:
+def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Document:
     if np.isfinite(held_out.samples.labels).any():
-        return scoring.score_against_labels(rows, labels_nan_outside_usable_span(held_out))
+        return scoring.score_against_labels(rows, labels_in_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_nan_outside_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
+def labels_in_span(held_out: FitPart) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
-    usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
-    if usable_rows.size:
-        row_span = slice(usable_rows[0], usable_rows[-1] + 1)
-        labels[row_span] = held_out.samples.labels[row_span]
+    rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
+    if rows.size:
+        span = slice(rows[0], rows[-1] + 1)
+        labels[span] = held_out.samples.labels[span]
     return labels
 
 
-def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
+def summarize_failures(scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
-    failed_flights = [score for score in flight_scores if score["failure"]]
-    engine_failures = [score for score in failed_flights if ENGINE in score["failure"]]
-    surface_failures = [score for score in failed_flights if ENGINE not in score["failure"]]
-    detected_surface_failures = [score for score in surface_failures if score["detected"]]
-    false_alarm_flights = [score for score in flight_scores if score["false_alarms"]]
-    healthy_flights = [score for score in flight_scores if score["failure"] is None]
-    quiet_healthy_flights = [score for score in healthy_flights if not score["false_alarms"]]
-    healthy_hours = sum(score["healthy_s"] for score in flight_scores) / 3600.0
-    false_alarm_rate_and_interval = poisson(
-        sum(score["false_alarms"] for score in flight_scores), healthy_hours
-    )
-    n_detected_or_quiet_flights = len(detected_surface_failures) + len(quiet_healthy_flights)
+    failures = [score for score in scores if score["failure"]]
+    engine = [score for score in failures if ENGINE in score["failure"]]
+    failed = [score for score in failures if ENGINE not in score["failure"]]
+    found = [score for score in failed if score["detected"]]
+    false = [score for score in scores if score["false_alarms"]]
+    healthy = [score for score in scores if score["failure"] is None]
+    quiet = [score for score in healthy if not score["false_alarms"]]
+    hours = sum(score["healthy_s"] for score in scores) / 3600.0
+    rate = poisson(sum(score["false_alarms"] for score in scores), hours)
+    n_right = len(found) + len(quiet)
     return {
-        "surface_failures": len(surface_failures),
-        "found": len(detected_surface_failures),
-        "precision": len(detected_surface_failures)
-        / max(len(detected_surface_failures) + len(false_alarm_flights), 1),
-        "recall": len(detected_surface_failures) / max(len(surface_failures), 1),
-        "accuracy": n_detected_or_quiet_flights / max(len(surface_failures) + len(healthy_flights), 1),
-        "healthy_flights": len(healthy_flights),
-        "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_healthy_flights),
-        "false_alarms_per_hour": {
-            "value": false_alarm_rate_and_interval.value,
-            "low": false_alarm_rate_and_interval.low,
-            "high": false_alarm_rate_and_interval.high,
-        },
-        "healthy_hours": healthy_hours,
-        "wrong_group": sum(score["right_group"] is False for score in detected_surface_failures),
-        "delay_s": {
-            surface_kind: _summarize_delays(surface_failures, surface_kind) for surface_kind in SURFACE_KINDS
-        },
-        "engine_failures_with_an_alarm": sum(score["detected"] for score in engine_failures),
+        "surface_failures": len(failed),
+        "found": len(found),
+        "precision": len(found) / max(len(found) + len(false), 1),
+        "recall": len(found) / max(len(failed), 1),
+        "accuracy": n_right / max(len(failed) + len(healthy), 1),
+        "healthy_flights": len(healthy),
+        "healthy_flights_with_an_alarm": len(healthy) - len(quiet),
+        "false_alarms_per_hour": {"value": rate.value, "low": rate.low, "high": rate.high},
+        "healthy_hours": hours,
+        "wrong_group": sum(score["right_group"] is False for score in found),
+        "delay_s": {kind: _summarize_delays(failed, kind) for kind in SURFACE_KINDS},
+        "engine_failures_with_an_alarm": sum(score["detected"] for score in engine),
     }
 
 
-def _summarize_delays(surface_failures: Sequence[Document], surface_kind: str) -> Document:
+def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
     """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
     counts: an aileron before a rudder."""
-    failures_of_kind = [
-        failure_score
-        for failure_score in surface_failures
-        if min(
-            _KIND_OF_SURFACE.get(failed_surface, failed_surface)
-            for failed_surface in failure_score["failure"].split("+")
-        )
-        == surface_kind
-    ]
-    delays_s = [failure_score["delay_s"] for failure_score in failures_of_kind if failure_score["detected"]]
+    kinds = [min(_KIND_OF_SURFACE.get(one, one) for one in score["failure"].split("+")) for score in failed]
+    kin = [score for score, first in zip(failed, kinds, strict=True) if first == kind]
+    delays_s = [score["delay_s"] for score in kin if score["detected"]]
     return {
-        "failures": len(failures_of_kind),
+        "failures": len(kin),
         "found": len(delays_s),
         "within_5_s": sum(delay <= MAX_SHORT_DELAY_S for delay in delays_s),
         "mean": float(np.mean(delays_s)) if delays_s else None,
     }
 
 
-def summarize_label_scores(part_scores: Sequence[Document]) -> Document:
+def summarize_labels(parts: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
-    part_scores = [part_score for part_score in part_scores if part_score["rows"]]
-    if not part_scores:
-        return {**dict.fromkeys(LABEL_SCORE_TITLES), "rows": 0}
-    row_counts = np.array([part_score["rows"] for part_score in part_scores], dtype=float)
-    means = {
-        key: float(np.average([part_score[key] for part_score in part_scores], weights=row_counts))
-        for key in LABEL_SCORE_TITLES
-    }
-    return means | {"rows": int(row_counts.sum())}
+    parts = [part for part in parts if part["rows"]]
+    if not parts:
+        return {**dict.fromkeys(LABEL_TITLES), "rows": 0}
+    counts = np.array([part["rows"] for part in parts], dtype=float)
+    means = {key: float(np.average([part[key] for part in parts], weights=counts)) for key in LABEL_TITLES}
+    return means | {"rows": int(counts.sum())}
 
 
 def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set."""
     if "other_days" in document:
         return _tables_of_other_days(document["other_days"])
-    titles_and_tables = []
-    for data_set in document["sets"]:
-        header, format_row = (
-            (LABEL_TABLE_HEADER, _label_score_cells)
-            if data_set["scored_by"] == "labels"
-            else (FAILURE_TABLE_HEADER, _failure_score_cells)
-        )
-        rows = [format_row(method_scores) for method_scores in (*data_set["rows"], *data_set["published"])]
-        titles_and_tables.append((f"{data_set['set']}: left out, {data_set['left_out']}", (header, rows)))
-    return titles_and_tables
+    tables = []
+    for data in document["sets"]:
+        by_labels = data["scored_by"] == "labels"
+        head = LABEL_HEADER if by_labels else FAILURE_HEADER
+        rows = [
+            [row["method"], *_score_texts(row, LABEL_TITLES)] if by_labels else _failure_score_cells(row)
+            for row in (*data["rows"], *data["published"])
+        ]
+        tables.append((f"{data['set']}: left out, {data['left_out']}", (head, rows)))
+    return tables
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    header = ["day", *LABEL_SCORE_TITLES.values(), "classes by sliding least squares"]
-    titles_and_tables = []
-    for data_set in document["sets"]:
-        day_and_summary_rows = [
-            [one_day_scores["day"], *_day_score_cells(one_day_scores)]
-            for one_day_scores in data_set["rows"]
-            if one_day_scores["kind"] == "one change"
-        ]
-        for day_kind_summary in data_set["summary"]:
-            day_and_summary_rows += [
-                [f"{day_kind_summary['kind']}: {statistic}", *_day_score_cells(day_kind_summary[statistic])]
-                for statistic in ("mean", "worst")
-            ]
-        titles_and_tables.append(
-            (
-                f"{data_set['set']}: other days made of it, halves left out in turn",
-                (header, day_and_summary_rows),
-            )
-        )
-    return titles_and_tables
+    head = ["day", *LABEL_TITLES.values(), "classes by sliding least squares"]
+    tables = []
+    for data in document["sets"]:
+        rows = [[day["day"], *_day_score_cells(day)] for day in data["rows"] if day["kind"] == "one change"]
+        for summary in data["summary"]:
+            for key in ("mean", "worst"):
+                rows.append([f"{summary['kind']}: {key}", *_day_score_cells(summary[key])])
+        tables.append((f"{data['set']}: other days made of it, halves left out in turn", (head, rows)))
+    return tables
 
 
-def _day_score_cells(one_day_scores: Document) -> list[str]:
-    return [f"{one_day_scores[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
+def _day_score_cells(day: Document) -> list[str]:
+    return [f"{day[key]:.3f}" for key in (*LABEL_TITLES, "beside")]
 
 
-LABEL_TABLE_HEADER = ["method", *LABEL_SCORE_TITLES.values()]
-FAILURE_TABLE_HEADER = [
+LABEL_HEADER = ["method", *LABEL_TITLES.values()]
+FAILURE_HEADER = [
     "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
     "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
     "wrong group",
 ]  # fmt: skip
 
 
-def _label_score_cells(method_scores: Document) -> list[str]:
-    return [method_scores["method"], *_score_texts_or_empty(method_scores, LABEL_SCORE_TITLES)]
-
-
-def _failure_score_cells(method_scores: Document) -> list[str]:
+def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
-    delay_summaries = [method_scores["delay_s"].get(surface_kind, {}) for surface_kind in SURFACE_KINDS]
-    cells = [
-        method_scores["method"],
-        *_score_texts_or_empty(method_scores, FAILURE_TABLE_HEADER[1:4]),
-        *map(_mean_delay_text, delay_summaries),
-    ]
-    if "false_alarms_per_hour" not in method_scores:
-        return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
-    n_ailerons_and_rudders_within_5_s, n_aileron_and_rudder_failures = (
-        sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
-    )
-    alarms_per_hour = method_scores["false_alarms_per_hour"]
+    delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
+    cells = [row["method"], *_score_texts(row, FAILURE_HEADER[1:4]), *map(_mean_delay_text, delays)]
+    if "false_alarms_per_hour" not in row:
+        return cells + [""] * (len(FAILURE_HEADER) - len(cells))
+    n_soon, n_failed = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
+    alarms = row["false_alarms_per_hour"]
     return [
         *cells,
-        f"{n_ailerons_and_rudders_within_5_s} of {n_aileron_and_rudder_failures}",
-        f"{alarms_per_hour['value']:.1f} ({alarms_per_hour['low']:.1f} to {alarms_per_hour['high']:.1f})",
-        f"{method_scores['healthy_flights_with_an_alarm']} of {method_scores['healthy_flights']}",
-        str(method_scores["wrong_group"]),
+        f"{n_soon} of {n_failed}",
+        f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})",
+        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
+        str(row["wrong_group"]),
     ]
 
 
-def _score_texts_or_empty(method_scores: Document, keys: Iterable[str]) -> list[str]:
-    return ["" if method_scores.get(key) is None else f"{method_scores[key]:.3f}" for key in keys]
+def _score_texts(row: Document, keys: Iterable[str]) -> list[str]:
+    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
 
 
-def _mean_delay_text(delay_summary: Document) -> str:
-    if delay_summary.get("mean") is None:
-        return "not found" if delay_summary.get("failures") else ""
-    count_text = (
-        f" ({delay_summary['found']} of {delay_summary['failures']})" if "found" in delay_summary else ""
-    )
-    return f"{delay_summary['mean']:.1f}{count_text}"
+def _mean_delay_text(delay: Document) -> str:
+    if delay.get("mean") is None:
+        return "not found" if delay.get("failures") else ""
+    counts = f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
+    return f"{delay['mean']:.1f}{counts}"
 
 
 def as_text(document: Document) -> str:
@@ -374,10 +297,8 @@ def as_text(document: Document) -> str:
 
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
-    titles_and_tables = score_tables(document)
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in titles_and_tables
-    )
+    tables = score_tables(document)
+    return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables)
 
 
 def table_markers(document: Document) -> tuple[str, str]:
@@ -394,15 +315,14 @@ def update_page(document: Document, page: Path) -> None:
 def draw_comparison_figure(document: Document) -> Any:
     """How late each method found each failure, and how near it came to the labels: a panel a data set."""
     data_sets = document["sets"]
-    figure, axes_grid = panels(
-        len(data_sets), 1, 8.6, sum(0.27 * len(_method_titles(data_set)) + 1.3 for data_set in data_sets)
-    )
-    for axis, data_set in zip(axes_grid[:, 0], data_sets, strict=True):
-        draw_panel = _draw_shares_of_right_rows if data_set["scored_by"] == "labels" else _draw_failure_delays
-        draw_panel(axis, data_set)
-        axis.set_title(f"{data_set['set']}: left out, {data_set['left_out']}", fontsize=10, loc="left")
-        axis.set_yticks(range(len(_method_titles(data_set))), _method_titles(data_set))
-        axis.set_ylim(len(_method_titles(data_set)) - 0.5, -0.5)
+    height = sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
+    figure, axes = panels(len(data_sets), 1, 8.6, height)
+    for axis, data in zip(axes[:, 0], data_sets, strict=True):
+        (_draw_shares if data["scored_by"] == "labels" else _draw_failure_delays)(axis, data)
+        axis.set_title(f"{data['set']}: left out, {data['left_out']}", fontsize=10, loc="left")
+        titles = _method_titles(data)
+        axis.set_yticks(range(len(titles)), titles)
+        axis.set_ylim(len(titles) - 0.5, -0.5)
         axis.tick_params(labelsize=8)
         axis.grid(color=GRID, linewidth=0.5)
         axis.set_axisbelow(True)
@@ -410,63 +330,35 @@ def draw_comparison_figure(document: Document) -> Any:
     return figure
 
 
-def _method_titles(data_set: Document) -> list[str]:
-    return [method_scores["method"] for method_scores in (*data_set["rows"], *data_set.get("published", ()))]
+def _method_titles(data: Document) -> list[str]:
+    return [row["method"] for row in (*data["rows"], *data.get("published", ()))]
 
 
-def _draw_failure_delays(axis: Any, data_set: Document) -> None:
+def _draw_failure_delays(axis: Any, data: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
-    method_titles = _method_titles(data_set)
-    failure_of_flight = {entry["left_out"]: entry["failure"] for entry in data_set["flights"]}
-    distinct_failure_names = [
-        failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
-    ]
-    for i, surface_failure in enumerate(distinct_failure_names):
-        entries_of_failure = [
-            entry
-            for entry in data_set["flights"]
-            if entry["failure"] == surface_failure and entry["method"] in method_titles
-        ]
-        delays_s = [
-            _MAX_SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"]
-            for entry in entries_of_failure
-        ]
-        heights_in_method_rows = [
-            method_titles.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_failure_names) - 0.5)
-            for entry in entries_of_failure
-        ]
-        label = surface_failure.replace("_", " ").replace("+", " + ")
-        axis.plot(
-            [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
-            heights_in_method_rows,
-            marker(i),
-            color=SERIES[i],
-            label=label,
-        )
-    axis.axvspan(_MAX_SHOWN_DELAY_S, _MAX_SHOWN_DELAY_S + 2.0, color=GRID)
-    axis.set_xlim(-0.5, _MAX_SHOWN_DELAY_S + 2.0)
-    axis.set_xlabel(f"delay, s (grey: not found within {_MAX_SHOWN_DELAY_S:g} s)", fontsize=9)
+    titles = _method_titles(data)
+    failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
+    failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
+    for i, failure in enumerate(failures):
+        shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
+        entries = [one for one in data["flights"] if one["failure"] == failure and one["method"] in titles]
+        delays_s = [np.inf if entry["delay_s"] is None else entry["delay_s"] for entry in entries]
+        delays_s = [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s]
+        heights = [titles.index(entry["method"]) + shift for entry in entries]
+        label = failure.replace("_", " ").replace("+", " + ")
+        axis.plot(delays_s, heights, marker(i), color=SERIES[i], label=label)
+    axis.axvspan(_SHOWN_DELAY_S, _SHOWN_DELAY_S + 2.0, color=GRID)
+    axis.set_xlim(-0.5, _SHOWN_DELAY_S + 2.0)
+    axis.set_xlabel(f"delay, s (grey: not found within {_SHOWN_DELAY_S:g} s)", fontsize=9)
 
 
-def _draw_shares_of_right_rows(axis: Any, data_set: Document) -> None:
+def _draw_shares(axis: Any, data: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
-    legend_label_of_score = {
-        "classes": "class",
-        "healthy_or_faulty": "healthy or faulty",
-        "side": "side of the aircraft",
-    }
-    rows = [*data_set["rows"], *data_set["published"]]
-    for i, (key, label) in enumerate(legend_label_of_score.items()):
-        indices_of_rows_with_score = [
-            row_index for row_index, row in enumerate(rows) if row.get(key) is not None
-        ]
-        heights_in_method_rows = [row_index + 0.22 * (i - 1) for row_index in indices_of_rows_with_score]
-        axis.plot(
-            [rows[row_index][key] for row_index in indices_of_rows_with_score],
-            heights_in_method_rows,
-            marker(i),
-            color=SERIES[i],
-            label=label,
-        )
+    labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
+    rows = [*data["rows"], *data["published"]]
+    for i, (key, label) in enumerate(labels.items()):
+        scored = [k for k, row in enumerate(rows) if row.get(key) is not None]
+        heights = [k + 0.22 * (i - 1) for k in scored]
+        axis.plot([rows[k][key] for k in scored], heights, marker(i), color=SERIES[i], label=label)
     axis.set_xlim(0, 1)
     axis.set_xlabel("share of the rows that are right", fontsize=9)

@@ -15,13 +15,8 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import BANK_OF_FILTERS_DETECTOR, diagnose_with_detector
-from beaver_ftc_logs.fitting import (
-    FlightWithUsableRows,
-    fit_model,
-    flights_with_usable_rows,
-    validation_folds,
-)
+from beaver_ftc_logs.detectors import OUR_DETECTOR, diagnose_with_detector
+from beaver_ftc_logs.fitting import FitPart, fit_model, fit_parts, validation_folds
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
@@ -29,8 +24,8 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS, TEST_SEEDS = range(8), range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
-_WORST_FUNCTION_BY_SCORE = {"mean_error": max}
-_TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
+_WORST_OF_SCORE = {"mean_error": max}
+_TRIM_MEAN_S = 30.0  # of the mean that is called slow
 
 
 @dataclass(frozen=True)
@@ -57,64 +52,44 @@ class DayChanges:
     trim_drift_sd_commands: float = 0.0
 
 
-def unchanged_day(n_surfaces: int) -> DayChanges:
+def unchanged_day(n: int) -> DayChanges:
     """The day as it was."""
-    return DayChanges("as it was", np.zeros(n_surfaces), np.zeros(n_surfaces), np.ones(n_surfaces))
+    return DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
 
 
-def unchanged_and_one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
-    """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
-    unchanged = unchanged_day(len(mixer_shares))
-    days_in_order = [unchanged]
-    for command_name, surface_shares in zip(command_names, mixer_shares.T, strict=True):
+def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
+    """One thing changed at a time. mixer (S, C): share of each command in each surface."""
+    unchanged = unchanged_day(len(mixer))
+    days = [unchanged]
+    for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            days_in_order.append(
-                replace(
-                    unchanged,
-                    name=f"trim of {command_name} {shift:+.2f}",
-                    trim_shift_commands=shift * surface_shares,
-                )
-            )
-            days_in_order.append(
-                replace(
-                    unchanged,
-                    name=f"neutral of {command_name} {shift:+.2f}",
-                    neutral_shift_commands=shift * surface_shares,
-                )
-            )
-    days_in_order += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days_in_order += [
-        replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
-        for delay_s in (-0.04, 0.04)
-    ]
-    days_in_order += [
-        replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)
-    ]
-    days_in_order += [
-        replace(unchanged, name="noise 1.5", noise_ratio=1.5),
-        replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
-    ]
-    for i, surface_unit_vector in enumerate(np.eye(len(mixer_shares))):
+            by, name = shift * shares, f"of {command} {shift:+.2f}"
+            days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=by))
+            days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=by))
+    days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
+    days += [replace(unchanged, name=f"commands {by:+.2f} s", command_delay_s=by) for by in (-0.04, 0.04)]
+    days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
+    days.append(replace(unchanged, name="noise 1.5", noise_ratio=1.5))
+    days.append(replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01))
+    for i, unit in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
-            surface_gains = np.where(surface_unit_vector, gain, 1.0)
-            days_in_order.append(
-                replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
-            )
-    return days_in_order
+            gains = np.where(unit, gain, 1.0)
+            days.append(replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains))
+    return days
 
 
-def random_days(n_surfaces: int, seeds: range) -> list[DayChanges]:
-    """Days on which everything differs a little."""
-    return [_random_day(n_surfaces, seed) for seed in seeds]
+def random_days(n: int, seeds: range) -> list[DayChanges]:
+    """Days on which everything differs a little from the recorded one."""
+    return [_random_day(n, seed) for seed in seeds]
 
 
-def _random_day(n_surfaces: int, seed: int) -> DayChanges:
+def _random_day(n: int, seed: int) -> DayChanges:
     rng = np.random.default_rng([20, seed])
     return DayChanges(
         name=f"drawn {seed}",
-        trim_shift_commands=0.015 * rng.standard_normal(n_surfaces),
-        neutral_shift_commands=0.01 * rng.standard_normal(n_surfaces),
-        surface_gains=np.exp(0.03 * rng.standard_normal(n_surfaces)),
+        trim_shift_commands=0.015 * rng.standard_normal(n),
+        neutral_shift_commands=0.01 * rng.standard_normal(n),
+        surface_gains=np.exp(0.03 * rng.standard_normal(n)),
         common_gain=float(np.exp(0.1 * rng.standard_normal())),
         command_delay_s=float(0.02 * rng.standard_normal()),
         motion_scale=float(np.exp(0.25 * rng.standard_normal())),
@@ -123,161 +98,102 @@ def _random_day(n_surfaces: int, seed: int) -> DayChanges:
     )
 
 
-def apply_day_changes(
-    day: DayChanges, samples: Samples, lagged_rate_coefficients: Floats, noise_covariance: Floats
-) -> Samples:
-    """The flight as it might have been on that day. lagged_rate_coefficients (3 h, 3) and noise_covariance
-    (3, 3) of its model."""
+def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:
+    """The flight as it might have been on that day. A (3 h, 3): how its model's rates answer their own past,
+    Q (3, 3) (rad/s)2: covariance of its noise. e (n, S): effectiveness."""
     rng = np.random.default_rng(20)
-    effectiveness_or_one = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
-    trim_commands = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
-    commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
-        day.common_gain * day.surface_gains
-    )
-    trim_drift_as_commands = day.trim_drift_sd_commands * _coloured_noise(
-        rng, commands.shape, 300.0 / samples.dt_s
-    )
-    commands = (
-        commands
-        + day.neutral_shift_commands
-        + (day.trim_shift_commands + trim_drift_as_commands) / effectiveness_or_one
-    )
-    trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
-    rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
-    extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
-    rates = rates + extra_noise_sd_ratio * _rate_response_to_noise(
-        rng, lagged_rate_coefficients, noise_covariance, len(rates)
-    )
+    e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)
+    trim = _running_mean(commands, round(_TRIM_MEAN_S / samples.dt_s))
+    commands = trim + day.motion_scale * (commands - trim) / (day.common_gain * day.surface_gains)
+    drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + drift) / e
+    mean = _running_mean(samples.rates, round(_TRIM_MEAN_S / samples.dt_s))
+    rates = mean + day.motion_scale * (samples.rates - mean)
+    extra = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
+    rates = rates + extra * _response_to_noise(rng, A, Q, len(rates))
     return replace(samples, commands=commands, rates=rates)
 
 
-def _shift_values_earlier(values: Floats, n_samples: float) -> Floats:
-    """Values that act `n_samples` samples later than these: logged earlier by as much, (n, S)."""
-    fractional_source_rows = np.arange(len(values)) + n_samples
-    return np.column_stack(
-        [np.interp(fractional_source_rows, np.arange(len(values)), column) for column in values.T]
-    )
+def _shifted(values: Floats, n: float) -> Floats:
+    """Values that act `n` samples later than these: logged earlier by as much, (n, S)."""
+    rows = np.arange(len(values)) + n
+    return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
 
 
-def _running_mean(values: Floats, window_samples: int) -> Floats:
+def _running_mean(values: Floats, n: int) -> Floats:
     """Centred running mean, (n, S)."""
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(values, window_samples, axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))
 
 
-def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlation_samples: float) -> Floats:
-    """Coloured noise of standard deviation 1 and correlation time `correlation_samples`."""
+def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) -> Floats:
+    """Coloured noise x[k] = a x[k-1] + w[k] of standard deviation 1 and correlation time n samples,
+    a = exp(-1/n)."""
     from scipy.signal import lfilter
 
-    retention = np.exp(-1.0 / correlation_samples)
-    white_noise = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
-    return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
+    a = np.exp(-1.0 / n)
+    w = rng.standard_normal(shape) * np.sqrt(1.0 - a**2)
+    return np.asarray(lfilter([1.0], [1.0, -a], w, axis=0))
 
 
-def _rate_response_to_noise(
-    rng: np.random.Generator, lagged_rate_coefficients: Floats, noise_covariance: Floats, n_samples: int
-) -> Floats:
-    """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
-    process_noise = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
-    n_lags = len(lagged_rate_coefficients) // 3
-    rates = np.zeros((n_samples + n_lags, 3))
-    for k in range(n_samples):
-        rates[k + n_lags] = (
-            rates[k : k + n_lags][::-1].ravel() @ lagged_rate_coefficients[: 3 * n_lags] + process_noise[k]
-        )
-    return rates[n_lags:]
+def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:
+    """Return the rates (n, 3), rad/s, under white moments w of the model's noise:
+    x[k] = A' (x[k-1], ..., x[k-h]) + w[k]."""
+    w = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
+    h = len(A) // 3
+    x = np.zeros((n + h, 3))
+    for k in range(n):
+        x[k + h] = x[k : k + h][::-1].ravel() @ A[: 3 * h] + w[k]
+    return x[h:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled_data_sets = [
-        data_set
-        for data_set in benchmark.load_data_sets(folder)
-        if np.isfinite(data_set.flights[0].labels).any()
-    ]
-    if not labelled_data_sets:
+    all_sets = benchmark.load_data_sets(folder)
+    labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
+    if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
-    return {"sets": [_test_data_set_on_days(data_set) for data_set in labelled_data_sets]}
+    return {"sets": [_test_data_set(data) for data in labelled]}
 
 
-def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
-    flights_with_usable_mask = flights_with_usable_rows(data_set.flights)
-    settings = benchmark.settings_of_whole_flight(flights_with_usable_mask, data_set)
-    models_and_held_out = [
-        (fit_model(fitted_flights, data_set.vehicle, settings), held_out)
-        for fitted_flights, held_out, _ in validation_folds(flights_with_usable_mask)
-    ]
-    all_flights_model = fit_model(flights_with_usable_mask, data_set.vehicle, settings)
-    n_surfaces = len(data_set.vehicle.surfaces)
-    days_by_kind = {
-        "one change": unchanged_and_one_change_days(
-            mixer_matrix(data_set.vehicle), data_set.vehicle.command_column_names
-        ),
-        "drawn, settings chosen on these": random_days(n_surfaces, TUNING_SEEDS),
-        "drawn, not looked at": random_days(n_surfaces, TEST_SEEDS),
+def _test_data_set(data: benchmark.DataSet) -> Document:
+    usable = fit_parts(data.flights)
+    settings = benchmark.whole_settings(usable, data)
+    parts = validation_folds(usable)
+    folds = [(fit_model(fitted, data.vehicle, settings), held_out) for fitted, held_out, _ in parts]
+    model = fit_model(usable, data.vehicle, settings)
+    n = len(data.vehicle.surfaces)
+    kinds = {
+        "one change": one_change_days(mixer_matrix(data.vehicle), data.vehicle.command_columns),
+        "drawn, settings chosen on these": random_days(n, TUNING_SEEDS),
+        "drawn, not looked at": random_days(n, TEST_SEEDS),
     }
-    scores_of_all_days = [
-        one_day_scores
-        for kind, days in days_by_kind.items()
-        for one_day_scores in _score_days(kind, days, models_and_held_out, all_flights_model)
-    ]
-    summary_by_kind = [
-        _summarize_days(
-            kind, [one_day_scores for one_day_scores in scores_of_all_days if one_day_scores["kind"] == kind]
-        )
-        for kind in days_by_kind
-    ]
-    return {"set": data_set.name, "rows": scores_of_all_days, "summary": summary_by_kind}
+    scores = [day for kind, days in kinds.items() for day in _score_days(kind, days, folds, model)]
+    summary = [_summarize_days(kind, [day for day in scores if day["kind"] == kind]) for kind in kinds]
+    return {"set": data.name, "rows": scores, "summary": summary}
 
 
 def _score_days(
-    kind: str,
-    days: Sequence[DayChanges],
-    models_and_held_out: Sequence[tuple[Model, FlightWithUsableRows]],
-    all_flights_model: Model,
+    kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
-    _, lagged_rate_coefficients, _, noise_covariance = all_flights_model.intercept_past_response_noise()
+    """Yield the scores of each day. whole: the model of all flights."""
+    _, A, _, Q = whole.as_arrays()
     for day in days:
-        part_scores_by_detector: dict[str, list[Document]] = {
-            BANK_OF_FILTERS_DETECTOR: [],
-            _RIVAL_DETECTOR: [],
-        }
-        for model, held_out in models_and_held_out:
-            altered_samples = apply_day_changes(
-                day, held_out.samples, lagged_rate_coefficients, noise_covariance
-            )
-            labels = benchmark.labels_nan_outside_usable_span(held_out)
-            for detector_name, part_scores in part_scores_by_detector.items():
-                part_scores.append(
-                    scoring.score_against_labels(
-                        diagnose_with_detector(detector_name, altered_samples, model), labels
-                    )
-                )
-        rival_class_score = benchmark.summarize_label_scores(part_scores_by_detector[_RIVAL_DETECTOR])[
-            "classes"
-        ]
-        yield {
-            "kind": kind,
-            "day": day.name,
-            **benchmark.summarize_label_scores(part_scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
-            "beside": rival_class_score,
-        }
+        scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}
+        for model, held_out in folds:
+            altered = apply_day_changes(day, held_out.samples, A, Q)
+            labels = benchmark.labels_in_span(held_out)
+            for detector, parts in scores.items():
+                rows = diagnose_with_detector(detector, altered, model)
+                parts.append(scoring.score_against_labels(rows, labels))
+        ours, rival = (benchmark.summarize_labels(scores[name]) for name in (OUR_DETECTOR, _RIVAL_DETECTOR))
+        yield {"kind": kind, "day": day.name, **ours, "beside": rival["classes"]}
 
 
-def _summarize_days(kind: str, scores_of_days: Sequence[Document]) -> Document:
+def _summarize_days(kind: str, days: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values_of_score = {
-        key: [one_day_scores[key] for one_day_scores in scores_of_days]
-        for key in (*benchmark.LABEL_SCORE_TITLES, "beside")
-    }
-    mean_by_score = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
-    return {
-        "kind": kind,
-        "mean": mean_by_score,
-        "worst": {
-            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(score_values)
-            for k, score_values in values_of_score.items()
-        },
-    }
+    values = {key: [day[key] for day in days] for key in (*benchmark.LABEL_TITLES, "beside")}
+    worst = {key: _WORST_OF_SCORE.get(key, min)(one) for key, one in values.items()}
+    return {"kind": kind, "mean": {key: float(np.mean(one)) for key, one in values.items()}, "worst": worst}

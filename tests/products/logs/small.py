@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import LoggedFailure
-from beaver_ftc_logs.regression import group_surfaces_by_commands
+from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -39,7 +39,7 @@ def vehicle(of=WING, **changes):
 def model(of=WING, settings=None, history=2, lags=3, **changes):
     """A model whose coefficients differ in everything. of: its vehicle file."""
     its = vehicle(of)
-    groups = group_surfaces_by_commands(its)
+    groups = group_surfaces(its)
     names = list(its.surfaces)
     further = [(-1) ** j * 0.2 * np.eye(3) - 0.01 for j in range(1, history)]
     past = np.vstack([np.diag([0.5, 0.6, 0.7]) + 0.02, *further])
@@ -69,7 +69,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     members = [[list(its.surfaces).index(one) for one in group] for group in model.groups]
     moved = np.column_stack([(labels * surfaces)[:, group].sum(axis=1) for group in members])
     white = rng.standard_normal((n, 3)) @ np.linalg.cholesky(np.array(model.residual_covariance)).T
-    response, past = np.array(model.command_response), np.array(model.lagged_rate_and_signal_coefficients)
+    response, past = np.array(model.command_response), np.array(model.past_coefficients)
     rates = np.zeros((n, 3))
     for k in range(max(model.n_rate_lags, model.n_command_lags), n):
         before = [*(rates[k - j] for j in range(1, model.n_rate_lags + 1)), signals[k - 1]]
@@ -82,7 +82,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     labels = labels if its.labels else np.full_like(labels, np.nan)
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
-        "stretch_number": run, "dt_s": step, "mean_age_s_by_held_column": {}, "logged_failures": (),
+        "stretch_number": run, "dt_s": step, "held_age_s": {}, "logged_failures": (),
         "log_stamps_s": t_s,
     }  # fmt: skip
     return Samples(**(given | changes))
@@ -95,7 +95,7 @@ def rows(parts, surfaces=2, step_s=0.5):
     faulty = np.array([int(bool(name)) for name in named], dtype=np.int64)
     t_s = 10.0 + step_s * np.arange(len(named))
     probability = np.where(faulty, 0.9, 0.1) + 0.001 * np.arange(len(named))
-    return DiagnosisRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
+    return LogRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
 
 
 FAILURE = (

@@ -9,9 +9,9 @@ from beaver_ftc_logs.bank import (
     NO_RESPONSE,
     PAIR_LOSS,
     UNKNOWN_OFFSET,
-    build_hypothesis_bank,
-    build_residual_noise,
-    build_trim_and_gain_state_model,
+    build_bank,
+    build_noise,
+    build_states,
 )
 from products.logs import small
 
@@ -32,7 +32,7 @@ MODELS = {
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_hypotheses_of_a_model(changed, name):
-    assert not changed(build_hypothesis_bank(MODELS[name])._asdict())
+    assert not changed(build_bank(MODELS[name])._asdict())
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -40,8 +40,8 @@ def test_what_may_differ_from_a_model(changed, name):
     model = MODELS[name]
     assert not changed(
         {
-            "adaptation": build_trim_and_gain_state_model(model)._asdict(),
-            "noise": build_residual_noise(model)._asdict(),
+            "adaptation": build_states(model)._asdict(),
+            "noise": build_noise(model)._asdict(),
         }
     )
 
@@ -50,7 +50,7 @@ def test_what_may_differ_from_a_model(changed, name):
 def test_shares_are_those_of_the_settings(name):
     """Of changes a fifth restores health, and the others are all the rest; a flight begins healthy at 0.7."""
     model = MODELS[name]
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     assert bank.transition_share[0] == 0.2
     assert bank.transition_share.sum() == pytest.approx(1.0)
     assert (bank.prior_probability[0], bank.prior_probability[-1], bank.prior_probability.sum()) == (
@@ -78,7 +78,7 @@ def test_shares_are_those_of_the_settings(name):
 
 
 def test_levels_seen_carry_their_share_of_a_groups_faults():
-    bank = build_hypothesis_bank(MODELS["two groups, levels seen of one"])
+    bank = build_bank(MODELS["two groups, levels seen of one"])
     left = (bank.hypothesis_kind == GROUP_LOSS) & (bank.effectiveness[:, 1] < 1.0)
     weight = dict(zip(bank.effectiveness[left, 1].tolist(), bank.transition_share[left], strict=True))
     assert sorted(weight) == [0.0, 0.25, 0.4, 0.5, 0.75]
@@ -89,7 +89,7 @@ def test_levels_seen_carry_their_share_of_a_groups_faults():
 def test_a_stuck_surface_offsets_the_axes_it_moves_most():
     """0.3 to 1 of 1.7 residual sd, by the sum of its responses; a loss brings none."""
     model = MODELS["slaved, may be stuck"]
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     noise = np.diag(model.residual_covariance)
     moved = np.abs(np.array(model.command_response)).sum(axis=1) / np.sqrt(noise)
     for group in range(2):
@@ -104,22 +104,18 @@ def test_a_stuck_surface_offsets_the_axes_it_moves_most():
 
 def test_a_group_of_which_nothing_is_said_has_no_hypothesis():
     told = {"commands": [], "rates": [], "tied": [1.0, 0.2]}
-    bank = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told))
+    bank = build_bank(small.model(settings=SETTINGS, fitted=told))
     assert (bank.effectiveness[:-1, 0] == 1.0).all()
     assert bank.transition_share.sum() == pytest.approx(1.0)
-    nothing = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
-    assert len(nothing.transition_share) == len(
-        build_hypothesis_bank(small.model(settings=SETTINGS)).transition_share
-    )
+    nothing = build_bank(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
+    assert len(nothing.transition_share) == len(build_bank(small.model(settings=SETTINGS)).transition_share)
 
 
 def test_of_another_law_a_surface_s_own_gain_counts_whole_whatever_is_left_of_it():
     plain, other = (
-        build_hypothesis_bank(small.model(small.WING | {"other_laws": laws}, settings=SETTINGS))
+        build_bank(small.model(small.WING | {"other_laws": laws}, settings=SETTINGS))
         for laws in (False, True)
     )
-    np.testing.assert_array_equal(plain.response_share_scaled_by_group_gain, plain.effectiveness)
+    np.testing.assert_array_equal(plain.own_gain_share, plain.effectiveness)
     np.testing.assert_array_equal(other.effectiveness, plain.effectiveness)
-    np.testing.assert_array_equal(
-        other.response_share_scaled_by_group_gain, np.ones_like(plain.effectiveness)
-    )
+    np.testing.assert_array_equal(other.own_gain_share, np.ones_like(plain.effectiveness))

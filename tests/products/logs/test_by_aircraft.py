@@ -16,13 +16,13 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import by_aircraft, stepped
-from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
+from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.recording import Column, RecordedFlight
-from beaver_ftc_logs.samples import read_columns_of_vehicle
+from beaver_ftc_logs.samples import read_vehicle_columns
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
-BEAVER = load_aircraft_and_declared_errors("beaver")
+BEAVER = load_diagnosed("beaver")
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def exported(folder, kind, to):
 def log(flown, tmp_path_factory):
     """A table of the flight, and what its vehicle file says."""
     path, vehicle = exported(flown[0], "table", tmp_path_factory.mktemp("log"))
-    return read_columns_of_vehicle(path, vehicle), vehicle
+    return read_vehicle_columns(path, vehicle), vehicle
 
 
 def changed(recording, **functions):
@@ -66,7 +66,7 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     path, vehicle = exported(flown[0], kind, tmp_path)
-    _, rows, verdict = diagnose_with_aircraft_model(read_columns_of_vehicle(path, vehicle), vehicle, BEAVER)
+    _, rows, verdict = diagnose_aircraft(read_vehicle_columns(path, vehicle), vehicle, BEAVER)
     flight = flown[1]
     assert verdict["detection_s"] == pytest.approx(flight.detection.time_s, abs=1e-9)
     assert verdict["isolation_s"] == pytest.approx(flight.isolation.time_s, abs=1e-9)
@@ -77,20 +77,20 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
 
 def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):
     recording, vehicle = log
-    _, rows, _ = diagnose_with_aircraft_model(recording, vehicle, BEAVER)
+    _, rows, _ = diagnose_aircraft(recording, vehicle, BEAVER)
     truth = np.ones((len(rows.t_s), 4))
     truth[rows.t_s >= 6.0 - 1e-9, 1] = 0.6
     held = (rows.effectiveness_low <= truth) & (truth <= rows.effectiveness_high)
     wrong = rows.t_s[~held.all(axis=1)]
-    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.EFFECTIVENESS_BOUND_WINDOW_S)).all()
+    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.BOUND_WINDOW_S)).all()
     later = rows.t_s > 7.0
     assert np.median((rows.effectiveness_high - rows.effectiveness_low)[later, 1]) < 0.1
 
 
 def test_a_flight_cut_short_says_the_same_up_to_the_cut(log):
     recording, vehicle = log
-    _, whole, _ = diagnose_with_aircraft_model(recording, vehicle, BEAVER)
-    _, cut, _ = diagnose_with_aircraft_model(only(recording, slice(0, 700)), vehicle, BEAVER)
+    _, whole, _ = diagnose_aircraft(recording, vehicle, BEAVER)
+    _, cut, _ = diagnose_aircraft(only(recording, slice(0, 700)), vehicle, BEAVER)
     for name in (
         "faulty",
         "isolated_surfaces",
@@ -106,7 +106,7 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
     recording, vehicle = log
     rows = np.r_[0:300, 330:900]
     holed = changed(only(recording, rows), p_rad_s=lambda p: np.where(np.arange(len(p)) == 100, np.nan, p))
-    _, found, verdict = diagnose_with_aircraft_model(holed, vehicle, BEAVER)
+    _, found, verdict = diagnose_aircraft(holed, vehicle, BEAVER)
     assert found.credible[100] == 0
     assert (found.credible == 0).sum() == 1
     assert (
@@ -119,7 +119,7 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
 def test_outside_the_envelope_nothing_is_said(log):
     recording, vehicle = log
     fast = changed(recording, airspeed_mps=lambda v: 2.0 * v, qdyn_pa=lambda q: 4.0 * q)
-    _, rows, verdict = diagnose_with_aircraft_model(fast, vehicle, BEAVER)
+    _, rows, verdict = diagnose_aircraft(fast, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert rows.credible.mean() < 0.02
     assert verdict["detection_s"] is None
@@ -131,7 +131,7 @@ def test_a_log_of_another_aircraft_is_not_credible(log):
     recording, vehicle = log
     turned = changed(recording, **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), lambda rate: 2.0 * rate))
     vehicle = vehicle.model_copy(update={"attitude": None})
-    _, rows, verdict = diagnose_with_aircraft_model(turned, vehicle, BEAVER)
+    _, rows, verdict = diagnose_aircraft(turned, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
 
@@ -152,11 +152,11 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     planted = np.repeat(theta, 1000, axis=0)
     innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
     innovation[0], innovation[7, 1] = 1e6, np.nan  # the first ends no frame
-    gains, most = stepped._relative_command_gains_and_upper_bounds(innovation, expected)
+    gains, most = stepped._command_gains(innovation, expected)
     assert np.all(most > gain)
     assert most == pytest.approx(gain, abs=0.1)
     assert gains == pytest.approx(1.0 + np.mean(theta, axis=0), abs=0.05)
-    short = stepped._relative_command_gains_and_upper_bounds(innovation[:200], expected[:200])
+    short = stepped._command_gains(innovation[:200], expected[:200])
     assert np.all(np.array(short) == 1.0)
 
 
@@ -165,14 +165,14 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
     bf.fly(scenario).save(tmp_path, report=False)
     path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
-    recording = read_columns_of_vehicle(path, vehicle)
+    recording = read_vehicle_columns(path, vehicle)
     turned = changed(recording, rudder_command=np.negative)
-    assert diagnose_with_aircraft_model(recording, vehicle, BEAVER)[2]["faulty"] is False
+    assert diagnose_aircraft(recording, vehicle, BEAVER)[2]["faulty"] is False
     with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
-        diagnose_with_aircraft_model(turned, vehicle, BEAVER)
+        diagnose_aircraft(turned, vehicle, BEAVER)
     (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
-    moving = load_aircraft_and_declared_errors("beaver", str(tmp_path / "moving.yaml"))
-    assert diagnose_with_aircraft_model(turned, vehicle, moving)[2]["faulty"] in (False, True)
+    moving = load_diagnosed("beaver", str(tmp_path / "moving.yaml"))
+    assert diagnose_aircraft(turned, vehicle, moving)[2]["faulty"] in (False, True)
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.9])
@@ -189,18 +189,18 @@ def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_
     })  # fmt: skip
     bf.fly(scenario).save(tmp_path, report=False)
     path, vehicle = exported(tmp_path / "noisy", "table", tmp_path)
-    declared = load_aircraft_and_declared_errors("beaver", str(tmp_path / "noisy" / "scenario.yaml"))
-    recording = read_columns_of_vehicle(path, vehicle)
-    assert diagnose_with_aircraft_model(recording, vehicle, declared)[2]["isolated"] == (
+    declared = load_diagnosed("beaver", str(tmp_path / "noisy" / "scenario.yaml"))
+    recording = read_vehicle_columns(path, vehicle)
+    assert diagnose_aircraft(recording, vehicle, declared)[2]["isolated"] == (
         "aileron" if loss else None
     )
     if not loss:
         with pytest.raises(BadInput, match=r"command of aileron has the other sign, there is no alarm"):
-            diagnose_with_aircraft_model(changed(recording, aileron_command=np.negative), vehicle, declared)
+            diagnose_aircraft(changed(recording, aileron_command=np.negative), vehicle, declared)
         aileron, flap = (recording.columns[f"{name}_command"].values for name in ("aileron", "flap"))
         exchanged = changed(recording, aileron_command=lambda _: flap, flap_command=lambda _: aileron)
         with pytest.raises(BadInput, match=r"aileron and flap are exchanged, there is no alarm"):
-            diagnose_with_aircraft_model(exchanged, vehicle, declared)
+            diagnose_aircraft(exchanged, vehicle, declared)
 
 
 def without(vehicle, **keys):
@@ -222,7 +222,7 @@ def test_what_a_log_lacks_is_said(log, keys, factors, says):
     recording, vehicle = log
     scaled = {name: (lambda values, by=by: values * by) for name, by in factors.items()}
     with pytest.raises(BadInput, match=says):
-        diagnose_with_aircraft_model(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
+        diagnose_aircraft(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
 
 
 @pytest.mark.parametrize(("rate_hz", "taken"), [(20.0, True), (19.98, False), (1e3, True), (1001.0, False)])
@@ -249,7 +249,7 @@ def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
     """Commands and labels of a file that names them the other way round; at any airspeed as they are."""
     recording, vehicle = log
     names = list(bf.aircraft("beaver").surfaces)
-    plain = by_aircraft.read_diagnosis_inputs(recording, vehicle, BEAVER)
+    plain = by_aircraft.read_inputs(recording, vehicle, BEAVER)
     t_s = recording.columns["p_rad_s"].t_s
     truth = {f"{name}_truth": Column(t_s, np.full(len(t_s), 0.2 * k + 0.1)) for k, name in enumerate(names)}
     labelled = RecordedFlight(recording.name, recording.columns | truth)
@@ -259,11 +259,11 @@ def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
         labels={name: f"{name}_truth" for name in names},
         reference_airspeed_mps=20.0,
     )
-    found = by_aircraft.read_diagnosis_inputs(labelled, turned, BEAVER)
+    found = by_aircraft.read_inputs(labelled, turned, BEAVER)
     np.testing.assert_array_equal(found.samples.commands, plain.samples.commands)
     np.testing.assert_allclose(found.samples.labels, np.tile([0.1, 0.3, 0.5, 0.7], (len(t_s), 1)))
     for one, other in zip(
-        found.rates_signals_commands_attitude, plain.rates_signals_commands_attitude, strict=True
+        found.input_arrays, plain.input_arrays, strict=True
     ):
         np.testing.assert_array_equal(one, other)
     assert (found.rate_hz, found.gap_free_stretches) == (100.0, [(0, len(t_s))])
@@ -274,26 +274,26 @@ def test_a_log_too_slow_or_uneven_is_refused(log):
     with pytest.raises(
         BadInput, match="is logged at 10 Hz, allowed: an aircraft's model takes 20 to 1000 Hz"
     ):
-        diagnose_with_aircraft_model(only(recording, slice(0, None, 10)), vehicle, BEAVER)
+        diagnose_aircraft(only(recording, slice(0, None, 10)), vehicle, BEAVER)
     rng = np.random.default_rng(3)
     uneven = only(recording, np.flatnonzero(rng.uniform(size=900) < 0.7))
     with pytest.raises(BadInput, match="no 50 samples in turn, evenly spaced"):
-        diagnose_with_aircraft_model(uneven, vehicle, BEAVER)
+        diagnose_aircraft(uneven, vehicle, BEAVER)
 
 
 def test_turbulence_wants_the_attitude(log, tmp_path):
     recording, vehicle = log
     (tmp_path / "rough.yaml").write_text("name: rough\nfdi: {bounds: {turbulence: light}}\n")
-    rough = load_aircraft_and_declared_errors("beaver", str(tmp_path / "rough.yaml"))
+    rough = load_diagnosed("beaver", str(tmp_path / "rough.yaml"))
     level = without(vehicle, attitude={"roll": "roll_rad", "pitch": "pitch_rad"})
     with pytest.raises(BadInput, match=r"attitude.yaw: is missing, allowed: its column, where fdi.bounds"):
-        diagnose_with_aircraft_model(recording, level, rough)
+        diagnose_aircraft(recording, level, rough)
 
 
 def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch):
     elsewhere = bf.load("fault-free").model_copy(update={"aircraft": "./elsewhere"})
     monkeypatch.setattr("beaver_ftc.scenario.load_scenario", lambda given: elsewhere)
-    assert load_aircraft_and_declared_errors("beaver", "any").aircraft.name == "beaver"
+    assert load_diagnosed("beaver", "any").aircraft.name == "beaver"
 
 
 @pytest.mark.parametrize(
@@ -307,7 +307,7 @@ def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch)
 def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
     (tmp_path / "other.yaml").write_text(f"name: other\n{text}")
     with pytest.raises(BadInput, match=says):
-        load_aircraft_and_declared_errors("beaver", str(tmp_path / "other.yaml"))
+        load_diagnosed("beaver", str(tmp_path / "other.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -368,17 +368,17 @@ def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
     bound = np.abs(off)
     expected = np.array(slopes)[None, :, None]
     innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
-    least, greatest = stepped._bounds_of_explaining_losses(innovation, bound[None, :, None], expected)
+    least, greatest = stepped._explaining_losses(innovation, bound[None, :, None], expected)
     assert least[0, 0] <= theta <= greatest[0, 0]
 
 
 def test_a_loss_that_explains_nothing_has_no_place():
     expected = np.array([1.0, 0.0, 0.0])[None, :, None]
     innovation = np.array([0.5, 0.0, 0.0])[None, :, None]
-    least, greatest = stepped._bounds_of_explaining_losses(innovation, np.full((1, 3, 1), 0.1), expected)
+    least, greatest = stepped._explaining_losses(innovation, np.full((1, 3, 1), 0.1), expected)
     assert least[0, 0] > greatest[0, 0]  # a loss cannot add to what is commanded
     unmoved = np.array([-0.5, 0.3, 0.0])[None, :, None]
-    least, greatest = stepped._bounds_of_explaining_losses(unmoved, np.full((1, 3, 1), 0.1), expected)
+    least, greatest = stepped._explaining_losses(unmoved, np.full((1, 3, 1), 0.1), expected)
     assert least[0, 0] > greatest[0, 0]  # nor move another axis
 
 
@@ -411,7 +411,7 @@ def test_a_stretch_has_fifty_even_samples_that_are_all_known():
 def test_what_is_at_a_limit_of_the_envelope_is_inside():
     airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
     signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
-    found = by_aircraft._undiagnosable_rows_by_reason(signals, PLANE, np.arange(6) == 5, [(1, 5)])
+    found = by_aircraft._doubtful_rows_of(signals, PLANE, np.arange(6) == 5, [(1, 5)])
     assert {says: true(mask) for says, mask in found.items()} == {
         "a number is missing": [5], "samples are not evenly spaced": [0],
         "airspeed is outside 20 to 50 m/s": [0, 3],
@@ -426,7 +426,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
         verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
     verdicts[5] = by_aircraft.Verdict(True)
     given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._rows_by_reason_after_unanticipated_start(
+    ((says, mask),) = by_aircraft._unexplained_starts(
         np.arange(10) * 0.5, [(1, 5), (5, 10)], given
     ).items()
     assert (says.partition(":")[0], true(mask)) == (
@@ -437,7 +437,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
 def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
     rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
     reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
-    found = by_aircraft._drop_empty_add_doubtful_alarm_reason([(0, 4), (4, 8)], rows, reasons)
+    found = by_aircraft._complete_reasons([(0, 4), (4, 8)], rows, reasons)
     says = "the alarm was raised where nothing can be said"
     assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
 
@@ -447,12 +447,12 @@ def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credib
     rows = SimpleNamespace(
         faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), effectiveness_low=low
     )
-    assert by_aircraft._excluded_loss_sentences(rows, ["right", "left"]) == [
+    assert by_aircraft._excluded_losses(rows, ["right", "left"]) == [
         "right: a loss of more than 20 % shows within a second in half of the flight.",
         "left: in half of the flight not even a complete loss would show within a second.",
     ]
     rows.credible = np.array([0, 0, 0, 1, 0])
-    assert by_aircraft._excluded_loss_sentences(rows, ["right", "left"]) == []
+    assert by_aircraft._excluded_losses(rows, ["right", "left"]) == []
 
 
 @pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [
@@ -470,39 +470,39 @@ def test_flow_and_commands_in_another_unit_are_refused(alpha, beta, density, com
     )
     commands = np.array([[0.0], [np.nan], [command], [0.0], [0.0], [0.0]])
     if says is None:
-        by_aircraft._check_units_plausible("log", [np.empty(0), signals, commands], PLANE)
+        by_aircraft._check_plausible("log", [np.empty(0), signals, commands], PLANE)
         return
     with pytest.raises(BadInput, match=f"^log: .*{says}"):
-        by_aircraft._check_units_plausible("log", [np.empty(0), signals, commands], PLANE)
+        by_aircraft._check_plausible("log", [np.empty(0), signals, commands], PLANE)
 
 
 def test_a_column_without_a_number_is_no_warning_of_numpy():
     """Without an angle nothing is said of its unit; a density of no number is none that is allowed."""
     signals = np.column_stack([np.full((4, 2), np.nan), np.full(4, 40.0), np.full(4, 0.5 * 1.2 * 40.0**2)])
-    by_aircraft._check_units_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
+    by_aircraft._check_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
     signals[:, 3] = np.nan
     with pytest.raises(BadInput, match=r"^log: .*a density of nan kg/m3"):
-        by_aircraft._check_units_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
+        by_aircraft._check_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
 
 
 def test_stretches_make_one_flight():
     gains = np.array([[0.5, 0.9], [0.6, 0.4]])
     said = ([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), gains[0] - 1.0, gains[0])
     one, other = (
-        stepped.ReplayedVerdicts(*said),
-        stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), gains[1] - 1.0, gains[1]),
+        stepped.Replayed(*said),
+        stepped.Replayed([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), gains[1] - 1.0, gains[1]),
     )
-    found = by_aircraft._join_stretch_verdicts(5, 2, [(1, 3), (4, 5)], [one, other])
+    found = by_aircraft._join_stretches(5, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
     assert (
-        found.single_fault_effectiveness_low[:, 1].tolist(),
-        found.single_fault_effectiveness_high[:, 0].tolist(),
+        found.alone_low[:, 1].tolist(),
+        found.alone_high[:, 0].tolist(),
     ) == (
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
-    assert found.relative_command_gains.tolist() == pytest.approx([-0.5, -0.6])
-    assert found.relative_command_gain_upper_bounds.tolist() == [0.5, 0.4]
+    assert found.command_gains.tolist() == pytest.approx([-0.5, -0.6])
+    assert found.command_gain_bounds.tolist() == [0.5, 0.4]
 
 
 PAIR = SimpleNamespace(
@@ -529,7 +529,7 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     commands = np.arange(18.0).reshape(6, 3)
     samples = SimpleNamespace(
         name="log", t_s=t_s, dt_s=0.1, rates=np.arange(18.0).reshape(6, 3) / 7.0, commands=commands,
-        mean_age_s_by_held_column={"roll": 0.3},
+        held_age_s={"roll": 0.3},
     )  # fmt: skip
     recording = RecordedFlight("log", logged)
     given, age_s = by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
@@ -553,7 +553,7 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     ([(-0.29, 0.9), (0.5, -0.29)], None),
 ])  # fmt: skip
 def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
-    gap_free_stretches = [SimpleNamespace(relative_command_gain_upper_bounds=np.array(of)) for of in gains]
+    gap_free_stretches = [SimpleNamespace(command_gain_bounds=np.array(of)) for of in gains]
     if says is None:
         by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
         return
@@ -570,7 +570,7 @@ def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
     faulty = np.array([0, 1, 1, 1, 1, 0])
     low = np.tile([0.9, 0.7], (6, 1))
     names = np.array(["", "unknown", "left", "right", "left", ""], dtype=object)
-    rows = stepped.DiagnosisRows(
+    rows = stepped.LogRows(
         100.0 + 0.25 * np.arange(6), faulty, names, np.ones((6, 2)), low, np.ones((6, 2)),
         faulty.astype(float),
     )  # fmt: skip
@@ -587,7 +587,7 @@ def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
         "notes": ["a remark", "alpha is held, 0.13 s old on average: errors declared have to cover it"],
     }  # fmt: skip
     assert {name: found[name] for name in expected} == expected
-    quiet = stepped.DiagnosisRows(**(vars(rows) | {"faulty": 0 * faulty}))
+    quiet = stepped.LogRows(**(vars(rows) | {"faulty": 0 * faulty}))
     none = by_aircraft._verdict_document(
         samples, quiet, SimpleNamespace(verdicts=[by_aircraft.Verdict()] * 6), diagnosed, {}
     )

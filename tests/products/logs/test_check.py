@@ -60,7 +60,7 @@ def test_a_strangers_log_is_told_and_gets_a_vehicle_file(tmp_path):
     vehicle = load_vehicle(out)
     assert (vehicle.time.column, vehicle.time.unit) == ("TimeUS", "us")
     assert vehicle.rates.p.unit == "deg/s"
-    assert vehicle.command_column_names == ["roll_cmd", "pitch_cmd"]
+    assert vehicle.command_columns == ["roll_cmd", "pitch_cmd"]
     again = json.loads(run("identify", "--check", path, "--vehicle", out, "--format", "json").stdout)
     assert again["logs"][0]["usable"]
     assert again["vehicle"] is None
@@ -447,10 +447,10 @@ def test_angles_and_rates_scaled_alike_are_found_by_the_pitch_angle():
     t_s = np.arange(200) * 0.05
     for factor, unit in ((180.0 / np.pi, "deg"), (18000.0 / np.pi, "cdeg")):
         pitch = Column(t_s, factor * 0.2 * np.sin(t_s))
-        says = physics.pitch_angle_unit_remark(pitch, "theta")
+        says = physics.pitch_remark(pitch, "theta")
         assert says is not None
         assert f"it is in {unit}, a factor of {1.0 / factor:.4g} fits" in says
-    assert physics.pitch_angle_unit_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None
+    assert physics.pitch_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None
 
 
 def held(value, n=60):
@@ -472,7 +472,7 @@ def test_the_unit_of_rates_is_told_by_the_first_name_or_the_largest_of_all(name,
     ([-10.1, 3.0], {"column": "u", "unit": "%"}), ([105.0], {"column": "u", "unit": "%"}), ([105.1], "u"),
 ])  # fmt: skip
 def test_commands_are_pulses_per_cent_or_shares(values, found):
-    assert check._vehicle_file_command_entry("u", np.array(values, dtype=float)) == found
+    assert check._pulse_entry("u", np.array(values, dtype=float)) == found
 
 
 def test_names_as_the_patterns_have_them():
@@ -480,35 +480,35 @@ def test_names_as_the_patterns_have_them():
         " Roll Rate [deg/s] ": "roll_rate_deg_s", "gyro_rad[0]": "gyro_rad[0]", "Time (ms)": "time_ms",
         "a / b": "a_b",
     }  # fmt: skip
-    assert {name: check._snake_case_name(name) for name in spelled} == spelled
+    assert {name: check._snake_case(name) for name in spelled} == spelled
     plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
-    assert {name: check._as_vehicle_or_surface_name(name) for name in plain} == plain
+    assert {name: check._plain_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
-    assert check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], rates) == "GyrX"
+    assert check._shortest_match(check._NAME_PATTERNS["p"], rates) == "GyrX"
     assert (
-        check._shortest_matching_column_name(
-            check._COLUMN_NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"]
+        check._shortest_match(
+            check._NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"]
         )
         == "agyro_x"
     )
     assert (
-        check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"])
+        check._shortest_match(check._NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"])
         == "GyrX"
     )
     assert (
-        check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"])
+        check._shortest_match(check._NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"])
         == "gyro_x"
     )
-    assert check._shortest_matching_column_name(check._COLUMN_NAME_PATTERNS["r"], rates) is None
+    assert check._shortest_match(check._NAME_PATTERNS["r"], rates) is None
     wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
-    assert check._names_of_columns_to_read(wide) == ["p", *(f"servo{k}" for k in range(59))]
+    assert check._likely_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]
 
 
 @pytest.mark.parametrize(("correlation", "says"), [
     (0.7, "tell nothing of one another"), (0.71, "agree"), (-0.71, "agree"), (-0.7, "tell nothing"),
 ])  # fmt: skip
 def test_rate_and_angle_agree_from_seven_tenths_on(correlation, says):
-    said = check._angle_rate_fit_text(physics.AngleRateFit(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
+    said = check._fit_text(physics.AngleFit(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
     told = f"the change of roll is 1.250 times the integral of p (correlation {correlation:.2f}): they {says}"
     assert said.startswith(told)
 
@@ -526,9 +526,9 @@ def test_time_is_the_column_whose_steps_fit_a_log(tmp_path, text, found, lines):
     path.write_text(text)
     if found is None:
         with pytest.raises(BadInput, match=r"no column of time, allowed: a table with t_s in seconds"):
-            check._require_time_column_and_unit(path, said)
+            check._find_time(path, said)
         return
-    assert (check._require_time_column_and_unit(path, said), said) == (found, lines)
+    assert (check._find_time(path, said), said) == (found, lines)
 
 
 @pytest.mark.parametrize(("down", "acceleration"), [

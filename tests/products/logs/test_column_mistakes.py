@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.column_mistakes import logs_with_one_mistake_corrected
+from beaver_ftc_logs.column_mistakes import corrected_logs
 from products.logs import small
 from telling import apart
 
@@ -17,7 +17,7 @@ def log():
     vehicle = small.vehicle(small.TAIL | NAMED)
     samples = small.flight(small.model(small.TAIL), n=4)
     rates = np.array([[1.0, 2.0, 3.0]]) * [[1.0], [1.1], [1.3], [1.7]]
-    assert vehicle.signal_regressor_names == [
+    assert vehicle.regressor_columns == [
         "alpha",
         "beta",
         *(f"{n} by airspeed" for n in (*small.RATES.values(), "alpha", "beta")),
@@ -28,17 +28,17 @@ def log():
 
 
 def column(samples, vehicle, name):
-    names = [*small.RATES.values(), *vehicle.signal_regressor_names]
+    names = [*small.RATES.values(), *vehicle.regressor_columns]
     return np.column_stack([samples.rates, samples.signals])[:, names.index(name)]
 
 
 def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
     vehicle, samples = log
-    found = {one.correction_text: one for one in logs_with_one_mistake_corrected(samples, vehicle)}
+    found = {one.correction_text: one for one in corrected_logs(samples, vehicle)}
     for name in ("q_rad_s", "beta"):
         scaled = found[f"`scale: 57.3` on {name}"]
         assert scaled.log_jacobian == pytest.approx(np.log(57.29578) if name == "q_rad_s" else 0.0)
-        for other in (*small.RATES.values(), *vehicle.signal_regressor_names):
+        for other in (*small.RATES.values(), *vehicle.regressor_columns):
             factor = 57.29577951 if other.removesuffix(" by airspeed") == name else 1.0
             np.testing.assert_allclose(
                 column(scaled.samples, vehicle, other), factor * column(samples, vehicle, other)
@@ -47,13 +47,13 @@ def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
 
 def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
     vehicle, samples = log
-    found = {one.correction_text: one.samples for one in logs_with_one_mistake_corrected(samples, vehicle)}
+    found = {one.correction_text: one.samples for one in corrected_logs(samples, vehicle)}
     rates, turned = (
         found["p_rad_s and r_rad_s exchanged"],
         found["the commands of left_aileron and right_aileron exchanged"],
     )
     pairs = {"p_rad_s": "r_rad_s", "r_rad_s": "p_rad_s"}
-    for name in (*small.RATES.values(), *vehicle.signal_regressor_names):
+    for name in (*small.RATES.values(), *vehicle.regressor_columns):
         stem = name.removesuffix(" by airspeed")
         source = name.replace(stem, pairs.get(stem, stem))
         np.testing.assert_array_equal(column(rates, vehicle, name), column(samples, vehicle, source))
@@ -64,7 +64,7 @@ def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
 def test_commands_of_unknown_effect_are_exchanged_with_none(log):
     vehicle, samples = log
     every, fewer = (
-        [one.correction_text for one in logs_with_one_mistake_corrected(samples, vehicle, unknown)]
+        [one.correction_text for one in corrected_logs(samples, vehicle, unknown)]
         for unknown in ((), {"elevator"})
     )
     assert [text for text in every if text not in fewer] == [
@@ -77,9 +77,9 @@ def test_commands_of_unknown_effect_are_exchanged_with_none(log):
 @pytest.mark.parametrize("confirmed", [(), ("q_rad_s",), ("p_rad_s", "r_rad_s")])
 def test_a_rate_that_the_attitude_confirms_is_what_it_is(log, confirmed):
     vehicle, samples = log
-    of_angles = replace(samples, rates_confirmed_by_attitude=frozenset(confirmed))
+    of_angles = replace(samples, confirmed_rates=frozenset(confirmed))
     every, fewer = (
-        [one.correction_text for one in logs_with_one_mistake_corrected(flight, vehicle)]
+        [one.correction_text for one in corrected_logs(flight, vehicle)]
         for flight in (samples, of_angles)
     )
     assert fewer == [text for text in every if not any(name in text for name in confirmed)]

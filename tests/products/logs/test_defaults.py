@@ -7,11 +7,11 @@ import pytest
 import small
 
 from beaver_ftc_logs.diagnose import (
-    _add_unknown_effect_surfaces_widening_bounds,
-    _would_name_all_named_before,
+    _add_unknown_surfaces,
+    _names_all_again,
 )
-from beaver_ftc_logs.filtering import recent_noise_variance_scale
-from beaver_ftc_logs.identification import with_assumed_law_and_air
+from beaver_ftc_logs.filtering import recent_scale
+from beaver_ftc_logs.identification import assume_law_and_air
 from beaver_ftc_logs.model import FittedRanges
 
 BARE = {key: of for key, of in small.WING.items() if key != "labels"}
@@ -29,7 +29,7 @@ RNG = np.random.default_rng(5005)
 )
 def test_laws_and_air_are_taken_to_be_others_unless_labels_or_a_key_say(of, keys, taken):
     model = small.model(of)
-    vehicle, lines = with_assumed_law_and_air([small.flight(model, n=60)], small.vehicle(of, **keys))
+    vehicle, lines = assume_law_and_air([small.flight(model, n=60)], small.vehicle(of, **keys))
     assert (vehicle.other_laws, vehicle.moving_air) == taken
     assert [line.partition(":")[0] for line in lines[:2]] == ["other_laws", "moving_air"]
     assert sum("as the vehicle file says" in line for line in lines) == len(keys)
@@ -69,7 +69,7 @@ def test_what_is_assumed_is_told_with_its_reason(labelled, told, airspeeds):
     keys = {} if told is None else {"other_laws": told, "moving_air": told}
     keys |= {"reference_airspeed_mps": 20.0} if airspeeds == "with a reference" else {}
     given = small.vehicle(small.WING, **keys)
-    vehicle, lines = with_assumed_law_and_air([bare, other], given)
+    vehicle, lines = assume_law_and_air([bare, other], given)
     taken = (not labelled) if told is None else told
     assert vehicle == given.model_copy(update={"other_laws": taken, "moving_air": taken})
     last = {
@@ -94,9 +94,9 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     held = np.repeat(RNG.standard_normal((6000 // span, 3)), span, axis=0)
     covariance = np.diag([1.0, 4.0, 9.0])
     residual = 3.0 * held * np.sqrt(np.diag(covariance))
-    scale = recent_noise_variance_scale(residual, np.ones(6000, bool), covariance, 100.0)
+    scale = recent_scale(residual, np.ones(6000, bool), covariance, 100.0)
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
-    cut = recent_noise_variance_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
+    cut = recent_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
     assert np.allclose(cut, scale[:500])
 
 
@@ -105,10 +105,10 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_unknown_effect_surfaces_widening_bounds(still, model, rows).isolated_surfaces[20:]) == {
+    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {
         "left"
     }
-    found = _add_unknown_effect_surfaces_widening_bounds(flown, model, rows)
+    found = _add_unknown_surfaces(flown, model, rows)
     assert set(found.isolated_surfaces[20:]) == {"right+left"}
     assert (found.effectiveness_high[20:] == 1.0).all()
     assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])
@@ -119,5 +119,5 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
 )
 def test_a_surface_that_was_excluded_stays_so(now, said, wide):
-    assert _would_name_all_named_before(now, said, small.model(settings={"one_group": True})) is wide
-    assert not _would_name_all_named_before(now, said, small.model())
+    assert _names_all_again(now, said, small.model(settings={"one_group": True})) is wide
+    assert not _names_all_again(now, said, small.model())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import build_hypothesis_bank
+from beaver_ftc_logs.bank import build_bank
 from kept import in_short
 from products.logs import small
 
@@ -38,24 +38,24 @@ def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
     """What was 600 s ago counts 1/e."""
     rng = np.random.default_rng(1)
     evidence = [0.1 * rng.standard_normal(2000) for _ in range(3)]
-    found = filtering._model_probabilities_with_forgetting(evidence, 2.0)
+    found = filtering._model_weights(evidence, 2.0)
     for k in (0, 10, 1999):
         age_s = 0.5 * np.arange(k, -1, -1)
         total = np.array([(np.exp(-age_s / 600.0) * one[: k + 1]).sum() for one in evidence])
         np.testing.assert_allclose(found[:, k], np.exp(total) / np.exp(total).sum(), rtol=1e-9)
-    huge = filtering._model_probabilities_with_forgetting([1000.0 * np.ones(3), np.ones(3)], 2.0)
+    huge = filtering._model_weights([1000.0 * np.ones(3), np.ones(3)], 2.0)
     np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)
 
 
 def test_what_all_delays_say_together(changed):
     """The mean of what each alone does, by its weight, sample by sample."""
-    samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), build_hypothesis_bank(MODEL)
-    together = filtering.hypothesis_state_and_noise_posterior(samples, MODEL, bank)
+    samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), build_bank(MODEL)
+    together = filtering.bank_posterior(samples, MODEL, bank)
     runs = [
-        filtering._run_bank_on_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
+        filtering._run_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
         for delay_s in DELAYS_S
     ]
-    weights = filtering._model_probabilities_with_forgetting([run[3] for run in runs], 10.0)
+    weights = filtering._model_weights([run[3] for run in runs], 10.0)
     for part, found in enumerate(together):
         each = np.stack([run[part] for run in runs])
         weight = weights.reshape(*weights.shape, *[1] * (each.ndim - 2))
@@ -70,7 +70,5 @@ def test_what_cannot_be_predicted_changes_no_number_to_none():
     samples = small.flight(MODEL, 60)
     rates = samples.rates.copy()
     rates[30] = np.nan
-    found = filtering.hypothesis_state_and_noise_posterior(
-        replace(samples, rates=rates), MODEL, build_hypothesis_bank(MODEL)
-    )
+    found = filtering.bank_posterior(replace(samples, rates=rates), MODEL, build_bank(MODEL))
     assert all(np.isfinite(part).all() for part in found)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
+from beaver_ftc_logs.diagnose import LogRows, diagnose
 from beaver_ftc_logs.findings import verdict_document
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.scoring import score_against_labels, score_diagnosis
@@ -92,7 +92,7 @@ def test_a_score_by_one_label_on_the_stamps_of_a_faster_log(flown, rows):
     labels[:, 0] = np.nan
     twice = {name: np.repeat(getattr(rows, name), 2, axis=0) for name in rows.__dataclass_fields__}
     twice["t_s"] = twice["t_s"] + np.tile([0.0, 0.4 * flown.dt_s], len(rows.t_s))
-    found = score_diagnosis(replace(flown, labels=labels), DiagnosisRows(**twice), [["right"], ["left"]])
+    found = score_diagnosis(replace(flown, labels=labels), LogRows(**twice), [["right"], ["left"]])
     left = {
         name: getattr(rows, name)[:, 1:]
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
@@ -123,9 +123,9 @@ def test_a_verdict_says_what_a_still_flight_cannot_show(wing, wing_folder, wing_
 
 
 def test_events_are_as_few_as_the_faults(rows, wing):
-    from beaver_ftc_logs.findings import fault_events, lasting_or_else_all_events
+    from beaver_ftc_logs.findings import events_to_show, fault_events
 
-    events = lasting_or_else_all_events(fault_events(rows, list(wing.surfaces)))
+    events = events_to_show(fault_events(rows, list(wing.surfaces)))
     named = [event["named"] for event in events if event["to_s"] - event["from_s"] > 20]
     assert named == ["left", "right"]
     assert len(events) <= 5

@@ -12,7 +12,7 @@ from beaver_ftc_logs import energy
 from beaver_ftc_logs.readers import alfa
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import resample
-from beaver_ftc_logs.scoring import _is_most_frequent_name_right
+from beaver_ftc_logs.scoring import _is_main_name_right
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 T_S = np.arange(0.0, 20.0, 0.1)
@@ -36,23 +36,21 @@ WING = {
     ],
 )
 def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected):
-    climb = energy.compute_energy_height_rate_mps(T_S, altitude, airspeed, ONE)
+    climb = energy.energy_climb_mps(T_S, altitude, airspeed, ONE)
     assert np.isnan(climb[T_S < 4.9]).all()
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
 def test_a_gap_ends_what_is_known():
     run = (T_S >= 10.0).astype(int)
-    climb = energy.compute_energy_height_rate_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
+    climb = energy.energy_climb_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
     assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
     np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
 
 
 def named_of(faulty, falls, since_s=0.0):
     names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.withdraw_surfaces_where_engine_may_have_failed(
-        T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s
-    )
+    return energy.withdraw_surfaces(T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s)
 
 
 def test_an_alarm_while_energy_falls_names_no_surface():
@@ -77,14 +75,10 @@ def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_
     falls = (T_S >= 8.0) & (T_S < 10.0)
     climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
     names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S - 6.0)
+    named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S - 6.0)
     assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
     assert set(named[T_S > 16.05]) == {"left"}
-    assert set(
-        energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S)[
-            T_S > 17.05
-        ]
-    ) == {"left"}
+    assert set(energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]) == {"left"}
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
@@ -94,10 +88,8 @@ def test_a_name_uses_nothing_later(rows, data):
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
     cut = data.draw(st.integers(1, len(rows)))
     since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.withdraw_surfaces_where_engine_may_have_failed(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.withdraw_surfaces_where_engine_may_have_failed(
-        t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut]
-    )
+    whole = energy.withdraw_surfaces(t_s, faulty, names, climb, -1.0, since_s)
+    short = energy.withdraw_surfaces(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut])
     assert whole[:cut].tolist() == short.tolist()
     assert all((name == "") == (flag == 0) for name, flag in zip(whole, faulty, strict=True))
 
@@ -146,9 +138,9 @@ def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
 
 def test_an_engine_is_no_surface_that_was_named():
     groups = [["left"], ["right"]]
-    assert _is_most_frequent_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
-    assert _is_most_frequent_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
-    assert _is_most_frequent_name_right({"engine": 1.0}, ["engine"], groups) is None
+    assert _is_main_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
+    assert _is_main_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
+    assert _is_main_name_right({"engine": 1.0}, ["engine"], groups) is None
 
 
 def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_nothing_rises():
@@ -156,7 +148,7 @@ def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_
     faulty = ((T_S >= 5.0) & (T_S < 18.0)).astype(int)
     climb = np.where((T_S >= 3.0) & (T_S < 9.0), -2.0, np.where(T_S < 3.0, 0.5, -0.5))
     names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S - 2.0)
+    named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S - 2.0)
     assert set(named[(T_S > 4.95) & (T_S < 7.95)]) == {"unknown"}
     assert set(named[(T_S > 8.05) & (T_S < 17.95)]) == {"engine"}
 
@@ -165,6 +157,6 @@ def test_energy_that_neither_falls_as_without_power_nor_rises_tells_of_no_engine
     faulty = (T_S >= 5.0).astype(int)
     names = np.where(faulty == 1, "left", "").astype(object)
     level = np.full(len(T_S), -0.5)
-    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, level, -1.0, T_S)
+    named = energy.withdraw_surfaces(T_S, faulty, names, level, -1.0, T_S)
     assert set(named[(T_S > 4.95) & (T_S < 9.95)]) == {"unknown"}
     assert set(named[T_S > 10.05]) == {"left"}

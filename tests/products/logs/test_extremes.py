@@ -5,9 +5,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes, fitting
-from beaver_ftc_logs.bank import build_hypothesis_bank
-from beaver_ftc_logs.filtering import any_fault_log_odds_gains, page_cusum
-from beaver_ftc_logs.vehicle import with_false_alarm_rate
+from beaver_ftc_logs.bank import build_bank
+from beaver_ftc_logs.filtering import fault_evidence, page_cusum
+from beaver_ftc_logs.vehicle import with_alarm_rate
 from products.logs import small
 
 PER_HOUR = 300.0
@@ -31,8 +31,8 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
     rng, held, rates = np.random.default_rng(7), 0, []
     for _ in range(20):
         found = extremes.fit_peak_tail(parts_of(quantile, rng, hours))
-        threshold = extremes.threshold_for_false_alarms(found, asked)
-        rate = extremes.expected_false_alarms_per_hour(found, threshold)
+        threshold = extremes.threshold_for_rate(found, asked)
+        rate = extremes.false_alarm_rate(found, threshold)
         true = PER_HOUR * survival(threshold)
         held += rate.low <= true <= rate.high
         rates.append(true)
@@ -43,7 +43,7 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
 
 def test_more_flight_gives_the_threshold_of_the_closed_form():
     found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 100.0))
-    assert extremes.threshold_for_false_alarms(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
+    assert extremes.threshold_for_rate(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
 
 
 def test_flights_that_differ_count_for_less():
@@ -54,7 +54,7 @@ def test_flights_that_differ_count_for_less():
     calm, wild = extremes.fit_peak_tail(alike), extremes.fit_peak_tail(apart)
     assert calm.overdispersion < 2.0 < wild.overdispersion
     rates = [
-        extremes.expected_false_alarms_per_hour(wild.model_copy(update={"overdispersion": d}), 20.0)
+        extremes.false_alarm_rate(wild.model_copy(update={"overdispersion": d}), 20.0)
         for d in (1.0, wild.overdispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
@@ -77,7 +77,7 @@ def test_peaks_are_of_stretches_above_zero():
 def test_the_evidence_is_what_changes_alone_do_not_bring():
     """Where the probability of a fault is what the changes of a sample make of the last, there is none; where
     its odds are tenfold that, log 10."""
-    bank = build_hypothesis_bank(small.model(small.TAIL))
+    bank = build_bank(small.model(small.TAIL))
     first = float(bank.prior_probability[bank.is_fault_hypothesis].sum())
     change = bank.change_probability_per_sample * float(
         bank.transition_share[bank.is_fault_hypothesis].sum() / bank.transition_share.sum()
@@ -92,9 +92,7 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
     place = int(np.flatnonzero(bank.is_fault_hypothesis)[0])
     posterior[:, place] = first, second, odds / (1.0 + odds)
     posterior[:, 0] = 1.0 - posterior[:, place]
-    np.testing.assert_allclose(
-        any_fault_log_odds_gains(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12
-    )
+    np.testing.assert_allclose(fault_evidence(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12)
 
 
 def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
@@ -105,12 +103,10 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     walk = np.cumsum(rng.standard_normal((n, 3)), axis=0)
     series = np.column_stack([white[:, 0], coloured[:, 1], white[:, 2] + 0.05 * walk[:, 2]])
     series = series * np.sqrt(np.diag(np.array(model.residual_covariance)))
-    monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
-    monkeypatch.setattr(
-        fitting, "rows_whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
-    )
-    usable_flights = fitting.flights_with_usable_rows([small.flight(model, 60)])
-    found = fitting._estimate_trim_walk_sd_per_sample(usable_flights, model)
+    monkeypatch.setattr(fitting, "refit", lambda fitted, like: like)
+    monkeypatch.setattr(fitting, "whitened_residual", lambda like, kept: (np.arange(n), series, None))
+    usable_flights = fitting.fit_parts([small.flight(model, 60)])
+    found = fitting._estimate_trim_walk(usable_flights, model)
     assert max(found[:2]) < 0.01
     assert found[2] == pytest.approx(0.05, rel=0.15)
 
@@ -118,7 +114,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
 @pytest.mark.parametrize("rate", [0.0, -1.0, 1001.0, float("nan")])
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(BadInput, match="allowed: more than 0, up to 1000 an hour"):
-        with_false_alarm_rate(small.vehicle(), rate)
+        with_alarm_rate(small.vehicle(), rate)
 
 
 @pytest.mark.parametrize("threshold", [2.0, 3.0])
@@ -134,30 +130,22 @@ def test_a_true_likelihood_ratio_alarms_once_in_exp_h_samples_or_less_often(thre
     assert waited.mean() > np.exp(threshold)
     rate_hz = 20.0
     per_hour = 3600.0 * rate_hz / np.exp(threshold)
-    assert extremes.threshold_by_lorden_bound(rate_hz, per_hour) == pytest.approx(threshold)
-    assert extremes.threshold_by_lorden_bound(rate_hz, 1e9) == 0.0
+    assert extremes.lorden_threshold(rate_hz, per_hour) == pytest.approx(threshold)
+    assert extremes.lorden_threshold(rate_hz, 1e9) == 0.0
 
 
 def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
     tail = extremes.PeakTail(level=0.1, excess=[0.1] * 20, minutes=30.0)
     same = small.model(rate_hz=20.0)
     other = same.model_copy(update={"vehicle": same.vehicle.model_copy(update={"other_laws": True})})
-    assert (
-        fitting._choose_alarm_threshold(tail, 1.0, same)
-        == extremes.threshold_for_false_alarms(tail, 1.0)
-        < 3.0
-    )
-    assert fitting._choose_alarm_threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
+    assert fitting._choose_threshold(tail, 1.0, same) == extremes.threshold_for_rate(tail, 1.0) < 3.0
+    assert fitting._choose_threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
     moving = other.model_copy(update={"vehicle": other.vehicle.model_copy(update={"moving_air": True})})
-    assert fitting._choose_alarm_threshold(tail, 1.0, moving) == pytest.approx(np.log(72_000.0))
+    assert fitting._choose_threshold(tail, 1.0, moving) == pytest.approx(np.log(72_000.0))
     for without_tail in (moving, same):
-        assert fitting._choose_alarm_threshold(None, 2.0, without_tail) == pytest.approx(np.log(36_000.0))
+        assert fitting._choose_threshold(None, 2.0, without_tail) == pytest.approx(np.log(36_000.0))
     high = tail.model_copy(update={"tail_start_level": 50.0})
-    assert (
-        fitting._choose_alarm_threshold(high, 1.0, other)
-        == extremes.threshold_for_false_alarms(high, 1.0)
-        > 50.0
-    )
+    assert fitting._choose_threshold(high, 1.0, other) == extremes.threshold_for_rate(high, 1.0) > 50.0
 
 
 @pytest.mark.parametrize("n", [100, 400])
@@ -166,7 +154,7 @@ def test_the_interval_holds_nine_tenths_of_a_posterior_that_is_known(n):
     scale [Coles2001, section 4.3], a logarithm of the rate of variance (1 + 1/4 + 2 - 1) / n."""
     excess = TAILS["exponential"][0]((np.arange(n) + 0.5) / n)
     tail = extremes.PeakTail(level=5.0, excess=excess.tolist(), minutes=30.0)
-    found = extremes.expected_false_alarms_per_hour(tail, 7.0)
+    found = extremes.false_alarm_rate(tail, 7.0)
     assert np.log(found.high / found.low) == pytest.approx(2.0 * 1.645 * 1.5 / np.sqrt(n), rel=0.05)
     assert np.sqrt(found.high * found.low) == pytest.approx(2.0 * n / np.e, rel=0.02)
 
@@ -217,8 +205,8 @@ def test_the_sums_of_flights_that_differ_are_as_many_times_wider():
     """Hours of 1 and 3, excess of 9 and 3 by four peaks of each: 3 and 9 expected, of peaks of 1.5."""
     parts = [(np.array([1.0, 2.0, 2.5, 3.5]), 1.0), (np.array([0.25, 0.5, 1.0, 1.25]), 3.0)]
     expected = (9.0 - 3.0) ** 2 / (2.0 * 3.0 * 1.5) + (3.0 - 9.0) ** 2 / (2.0 * 9.0 * 1.5)
-    assert extremes._excess_overdispersion(parts) == pytest.approx(expected)
-    assert extremes._excess_overdispersion([(np.empty(0), 1.0), (np.zeros(2), 3.0)]) == 1.0
+    assert extremes._overdispersion(parts) == pytest.approx(expected)
+    assert extremes._overdispersion([(np.empty(0), 1.0), (np.zeros(2), 3.0)]) == 1.0
 
 
 @pytest.mark.parametrize(("hours", "permitted"), [(0.05, 0), (0.06, 1), (0.3, 1), (0.4, 2), (0.8, 2)])
@@ -229,21 +217,21 @@ def test_no_more_held_out_peaks_raise_an_alarm_than_the_rate_permits(hours, perm
     """
     excess = [0.01] * 40 + [116.0, 158.0, 132.0]
     tail = extremes.PeakTail(level=0.05, excess=excess, minutes=60.0 * hours, dispersion=15.0)
-    expected = 0.05 + extremes._excess_of_expected_rate(tail, 1.0)
+    expected = 0.05 + extremes._excess_for_rate(tail, 1.0)
     highest = 0.05 + [158.0, 132.0, 116.0][permitted]
     assert expected < highest
-    assert extremes.threshold_for_false_alarms(tail, 1.0) == highest
+    assert extremes.threshold_for_rate(tail, 1.0) == highest
 
 
 def test_where_hardly_any_peak_is_as_high_as_the_level_it_is_the_threshold():
     """Ten peaks in a hundred hours are fewer than one an hour already."""
     tail = extremes.PeakTail(level=2.5, excess=[0.1 * k for k in range(1, 11)], minutes=6000.0)
-    assert extremes.threshold_for_false_alarms(tail, 1.0) == 2.5
-    low, high = (2.5 + extremes._excess_of_expected_rate(tail, rate) for rate in (0.05, 0.01))
+    assert extremes.threshold_for_rate(tail, 1.0) == 2.5
+    low, high = (2.5 + extremes._excess_for_rate(tail, rate) for rate in (0.05, 0.01))
     assert 2.5 < low < high
-    assert extremes.threshold_for_false_alarms(tail, 0.05) == low
+    assert extremes.threshold_for_rate(tail, 0.05) == low
     for rate, threshold in ((0.05, low), (0.01, high)):
-        assert extremes.expected_false_alarms_per_hour(tail, threshold).value == pytest.approx(rate, rel=1e-6)
-    at_level = extremes.expected_false_alarms_per_hour(tail, 2.5)
+        assert extremes.false_alarm_rate(tail, threshold).value == pytest.approx(rate, rel=1e-6)
+    at_level = extremes.false_alarm_rate(tail, 2.5)
     assert at_level.value == pytest.approx(10.5 / 100.0, rel=0.01)  # a gamma's mean of 10 and a half
     assert (at_level.low, at_level.high) == (pytest.approx(0.058, abs=0.01), pytest.approx(0.163, abs=0.01))

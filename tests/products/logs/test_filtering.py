@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import ResidualNoise, build_hypothesis_bank, build_trim_and_gain_state_model
+from beaver_ftc_logs.bank import ResidualNoise, build_bank, build_states
 from beaver_ftc_logs.filtering import (
-    _model_probabilities_with_forgetting,
-    _update_gaussian,
+    _model_weights,
+    _update,
     _with_command_delay,
-    hypothesis_state_and_noise_posterior,
+    bank_posterior,
 )
 from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.samples import load_flights_for_fit
@@ -28,14 +28,13 @@ def healthy(wing, wing_folder):
 
 def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
-    bank = build_hypothesis_bank(model)
-    from beaver_ftc_logs.filtering import _run_bank_on_flight
+    bank = build_bank(model)
+    from beaver_ftc_logs.filtering import _run_flight
 
     evidence = [
-        _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3]
-        for d in model.settings.command_delay_offset_candidates_s
+        _run_flight(_with_command_delay(samples, d), model, bank)[3] for d in model.settings.command_delays_s
     ]
-    return _model_probabilities_with_forgetting(evidence, model.rate_hz)
+    return _model_weights(evidence, model.rate_hz)
 
 
 @pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
@@ -52,9 +51,9 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
     k = 700
     commands = healthy.commands.copy()
     commands[k + 1 :] += 0.3
-    bank = build_hypothesis_bank(wing_model)
-    one = hypothesis_state_and_noise_posterior(healthy, wing_model, bank)[0]
-    other = hypothesis_state_and_noise_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
+    bank = build_bank(wing_model)
+    one = bank_posterior(healthy, wing_model, bank)[0]
+    other = bank_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
     assert np.array_equal(one[: k + 1], other[: k + 1])
     assert not np.array_equal(one[k + 2], other[k + 2])
 
@@ -62,24 +61,24 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
 def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
     settings = wing_model.settings
-    _, _, response, noise = wing_model.intercept_past_response_noise()
+    _, _, response, noise = wing_model.as_arrays()
     rng = np.random.default_rng(4)
     shifts = settings.trim_command_shift_sd * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(
-        build_trim_and_gain_state_model(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
+        build_states(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
     )
 
 
 def test_gains_return_in_their_time(wing_model):
     """After a long time the spread of each gain is that of the settings, whatever it was."""
-    own = build_trim_and_gain_state_model(wing_model)
+    own = build_states(wing_model)
     variance = np.zeros(len(own.initial_mean))
     for _ in range(200_000):
         variance = own.deviation_retention**2 * variance + own.random_walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
-    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.group_gain_offset_sd, rel=1e-3)
+    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_spread, rel=1e-3)
 
 
 def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
@@ -101,7 +100,7 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_walk_sd_per_sample=walk))
+    own = build_states(with_settings(wing_model, trim_step_sd=walk))
     noise_sd = np.sqrt(np.diag(np.array(wing_model.residual_covariance)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
     np.testing.assert_allclose(np.sqrt(900 * own.random_walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
@@ -111,7 +110,7 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     """A pitching moment that grows: where the settings let the trim wander it is found there."""
     sd, past = (
         np.sqrt(np.diag(np.array(wing_model.residual_covariance)))[1],
-        np.array(wing_model.lagged_rate_and_signal_coefficients),
+        np.array(wing_model.past_coefficients),
     )
     moment = np.clip((healthy.t_s - 60.0) / 100.0, 0.0, 1.0) * 0.8 * sd
     answer = np.zeros((len(moment) + wing_model.n_rate_lags, 3))  # of the rates, by the model's own past
@@ -123,13 +122,12 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     for walk in (1e-6, 2e-2):
         model = with_settings(
             wing_model,
-            trim_walk_sd_per_sample=[walk] * 3,
-            max_trim_deviation_in_sd=40.0,
-            command_delay_offset_candidates_s=[0.0],
+            trim_step_sd=[walk] * 3,
+            max_trim_sd=40.0,
+            command_delays_s=[0.0],
         )
         one, other = (
-            hypothesis_state_and_noise_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
-            for flight in (drifting, healthy)
+            bank_posterior(flight, model, build_bank(model))[1][-1, 1] for flight in (drifting, healthy)
         )
         found[walk] = one - other
     assert found[2e-2] == pytest.approx(moment[-1], rel=0.15)
@@ -143,9 +141,9 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     rng = np.random.default_rng(8)
     rates = healthy.rates.copy()
     rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
-    model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delay_offset_candidates_s=[0.0])
-    bank = build_hypothesis_bank(model)
-    posterior, _, scale = hypothesis_state_and_noise_posterior(replace(healthy, rates=rates), model, bank)
+    model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delays_s=[0.0])
+    bank = build_bank(model)
+    posterior, _, scale = bank_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
     answering = 1.0 - posterior[begin + 1 : end + 1, bank.no_response_hypothesis_index].mean()
     grown = np.log(scale[end] / scale[begin])
@@ -160,7 +158,7 @@ def test_a_covariance_stays_symmetric_to_the_bit():
     p = root @ root.T + 0.1 * np.eye(5)
     expected = np.linalg.inv(np.linalg.inv(p) + seen @ np.linalg.inv(noise) @ seen.T)
     normal = ResidualNoise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf, 1.0)
-    _update_gaussian(np.zeros(5), p, np.zeros(3), seen, noise, normal)
+    _update(np.zeros(5), p, np.zeros(3), seen, noise, normal)
     assert (p == p.T).all()
     assert p == pytest.approx(expected, rel=1e-9)
 
@@ -175,14 +173,12 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
     noise = np.array([[0.0025, 0.0003, -0.0007], [0.0003, 0.0004, 0.0001], [-0.0007, 0.0001, 0.0081]])
     constant, known = np.array([0.3, -0.2, 0.1]), np.arange(40) != 7
     apart(noise=noise[np.triu_indices(3)], constant=constant, average=average)
-    settings = SimpleNamespace(
-        t_degrees_of_freedom=7.0, effective_sample_share=0.4, quick_response_error_share=0.6
-    )
+    settings = SimpleNamespace(t_degrees_of_freedom=7.0, effective_sample_share=0.4, quick_error_share=0.6)
     model = SimpleNamespace(
         settings=settings,
         whitened_intercept=lambda average: sum(average) * constant,
-        usual_quick_response_power=lambda average: usual,
-        covariance_of_noise_model=lambda average: sum(average) ** 2 * noise,
+        usual_quick_power=lambda average: usual,
+        covariance_of_noise=lambda average: sum(average) ** 2 * noise,
         rate_hz=8.0,
     )
     found, answers_by_hand = [], rng.normal(0.0, 0.05, (40, 2, 3))
@@ -190,11 +186,9 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         answers = size * answers_by_hand
         unexplained = size * (white + constant) + answers.sum(axis=1)
         answers = np.where(known[:, None, None], answers, np.nan)
-        monkeypatch.setattr(
-            filtering, "whitened_rates_and_responses", lambda *_, made=(known, unexplained, answers): made
-        )
+        monkeypatch.setattr(filtering, "whitened_rates", lambda *_, made=(known, unexplained, answers): made)
         colour = SimpleNamespace(ma_coefficients=of, residual_covariance=(size**2 * noise).tolist())
-        found.append(filtering._noise_model_log_likelihood(None, model, colour))
+        found.append(filtering._noise_likelihood(None, model, colour))
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
     square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)
     answers_by_hand[7] = 0.0  # unknown
@@ -214,10 +208,8 @@ def test_evidence_is_the_log_of_a_likelihood_ratio():
     posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
     before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
-    assert filtering.any_fault_log_odds_gains(posterior, bank) == pytest.approx(expected)
-    assert np.isfinite(
-        filtering.any_fault_log_odds_gains(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
-    ).all()
+    assert filtering.fault_evidence(posterior, bank) == pytest.approx(expected)
+    assert np.isfinite(filtering.fault_evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()
 
 
 def test_the_scale_of_the_last_two_seconds_is_of_samples_or_of_their_sums():
@@ -238,7 +230,7 @@ def test_the_scale_of_the_last_two_seconds_is_of_samples_or_of_their_sums():
             found.append(total @ inverse @ total / (3.0 * max(known[rows].sum(), 1)))
     means = [[np.mean(of[max(k - 39, 0) : k + 1]) for k in range(90)] for of in squares.values()]
     assert {int(place) for place in np.argmax(means, axis=0)} == {0, 1}
-    found = filtering.recent_noise_variance_scale(residual, known, noise, 20.0)
+    found = filtering.recent_scale(residual, known, noise, 20.0)
     np.testing.assert_allclose(found, np.max(means, axis=0), rtol=1e-9)
 
 
@@ -257,15 +249,15 @@ def test_under_other_laws_the_noise_is_as_wide_as_the_last_seconds_show(monkeypa
     """By what the flight leaves if it is healthy, less the constant; else by the filter's own scale."""
     model = small.model(small.WING | {"other_laws": laws})
     flight = small.flight(model, 40, gap=20)
-    ok, left, answers = filtering.whitened_rates_and_responses(flight, model)
+    ok, left, answers = filtering.whitened_rates(flight, model)
     given = []
     monkeypatch.setattr(filtering, "run_bank", lambda *of: given.append(of) or "run")
     monkeypatch.setattr(
         filtering,
-        "recent_noise_variance_scale",
+        "recent_scale",
         lambda *of: given.append(of) or np.arange(40.0),
     )
-    assert filtering._run_bank_on_flight(flight, model, "bank") == "run"
+    assert filtering._run_flight(flight, model, "bank") == "run"
     rates, responses, usable, bank, _, noise, least, quick = given[-1]
     np.testing.assert_array_equal(rates, np.nan_to_num(left))
     np.testing.assert_array_equal(responses, np.nan_to_num(answers))
@@ -276,7 +268,7 @@ def test_under_other_laws_the_noise_is_as_wide_as_the_last_seconds_show(monkeypa
     colour = {"average": [1.0], "noise": model.residual_covariance, "wider": 2.0, "quick": 0.4}
     model = model.model_copy(update={"noise_models": [NoiseModel(**colour)]})
     white = replace(flight, noise_ma_coefficients=(1.0,))
-    filtering._run_bank_on_flight(white, model.with_inflated_covariance_of_noise_model((1.0,)), "bank")
+    filtering._run_flight(white, model.with_noise_of((1.0,)), "bank")
     wider = _quick_by_hand(responses, np.array(colour["noise"]), 5, 0.4, 1.0)
     assert wider.max() > 2.0
     np.testing.assert_allclose(given[-1][-1], wider)
@@ -305,12 +297,12 @@ def test_a_noise_that_is_unlikely_is_left_out_and_filtered_no_longer_than_it_cou
     )
     monkeypatch.setattr(filtering, "first_samples", lambda of, n: SimpleNamespace(**(vars(of) | {"rows": n})))
     monkeypatch.setattr(
-        filtering, "_noise_model_log_likelihood", lambda of, by, colour: (of.noise_ma_coefficients, colour)
+        filtering, "_noise_likelihood", lambda of, by, colour: (of.noise_ma_coefficients, colour)
     )
     asked = []
     monkeypatch.setattr(
         filtering,
-        "_model_probabilities_with_forgetting",
+        "_model_weights",
         lambda likelihoods, rate_hz: asked.append((likelihoods, rate_hz)) or chances,
     )
 
@@ -320,8 +312,8 @@ def test_a_noise_that_is_unlikely_is_left_out_and_filtered_no_longer_than_it_cou
         rows = np.arange(1.0, flight.rows + 1.0)
         return np.outer(rows, [size, 2.0]), np.outer(rows, [0.1, size]), size + rows, None
 
-    monkeypatch.setattr(filtering, "_run_bank_on_flight", run)
-    posterior, states, scales = hypothesis_state_and_noise_posterior(small.flight(model, 3), model, "bank")
+    monkeypatch.setattr(filtering, "_run_flight", run)
+    posterior, states, scales = bank_posterior(small.flight(model, 3), model, "bank")
     likelihoods, rate_hz = asked[0]
     assert (likelihoods, rate_hz) == (
         [(tuple(one.ma_coefficients), one) for one in model.noise_models], model.rate_hz,

@@ -9,14 +9,14 @@ import pytest
 from beaver_ftc_logs import findings
 from beaver_ftc_logs.findings import (
     as_text,
-    diagnosed_duration_text,
+    duration_text,
+    events_to_show,
     fault_events,
     isolability_document,
     isolability_sentences,
-    lasting_or_else_all_events,
     verdict_document,
 )
-from beaver_ftc_logs.regression import unexplained_rates_and_responses
+from beaver_ftc_logs.regression import unexplained_rates
 from products.logs import small
 
 NAMES = ["right", "left"]
@@ -53,7 +53,7 @@ def test_three_seconds_are_not_brief(count, brief):
     events = fault_events(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
     assert [event["brief"] for event in events] == [brief]
     assert (
-        lasting_or_else_all_events(events) == events
+        events_to_show(events) == events
     )  # where every one is brief they are all there is to say
 
 
@@ -71,7 +71,7 @@ WORLD = {
     "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
     "tail": (
         small.model(small.TAIL, settings={"alarm": 0.9}),
-        {"gap": 150, "notes": ("a remark",), "mean_age_s_by_held_column": {"roll": 0.123456}},
+        {"gap": 150, "notes": ("a remark",), "held_age_s": {"roll": 0.123456}},
     ),
 }
 
@@ -116,7 +116,7 @@ def test_the_text_of_a_verdict(changed):
         VERDICT | {"credible": {"share": 0.0, "reasons": [{"says": "a rate is clipped", "share": 1.0}]}},
     ]
     assert not changed([as_text(case).splitlines() for case in cases])
-    assert [diagnosed_duration_text(case) for case in cases[:3]] == [
+    assert [duration_text(case) for case in cases[:3]] == [
         "61 s", "42 s, 1 gap in the log left out", "42 s, 2 gaps in the log left out",
     ]  # fmt: skip
 
@@ -145,7 +145,7 @@ def test_what_a_flight_can_separate_in_words():
 def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
     """The Schur complement of the whole information matrix, trim of each axis and the other groups out."""
     model, samples = flown
-    ok_answers = _standardized_group_responses(samples, model)
+    ok_answers = _white_responses(samples, model)
     n, groups, _ = ok_answers.shape
     design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
     flat = design.reshape(-1, groups + 3)
@@ -155,8 +155,8 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
         assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
 
 
-def _standardized_group_responses(samples, model):
-    ok, _, answers = unexplained_rates_and_responses(samples, model)
+def _white_responses(samples, model):
+    ok, _, answers = unexplained_rates(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
         model.settings.effective_sample_share
     )
@@ -195,19 +195,19 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
 def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
     """Of all of them without a word more; of hardly any there is no verdict."""
     assert findings._no_event_text({"credible": {"share": share}}) == says
-    little = findings._MIN_CREDIBLE_ROW_SHARE
+    little = findings._MIN_CREDIBLE_SHARE
     assert findings._no_event_text({"credible": {"share": 0.99 * little}}) == "no verdict"
     assert findings._no_event_text({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
 
 
 def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
     """Half of the square of the loss times the information; a complete loss is one."""
-    assert findings._smallest_detectable_losses(0.5, 5.0) == {
+    assert findings._smallest_losses(0.5, 5.0) == {
         "5": None,
         "20": 1.0,
         "60": pytest.approx(3.0**-0.5),
     }
-    assert findings._smallest_detectable_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
+    assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
 
 
 def test_odds_against_a_change_are_those_of_its_median_share():
@@ -216,10 +216,10 @@ def test_odds_against_a_change_are_those_of_its_median_share():
         transition_share=weight, is_fault_of_group=lambda group: np.arange(4) % 2 == (1 if group else 5)
     )
     model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._log_odds_needed_for_alarm(model, bank, 1, 0.1) == pytest.approx(
+    assert findings._alarm_odds(model, bank, 1, 0.1) == pytest.approx(
         np.log(9.0) - np.log(0.00025)
     )
-    assert findings._log_odds_needed_for_alarm(model, bank, 0, 0.1) == np.inf
+    assert findings._alarm_odds(model, bank, 0, 0.1) == np.inf
 
 
 def test_an_event_has_the_name_of_most_of_its_rows_and_begins_with_a_brief_alarm_without_one():

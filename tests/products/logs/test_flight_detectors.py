@@ -9,7 +9,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
 from beaver_ftc_logs.recording import Column, RecordedFlight
-from beaver_ftc_logs.regression import unexplained_rates_and_responses
+from beaver_ftc_logs.regression import unexplained_rates
 from kept import in_short
 from products.logs import small
 
@@ -22,7 +22,7 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
-    ok, unexplained, answers = unexplained_rates_and_responses(samples, model)
+    ok, unexplained, answers = unexplained_rates(samples, model)
     sd = np.sqrt(np.diag(model.residual_covariance))
     whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
@@ -126,7 +126,7 @@ def test_what_a_detector_of_the_loop_is_given(model):
     samples = small.flight(model, 60, gap=30)
     samples.rates[45, 2] = samples.commands[50, 0] = np.nan
     stream = detectors.loop_detector_inputs(samples, model)
-    ok, unexplained, answers = unexplained_rates_and_responses(samples, model)
+    ok, unexplained, answers = unexplained_rates(samples, model)
     intercept, x = np.array(model.intercept), np.nan_to_num(samples.rates)
     members = [[0], [1]] if model is WING else [[0, 2], [1]]
     for k, (now, command) in enumerate(stream):
@@ -163,7 +163,7 @@ def test_what_a_detector_is_told_before_the_flight(changed):
     fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
     assert not changed(fields | {"declared": vars(told.declared)})
     x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
-    past = np.array(WING.lagged_rate_and_signal_coefficients)[:3]
+    past = np.array(WING.past_coefficients)[:3]
     np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)
     assert told.model.G(np.zeros(4)).tolist() == [[0.0] * 4] * 3
 
@@ -201,7 +201,7 @@ VERDICTS = {
 def test_a_verdict_of_the_loop_becomes_a_row(name):
     verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
     samples = small.flight(BARE, 3)
-    rows = detectors.diagnosis_rows_from_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
+    rows = detectors.rows_of_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
     assert (rows.isolated_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
     np.testing.assert_allclose(rows.effectiveness, [[1, 1], estimate, [1, 1]])
     np.testing.assert_allclose(rows.effectiveness_low, [[1, 1], low, [1, 1]])
@@ -211,7 +211,7 @@ def test_a_verdict_of_the_loop_becomes_a_row(name):
 
 def test_surfaces_that_move_together_share_a_verdict():
     both = LOSS._replace(isolated="aileron")
-    rows = detectors.diagnosis_rows_from_verdicts([both], small.flight(TAIL, 1), TAIL)
+    rows = detectors.rows_of_verdicts([both], small.flight(TAIL, 1), TAIL)
     assert rows.isolated_surfaces.tolist() == ["left_aileron+right_aileron"]
     assert rows.effectiveness.tolist() == [[0.6, 1.0, 0.6]]
     assert rows.effectiveness_low.tolist() == [[0.0, 1.0, 0.0]]
@@ -248,11 +248,11 @@ def test_each_detector_gets_what_it_takes_and_its_rows_stand_at_the_stamps_of_th
     loop = detectors.detector_names()[-1]
     stubs = {
         "check_log_fits_model": lambda of, by: told.append((of, by)),
-        "with_rates_unknown_where_frozen_or_clipped": lambda of, by: (of, "alive", by),
+        "without_dead_rows": lambda of, by: (of, "alive", by),
         "diagnose": lambda of, by: ("ours", of, by),
         "run_loop_detector": lambda by, of, model: ("loop", by, of, model),
         "made": lambda kind, name: (kind, name),
-        "finalize_rows_at_log_stamps": lambda of, by, rows: ("at its stamps", of, by, rows),
+        "finish_rows": lambda of, by, rows: ("at its stamps", of, by, rows),
     }
     for name, stub in stubs.items():
         monkeypatch.setattr(detectors, name, stub)

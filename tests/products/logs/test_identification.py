@@ -10,17 +10,17 @@ import pytest
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc_logs import fitting, identification
-from beaver_ftc_logs.fitting import FlightWithUsableRows
+from beaver_ftc_logs.fitting import FitPart
 from beaver_ftc_logs.identification import (
+    density_ratios,
     fit_output_error,
     identification_text,
     identify,
     regressor_names,
-    residual_to_white_density_by_band,
-    scale_by_dynamic_pressure_if_better,
+    scale_if_better,
 )
 from beaver_ftc_logs.pages import load_template
-from beaver_ftc_logs.samples import Samples, with_airspeed_scaling_and_products
+from beaver_ftc_logs.samples import Samples, scale_by_airspeed
 from products.logs import small
 
 MODEL = small.model()
@@ -43,15 +43,15 @@ def pressed(flight, seed=3):
 
 def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    (anew,), described = scale_by_dynamic_pressure_if_better([pressed(flight)], its)
+    (anew,), described = scale_if_better([pressed(flight)], its)
     assert described.reference_airspeed_mps == pytest.approx(20.0, rel=0.02)
     ratio = (20.0 / described.reference_airspeed_mps) ** 2
     assert anew.commands == pytest.approx(ratio * flight.commands)
     wind = replace(flight, airspeed=pressed(flight).airspeed)
     for plain in ([wind], [flight]):
-        assert scale_by_dynamic_pressure_if_better(plain, its) == (plain, its)
+        assert scale_if_better(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
-    assert scale_by_dynamic_pressure_if_better([pressed(flight)], told)[1] == told
+    assert scale_if_better([pressed(flight)], told)[1] == told
 
 
 def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
@@ -60,12 +60,12 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
     by_speed = (flown.airspeed / 20.0)[:, None] ** np.array([[1.0, 2.0]])
     mixed = replace(flown, commands=flight.commands / by_speed)
     told = its.model_copy(update={"other_laws": True})
-    (anew,), described = scale_by_dynamic_pressure_if_better([mixed], told)
+    (anew,), described = scale_if_better([mixed], told)
     assert described.airspeed_powers == {"right": 1.0}
     ratio = 20.0 / described.reference_airspeed_mps
     assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
-    assert scale_by_dynamic_pressure_if_better([flown], told)[1].airspeed_powers == {}
-    assert scale_by_dynamic_pressure_if_better([mixed], its)[1].airspeed_powers == {}
+    assert scale_if_better([flown], told)[1].airspeed_powers == {}
+    assert scale_if_better([mixed], its)[1].airspeed_powers == {}
     said = identification_text(
         MODEL.model_copy(update={"vehicle": described, "identification_results": SAYS_LITTLE})
     )
@@ -82,21 +82,21 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
     asked = []
     monkeypatch.setattr(
         identification,
-        "with_airspeed_scaling_and_products",
+        "scale_by_airspeed",
         lambda one, mps, powers: asked.append(mps) or one,
     )
     monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
     its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    assert scale_by_dynamic_pressure_if_better(flights, its) == (flights, its)
+    assert scale_if_better(flights, its) == (flights, its)
     assert asked == [12.5, 12.5]
 
 
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
-    found = with_airspeed_scaling_and_products(flight, 20.0)
+    found = scale_by_airspeed(flight, 20.0)
     assert found.commands[:50] == pytest.approx(flight.commands[:50])
     assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
-    stopped = with_airspeed_scaling_and_products(replace(flight, airspeed=np.zeros(100)), 20.0)
+    stopped = scale_by_airspeed(replace(flight, airspeed=np.zeros(100)), 20.0)
     assert stopped.commands == pytest.approx(0.1 * flight.commands)
     assert (found.signals[:50] == 0.0).all()
     assert found.signals[50:] == pytest.approx(-0.5 * flight.rates[50:])
@@ -180,10 +180,8 @@ def test_names_of_the_regressors():
 
 def test_collinear_is_more_than_tenfold_worst_first(monkeypatch):
     factors = np.array([10.0, 10.1, 1.0, 40.0, np.inf, *[2.0] * 7])
-    monkeypatch.setattr(identification, "variance_inflation_factors", lambda x: factors)
-    found = identification.collinear_regressors(
-        fitting.flights_with_usable_rows([small.flight(MODEL, 200)]), MODEL
-    )
+    monkeypatch.setattr(identification, "variance_inflation", lambda x: factors)
+    found = identification.collinear_names(fitting.fit_parts([small.flight(MODEL, 200)]), MODEL)
     assert [(one["regressor"], one["inflation"]) for one in found] == [
         ("q[-2]", None), ("p[-2]", 40.0), ("q[-1]", 10.1),
     ]  # fmt: skip
@@ -194,8 +192,8 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
     model = small.model(small.TAIL)
     samples = small.flight(model, 300)
     samples.signals[:] = 20.0
-    usable_flights = fitting.flights_with_usable_rows([samples])
-    found = identification.collinear_regressors(usable_flights, model)
+    usable_flights = fitting.fit_parts([samples])
+    found = identification.collinear_names(usable_flights, model)
     assert found[0] == {"regressor": "airspeed_m_s[-1]", "inflation": None}
     assert json.loads(as_json(found)) == found
     told = model.model_copy(update={"identification_results": FOUND | {"collinear": found}})
@@ -207,13 +205,10 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
 
 
 def test_inflation_is_of_the_regressors_without_the_constant():
-    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 200)])
-    x = fitting.stacked_regression_data(
-        usable_flights, MODEL.vehicle, MODEL.n_rate_lags, MODEL.n_command_lags
-    )[0]
+    usable_flights = fitting.fit_parts([small.flight(MODEL, 200)])
+    x = fitting.stack_data(usable_flights, MODEL.vehicle, MODEL.n_rate_lags, MODEL.n_command_lags)[0]
     found = {
-        one["regressor"]: one["inflation"]
-        for one in identification.collinear_regressors(usable_flights, MODEL)
+        one["regressor"]: one["inflation"] for one in identification.collinear_names(usable_flights, MODEL)
     }
     for i, name in enumerate(regressor_names(MODEL), 1):
         others = np.delete(x, i, axis=1)
@@ -225,9 +220,9 @@ def test_inflation_is_of_the_regressors_without_the_constant():
 
 
 def test_colour_is_the_median_over_the_responses():
-    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300)])
-    fit = fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3)
-    found = identification.median_standard_error_inflation_by_axis(usable_flights, MODEL)
+    usable_flights = fitting.fit_parts([small.flight(MODEL, 300)])
+    fit = fitting.fit_order(usable_flights, MODEL.vehicle, 2, 3)
+    found = identification.median_inflation(usable_flights, MODEL)
     assert found == dict(zip("pqr", np.median(fit.standard_error_inflation[7:], axis=0), strict=True))
 
 
@@ -237,13 +232,13 @@ def test_a_spectrum_by_bands():
     model = small.model(rate_hz=20.0)
     samples = small.flight(model, 600)
     samples.rates[:, 1] += 0.5 * np.sin(2 * np.pi * 3.0 * samples.t_s)
-    usable_flights = fitting.flights_with_usable_rows([samples])
-    bands = residual_to_white_density_by_band(usable_flights, model)
+    usable_flights = fitting.fit_parts([samples])
+    bands = density_ratios(usable_flights, model)
     ends = [(band["from_hz"], band["to_hz"]) for band in bands]
     assert ends == [(0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0)]
     from scipy import signal
 
-    residual = fitting.rows_and_one_step_residuals(model, usable_flights[0])[1]
+    residual = fitting.one_step_residual(model, usable_flights[0])[1]
     frequency, density = signal.welch(residual, fs=20.0, nperseg=256, axis=0)
     for (low, high), band in zip(ends, bands, strict=True):
         inside = (frequency > low) & (frequency <= high)
@@ -251,9 +246,7 @@ def test_a_spectrum_by_bands():
             white = residual[:, axis].var() / 10.0
             assert band[name] == pytest.approx(density[inside, axis].mean() / white)
     assert max(bands, key=lambda band: band["q"])["from_hz"] == 2.0
-    low = residual_to_white_density_by_band(
-        fitting.flights_with_usable_rows([small.flight(MODEL, 300)]), MODEL
-    )
+    low = density_ratios(fitting.fit_parts([small.flight(MODEL, 300)]), MODEL)
     assert [band["to_hz"] for band in low] == [0.1, 0.5, 1.0, 2.0, 5.0]
 
 
@@ -274,7 +267,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
 
 
 def test_servo_lag_and_delay_are_found(changed):
-    found = fit_output_error(fitting.flights_with_usable_rows([lagged()]), [[0], [1]])
+    found = fit_output_error(fitting.fit_parts([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
     assert min(found["explained_of_windows_not_fitted"].values()) > 0.98
@@ -291,9 +284,7 @@ def _short(value):
 
 
 def test_a_servo_faster_than_the_rate_tells_is_said():
-    found = fit_output_error(
-        fitting.flights_with_usable_rows([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]]
-    )
+    found = fit_output_error(fitting.fit_parts([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]])
     assert found["shorter_than_can_be_told"] is True
 
 
@@ -310,14 +301,14 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         return SimpleNamespace(x=x, jac=jac, fun=fun)
 
     monkeypatch.setattr("scipy.optimize.least_squares", fitted)
-    usable_flights = fitting.flights_with_usable_rows([lagged(600)])
+    usable_flights = fitting.fit_parts([lagged(600)])
     found = fit_output_error(usable_flights, [[0], [1]])
     assert found["shorter_than_can_be_told"] is short
     errors = np.sqrt(np.diag(np.linalg.inv(jac.T @ jac)) * (fun @ fun) / 1000)
     assert [found["servo_lag_sd_s"], found["delay_sd_s"]] == pytest.approx(errors[:2])
     assert (found["servo_lag_s"], found["delay_s"]) == (lag_s, 0.13)
-    commands, rates = identification._cut_free_run_windows(usable_flights, [[0], [1]], 20, 7)
-    run = identification._simulate_free_runs(x, commands, rates, 0.1)
+    commands, rates = identification._cut_windows(usable_flights, [[0], [1]], 20, 7)
+    run = identification._simulate(x, commands, rates, 0.1)
     np.testing.assert_allclose(
         given["first"], ((run - rates) / rates.std(axis=(0, 1)))[::2].ravel(), rtol=1e-6
     )
@@ -326,7 +317,7 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         share = 1.0 - left.var() / of.var()
         assert found["explained_of_windows_not_fitted"][name] == pytest.approx(share)
     assert (given["loss"], given["max_nfev"]) == ("soft_l1", 40)
-    start, low, high = identification._output_error_fixed_guess_and_bounds(2, 0.1)
+    start, low, high = identification._guess_and_bounds(2, 0.1)
     np.testing.assert_array_equal(given["start"], start)
     np.testing.assert_array_equal(given["bounds"], (low, high))
 
@@ -335,14 +326,12 @@ def test_too_few_windows_are_said():
     """Of 2 s, after 0.7 s of the past: 20 want 407 samples; windows that end with the log are not taken."""
     says = "too few gap-free windows in which every rate moves"
     samples = lagged(407, noise=0.01)
-    found = fit_output_error([FlightWithUsableRows(samples, np.ones(407, dtype=bool))], [[0], [1]])
+    found = fit_output_error([FitPart(samples, np.ones(407, dtype=bool))], [[0], [1]])
     assert found == {"windows": 19, "says": says}
     samples = lagged(408, noise=0.01)
-    assert "delay_s" in fit_output_error(
-        [FlightWithUsableRows(samples, np.ones(408, dtype=bool))], [[0], [1]]
-    )
+    assert "delay_s" in fit_output_error([FitPart(samples, np.ones(408, dtype=bool))], [[0], [1]])
     samples.rates[:, 1] = 0.01
-    still = fit_output_error([FlightWithUsableRows(samples, np.ones(408, dtype=bool))], [[0], [1]])
+    still = fit_output_error([FitPart(samples, np.ones(408, dtype=bool))], [[0], [1]])
     assert still == {"windows": 20, "says": says}
 
 
@@ -361,9 +350,7 @@ def test_windows_with_their_past():
     use[22] = False
     rates[29, 1] = np.nan
     commands[35, 0] = np.nan
-    found, measured = identification._cut_free_run_windows(
-        [FlightWithUsableRows(samples, use)], [[0], [1]], 3, 2
-    )
+    found, measured = identification._cut_windows([FitPart(samples, use)], [[0], [1]], 3, 2)
     scaled = commands * [1.0, 0.5]
     lost = {
         *range(14, 18),
@@ -374,15 +361,15 @@ def test_windows_with_their_past():
     ends = [end for end in range(5, n, 3) if end - 1 not in lost]
     np.testing.assert_array_equal(found, [scaled[end - 5 : end] for end in ends])
     np.testing.assert_array_equal(measured, [rates[end - 3 : end] for end in ends])
-    together, _ = identification._cut_free_run_windows([FlightWithUsableRows(samples, use)], [[0, 1]], 3, 2)
+    together, _ = identification._cut_windows([FitPart(samples, use)], [[0, 1]], 3, 2)
     np.testing.assert_array_equal(together[:, :, 0], found.sum(axis=2))
 
 
 @pytest.mark.parametrize(("n", "kept_of"), [(1601, 1), (1603, 2), (2404, 3)])
 def test_of_many_windows_every_so_many_is_kept(n, kept_of):
     samples = small.flight(MODEL, n)
-    commands, rates = identification._cut_free_run_windows(
-        [FlightWithUsableRows(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1
+    commands, rates = identification._cut_windows(
+        [FitPart(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1
     )
     every = range(3, n, 2)
     np.testing.assert_array_equal(rates, [samples.rates[end - 2 : end] for end in every][::kept_of])
@@ -390,7 +377,7 @@ def test_of_many_windows_every_so_many_is_kept(n, kept_of):
 
 
 def test_where_the_fit_begins_and_what_it_may_say():
-    start, low, high = identification._output_error_fixed_guess_and_bounds(2, 0.05)
+    start, low, high = identification._guess_and_bounds(2, 0.05)
     assert start.tolist() == [
         0.1, 0.05, 0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7, *[0.01] * 6, 0, 0, 0,
     ]  # fmt: skip
@@ -407,7 +394,7 @@ def test_a_free_run_is_the_equation_sample_by_sample(delay_s):
     commands, rates = rng.standard_normal((3, 9, 2)), rng.standard_normal((3, 5, 3))
     a, b, c = 0.4 * rng.standard_normal((3, 3)), rng.standard_normal((2, 3)), rng.standard_normal(3)
     parameters = np.concatenate([[0.08, delay_s], a.ravel(), b.ravel(), c])
-    found = identification._simulate_free_runs(parameters, commands, rates, 0.1)
+    found = identification._simulate(parameters, commands, rates, 0.1)
     keep = np.exp(-0.1 / 0.08)
     for w in range(3):
         servo, x, expected = commands[w, 0], rates[w, 0], []
@@ -427,13 +414,13 @@ def test_a_flight_without_a_healthy_sample_is_refused_by_its_name():
     with pytest.raises(
         BadInput, match=r"^identify: lost: 0 samples known to be healthy, allowed: at least 2$"
     ):
-        identification._choose_noise_ma_coefficients(lost, model.vehicle, (4, 4))
+        identification._choose_ma(lost, model.vehicle, (4, 4))
 
 
 def test_the_remarks_on_the_rates_of_every_flight_are_in_the_error():
     notes = ("q_rad_s: in deg/s", "roll: of no use"), (), ("r_rad_s: late", "p_rad_s: late", "q_rad_s2: odd")
     flights = [SimpleNamespace(samples=SimpleNamespace(notes=of)) for of in notes]
-    said = identification._rate_mistakes_text(flights, MODEL)
+    said = identification._mistakes_text(flights, MODEL)
     assert said == "; q_rad_s: in deg/s; r_rad_s: late; p_rad_s: late"
 
 
@@ -457,12 +444,12 @@ def test_what_is_to_be_expected_of_another_day_is_mean_and_worst_of_what_was_lef
         "mean_error": {"mean": pytest.approx(0.03), "worst": 0.05},
         "held_by_bounds": {"mean": pytest.approx(0.9), "worst": 0.85},
     }
-    assert identification.another_day_scores_and_false_alarms(FOLDS, MODEL) == expected
-    assert identification.another_day_scores_and_false_alarms(FOLDS[1:2], MODEL) == {}
+    assert identification.expect_another_day(FOLDS, MODEL) == expected
+    assert identification.expect_another_day(FOLDS[1:2], MODEL) == {}
     tail = SimpleNamespace(healthy_minutes=11.5)
     monkeypatch.setattr(
-        identification.extremes, "expected_false_alarms_per_hour",
-        lambda of, threshold: identification.extremes.ExpectedFalseAlarmsPerHour(
+        identification.extremes, "false_alarm_rate",
+        lambda of, threshold: identification.extremes.FalseAlarmRate(
             threshold * of.healthy_minutes, 0.25, 6.5
         ),
     )  # fmt: skip
@@ -475,7 +462,7 @@ def test_what_is_to_be_expected_of_another_day_is_mean_and_worst_of_what_was_lef
             fitted_ranges=SimpleNamespace(alarm_peak_tail=tail), settings=settings,
             identification_results={"parts": 7, "alarmed": 2},
         )  # fmt: skip
-        found = identification.another_day_scores_and_false_alarms(FOLDS, model)
+        found = identification.expect_another_day(FOLDS, model)
         assert found == expected | {
             "false_alarms_per_hour": {"asked": asked, "value": 23.0, "low": 0.25, "high": 6.5},
             "minutes_left_out": 11.5, "minutes_missing": 100.0 * asked + 11.5, "parts": 7, "alarmed": 2,
@@ -486,17 +473,15 @@ def test_what_is_to_be_expected_of_another_day_is_mean_and_worst_of_what_was_lef
                 lacking.settings = SimpleNamespace(alarm_threshold=None, false_alarms_per_hour=rate)
             else:
                 lacking.fitted_ranges = SimpleNamespace(alarm_peak_tail=None) if what == "tail" else None
-            assert identification.another_day_scores_and_false_alarms(FOLDS, lacking) == expected
+            assert identification.expect_another_day(FOLDS, lacking) == expected
 
 
 def test_each_further_flight_has_its_commands_compared_with_those_of_the_first(monkeypatch):
     flights = [small.flight(MODEL, 80, seed=seed, name=f"flight {seed}") for seed in (1, 2, 3)]
     asked = []
-    monkeypatch.setattr(
-        identification.trust, "refuse_commands_in_other_unit", lambda *these: asked.append(these)
-    )
+    monkeypatch.setattr(identification.trust, "refuse_command_unit", lambda *these: asked.append(these))
     monkeypatch.setattr(identification.trust, "central_ranges", lambda values: values[:2].tolist())
-    identification._check_command_units_alike(flights, MODEL.vehicle)
+    identification._check_units(flights, MODEL.vehicle)
     assert [name for name, *_ in asked] == ["flight 2", "flight 3"]
     for (_, commands, rates, ranges, surfaces), flight in zip(asked, flights[1:], strict=True):
         assert (commands is flight.commands, rates is flight.rates) == (True, True)
@@ -533,7 +518,7 @@ SPEEDY = MODEL.vehicle.model_copy(update={"airspeed": "V"})
 def test_commands_are_scaled_where_that_explains_decisively_more(monkeypatch, scaled, taken):
     """By ten at least of the criterion; of a vehicle that leaves laws and air open they stay open."""
     asked = by_table(monkeypatch, {"plain": 100.0, (2.0, 2.0): scaled})
-    (found,), vehicle = scale_by_dynamic_pressure_if_better([FLOWN], SPEEDY)
+    (found,), vehicle = scale_if_better([FLOWN], SPEEDY)
     assert asked == ["plain", (2.0, 2.0)]
     assert vehicle.reference_airspeed_mps == (20.0 if taken else None)
     assert (vehicle.other_laws, vehicle.moving_air, vehicle.airspeed_powers) == (None, None, {})
@@ -556,7 +541,7 @@ def test_the_power_of_each_surface_is_the_best_of_those_that_are_decisively_bett
     criteria |= {(right, power): of for power, of in zip((0.0, 1.0, 3.0), of_left, strict=True)}
     asked = by_table(monkeypatch, {"plain": 100.0, (2.0, 2.0): 50.0} | criteria)
     told = SPEEDY.model_copy(update={"other_laws": True, "moving_air": False})
-    (found,), vehicle = scale_by_dynamic_pressure_if_better([FLOWN], told)
+    (found,), vehicle = scale_if_better([FLOWN], told)
     assert vehicle.airspeed_powers == powers
     assert asked == ["plain", (2.0, 2.0), (2.0, 2.0), *criteria]
     by = np.array([powers.get(name, 2.0) for name in ("right", "left")])
@@ -580,7 +565,7 @@ def test_in_moving_air_powers_are_compared_in_white_and_given_back_as_they_are(m
 
     monkeypatch.setattr(identification, "_min_bic", least)
     told = SPEEDY.model_copy(update={"other_laws": True, "moving_air": True})
-    found, vehicle = scale_by_dynamic_pressure_if_better(flights, told)
+    found, vehicle = scale_if_better(flights, told)
     assert seen == [[((), 1.0)] * 2] * 2 + [[*colours.values()]] * 7
     assert (vehicle.airspeed_powers, [one.noise_ma_coefficients for one in found]) == ({}, [(), ()])
     np.testing.assert_allclose(found[1].commands, FLOWN.commands * (FLOWN.airspeed / 20.0)[:, None] ** 2)
@@ -600,18 +585,18 @@ def test_what_an_identification_is_of_goes_through_its_steps_in_order(monkeypatc
 
     fitted, ranged = MODEL.model_copy(update={"rate_hz": 11.0}), MODEL.model_copy(update={"rate_hz": 12.0})
     heard = MODEL.model_copy(update={"rate_hz": 13.0, "identification_results": {"parts": 2}})
-    monkeypatch.setattr(identification, "_check_command_units_alike", step("units", None))
+    monkeypatch.setattr(identification, "_check_units", step("units", None))
     monkeypatch.setattr(identification, "whiten_flights", step("white", ["white"]))
-    monkeypatch.setattr(fitting, "flights_with_usable_rows", step("usable", usable))
+    monkeypatch.setattr(fitting, "fit_parts", step("usable", usable))
     monkeypatch.setattr(fitting, "fit_model", step("fit", fitted))
-    monkeypatch.setattr(fitting, "prediction_quality_by_fold", step("quality", ["quality"]))
-    monkeypatch.setattr(identification, "check_explained_variance", step("explained", None))
-    monkeypatch.setattr(fitting, "add_fitted_ranges_and_alarm_threshold", step("ranges", ranged))
-    monkeypatch.setattr(identification, "add_unseen_noise_models", step("unseen", heard))
-    monkeypatch.setattr(fitting, "score_folds_and_choose_credible_mass", step("folds", (["fold"], 0.875)))
+    monkeypatch.setattr(fitting, "fold_qualities", step("quality", ["quality"]))
+    monkeypatch.setattr(identification, "check_explained", step("explained", None))
+    monkeypatch.setattr(fitting, "add_ranges_and_threshold", step("ranges", ranged))
+    monkeypatch.setattr(identification, "add_unseen_noise", step("unseen", heard))
+    monkeypatch.setattr(fitting, "score_folds", step("folds", (["fold"], 0.875)))
     told = {
-        "another_day": "another_day_scores_and_false_alarms", "collinear": "collinear_regressors",
-        "colour": "median_standard_error_inflation_by_axis", "spectrum": "residual_to_white_density_by_band",
+        "another_day": "expect_another_day", "collinear": "collinear_names",
+        "colour": "median_inflation", "spectrum": "density_ratios",
         "output_error": "fit_output_error",
     }  # fmt: skip
     for key, function in told.items():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.bank import build_hypothesis_bank
+from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import isolability_document, isolability_sentences
 from beaver_ftc_logs.identification import identify
@@ -102,14 +102,12 @@ def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
         assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
         odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
         share = np.median(
-            build_hypothesis_bank(wing_model).transition_share[
-                build_hypothesis_bank(wing_model).is_fault_of_group(0)
-            ]
+            build_bank(wing_model).transition_share[build_bank(wing_model).is_fault_of_group(0)]
         )
         change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(
             np.log(
-                settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm) / change
+                settings.alarm_probability / (1.0 - settings.alarm_probability) / change
             ),
             rel=1e-9,
         )

@@ -44,8 +44,8 @@ def test_a_model_comes_back_from_its_file(tmp_path):
     lines = path.read_text().splitlines()
     assert lines[1] == ' "vehicle": {'
     assert path.read_text().endswith("}\n")
-    intercept, past, response, noise = model.intercept_past_response_noise()
-    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.lagged_rate_and_signal_coefficients)
+    intercept, past, response, noise = model.as_arrays()
+    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.past_coefficients)
     assert (response.tolist(), noise.tolist()) == (model.command_response, model.residual_covariance)
 
 

@@ -39,7 +39,7 @@ def parted(monkeypatch):
     """Parts of 500 rows, fits of 600 samples in stretches of 100."""
     monkeypatch.setattr(readers, "ROWS_PER_PART", 500)
     monkeypatch.setattr(samples, "MAX_FIT_SAMPLES", 600)
-    monkeypatch.setattr(samples, "_FIT_STRETCH_SAMPLES", 100)
+    monkeypatch.setattr(samples, "_FIT_SAMPLES", 100)
 
 
 def write(path, columns):
@@ -107,7 +107,7 @@ def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypa
         lines.insert(k, "1,2,3")
     path = tmp_path / "long.csv"
     path.write_text("\n".join(lines) + "\n")
-    _, parts = table._column_names_and_parts(path, None, 100)
+    _, parts = table._names_and_parts(path, None, 100)
     counted = [[int(text.rpartition(" ")[2]) for _, text in said] for _, said, _ in parts]
     assert len(counted) == 3
     assert sum(map(sum, counted)) == 4
@@ -229,8 +229,8 @@ def wing_of_topic(tmp_path, further_keys=""):
 
 def test_a_long_log_of_an_autopilot_has_parts_that_share_a_tenth(tmp_path, parted_log):
     vehicle = wing_of_topic(tmp_path)
-    whole = samples.read_columns_of_vehicle(parted_log, vehicle)
-    parts = list(samples.read_parts_for_vehicle(parted_log, vehicle))
+    whole = samples.read_vehicle_columns(parted_log, vehicle)
+    parts = list(samples.read_vehicle_parts(parted_log, vehicle))
     assert [part.name for part in parts] == [f"long-part-{k}" for k in range(1, 6)]
     assert {part.notes for part in parts} == {whole.notes}
     for name, column in whole.columns.items():
@@ -244,7 +244,7 @@ def test_a_long_log_of_an_autopilot_has_parts_that_share_a_tenth(tmp_path, parte
 def test_parts_of_a_log_that_is_averaged_have_so_many_samples_of_the_average(tmp_path, parted_log):
     """At 5 Hz the 2400 rows are 1200 samples."""
     vehicle = wing_of_topic(tmp_path, "max_rate_hz: 5.0\n")
-    parts = [samples.resample(part, vehicle) for part in samples.read_parts_for_vehicle(parted_log, vehicle)]
+    parts = [samples.resample(part, vehicle) for part in samples.read_vehicle_parts(parted_log, vehicle)]
     assert [len(part.t_s) for part in parts] == pytest.approx([500, 500, 300], abs=1)
     assert all(part.dt_s == pytest.approx(0.2) for part in parts)
 
@@ -274,7 +274,7 @@ def test_a_log_of_more_than_eighty_minutes_at_100_hz_has_parts_of_400_000_sample
 def test_parts_of_a_ulog_say_what_the_whole_says(tmp_path, parted_log, wing_model):
     vehicle = wing_of_topic(tmp_path)
     whole = diagnose(
-        samples.resample(samples.read_columns_of_vehicle(parted_log, vehicle), vehicle), wing_model
+        samples.resample(samples.read_vehicle_columns(parted_log, vehicle), vehicle), wing_model
     )
     parts = list(samples.stream_flights([parted_log], vehicle))
     assert len(parts) == 5

@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.mixing import load_vehicle_for_logs, mixing_of_log
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.regression import group_surfaces_by_commands
+from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle
 from products.logs import synthetic
@@ -207,7 +207,7 @@ def test_surfaces_that_move_together_follow_one_command():
         "right_aileron": {"actuator_servos.control[0]": -0.5},
     }
     vehicle = Vehicle.model_validate(RATES | {"commands": found.commands, "surfaces": found.surfaces})
-    assert group_surfaces_by_commands(vehicle) == [[0, 1]]
+    assert group_surfaces(vehicle) == [[0, 1]]
 
 
 def test_flaperons_follow_what_is_left_without_flaps():
@@ -343,7 +343,7 @@ def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
     log = write_px4(tmp_path / "a.ulg", PX4_ELEVONS, topics)
     first, second = "actuator_servos.control[0]", "actuator_servos.control[1]"
     vehicle, lines = load_vehicle_for_logs(vehicle_file(tmp_path / "bare.yaml"), [log])
-    assert vehicle.command_column_names == [first, second]
+    assert vehicle.command_columns == [first, second]
     assert vehicle.surfaces == {"left_elevon": {first: 1.0}, "right_elevon": {second: 1.0}}
     assert lines == [
         f"{log}: surface {i} is the {side} elevon: CA_SV_CS{i}_TYPE {5 + i}"
@@ -359,7 +359,7 @@ def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
     vehicle, _ = load_vehicle_for_logs(
         vehicle_file(tmp_path / "own.yaml", surfaces={"mine": {first: 0.3, second: -0.2}}), [log]
     )
-    assert (vehicle.command_column_names, vehicle.surfaces) == (
+    assert (vehicle.command_columns, vehicle.surfaces) == (
         [first, second],
         {"mine": {first: 0.3, second: -0.2}},
     )

@@ -93,7 +93,7 @@ def test_what_is_just_allowed_of_delays_and_covariances(tmp_path):
     settings = {"delays_s": [-0.05, 0.05]}
     noise = [[2e-12, 0, 0], [0, 1, 0], [0, 0, 1.9]]
     found = load_model(written(tmp_path, (("settings",), settings), (("noise",), noise)))
-    assert (list(found.settings.command_delay_offset_candidates_s), found.residual_covariance[0][0]) == (
+    assert (list(found.settings.command_delays_s), found.residual_covariance[0][0]) == (
         [-0.05, 0.05],
         2e-12,
     )

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.diagnose import _withdraw_contradicted_isolation, diagnose, standardized_healthy_residual
-from beaver_ftc_logs.regression import unexplained_rates_and_responses
+from beaver_ftc_logs.diagnose import _withdraw_contradicted, diagnose, healthy_residual
+from beaver_ftc_logs.regression import unexplained_rates
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
@@ -28,7 +28,7 @@ def biased(wing, wing_folder):
 def named(biased, wing_model, name):
     rows = diagnose(biased, wing_model)
     given = replace(rows, isolated_surfaces=np.full(len(rows.t_s), name, dtype=object))
-    return _withdraw_contradicted_isolation(biased, wing_model, given, 12.0)
+    return _withdraw_contradicted(biased, wing_model, given, 12.0)
 
 
 def test_the_other_surface_is_taken_back_and_its_bounds_with_it(biased, wing_model):
@@ -46,7 +46,7 @@ def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
 
 def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):
     rest, late = (
-        standardized_healthy_residual(wing_model, *unexplained_rates_and_responses(biased, wing_model)),
+        healthy_residual(wing_model, *unexplained_rates(biased, wing_model)),
         biased.t_s > FROM_S + 1.0,
     )
     assert rest[~late][10:590].std(axis=0) == pytest.approx(1.0, abs=0.15)

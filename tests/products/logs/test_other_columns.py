@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.samples import load_flights_for_fit
-from beaver_ftc_logs.trust import central_ranges, groups_with_reversed_gain, refuse_columns_not_as_identified
+from beaver_ftc_logs.trust import central_ranges, find_reversed, refuse_columns
 from products.logs import small, synthetic
 
 
@@ -37,8 +37,8 @@ def test_a_command_of_the_other_sign_that_rests_at_the_end_is_refused(n_signal_l
     commands = flight.commands * [1.0, sign, 1.0]
     commands[800:, 1] = 0.0
     log = replace(flight, commands=commands)
-    refuse_columns_not_as_identified(log, model)
-    assert groups_with_reversed_gain(log, model) == ([["elevator"]] if sign < 0.0 else [])
+    refuse_columns(log, model)
+    assert find_reversed(log, model) == ([["elevator"]] if sign < 0.0 else [])
     if sign > 0.0:
         assert diagnose(log, model).has_credible_alarm() == (left < 1.0)
         return
@@ -52,7 +52,7 @@ def test_a_lost_surface_that_seems_to_answer_a_little_the_other_way_round_has_no
 ):
     model, _ = n_signal_lags
     log = small.flight(model, n=1200, seed=10, lost=((1, 0, 1200, gain),))
-    assert groups_with_reversed_gain(log, model) == reversed_groups
+    assert find_reversed(log, model) == reversed_groups
 
 
 def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
@@ -78,7 +78,7 @@ def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder,
 @pytest.fixture(scope="module")
 def n_signal_lags():
     """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""
-    past = [*small.model(small.TAIL).lagged_rate_and_signal_coefficients[:-1], [0.3, 0.2, -0.1]]
+    past = [*small.model(small.TAIL).past_coefficients[:-1], [0.3, 0.2, -0.1]]
     model = small.model(small.TAIL, past=past)
     flight = small.flight(model, n=1200, seed=7)
     known = FittedRanges(commands=central_ranges(flight.commands), rates=central_ranges(flight.rates))
@@ -87,26 +87,24 @@ def n_signal_lags():
 
 def test_a_signal_of_the_other_sign_is_refused(n_signal_lags):
     model, flight = n_signal_lags
-    assert refuse_columns_not_as_identified(flight, model) is None
+    assert refuse_columns(flight, model) is None
     with pytest.raises(BadInput, match=r"times as likely with `scale: -1` on airspeed_m_s"):
-        refuse_columns_not_as_identified(replace(flight, signals=-flight.signals), model)
+        refuse_columns(replace(flight, signals=-flight.signals), model)
 
 
 def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(n_signal_lags):
     """A lost surface changes nothing of it."""
     model, _ = n_signal_lags
     lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
-    assert refuse_columns_not_as_identified(lost, model) is None
-    past = np.array(model.lagged_rate_and_signal_coefficients)
+    assert refuse_columns(lost, model) is None
+    past = np.array(model.past_coefficients)
     past[:3] += np.array([[0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
-    coupled = model.model_copy(update={"lagged_rate_and_signal_coefficients": past.tolist()})
+    coupled = model.model_copy(update={"past_coefficients": past.tolist()})
     idle = coupled.model_copy(update={"command_response": np.zeros_like(model.command_response).tolist()})
     flight = small.flight(idle, n=6000, seed=9)
-    assert refuse_columns_not_as_identified(flight, coupled) is None
+    assert refuse_columns(flight, coupled) is None
     with pytest.raises(BadInput, match=r"times as likely with `scale: -1` on r_rad_s"):
-        refuse_columns_not_as_identified(
-            replace(flight, rates=flight.rates * np.array([1.0, 1.0, -1.0])), coupled
-        )
+        refuse_columns(replace(flight, rates=flight.rates * np.array([1.0, 1.0, -1.0])), coupled)
 
 
 @pytest.mark.parametrize(("factor", "left", "refused"), [
@@ -123,6 +121,6 @@ def test_a_command_that_moves_far_more_and_does_hardly_anything_is_refused(
         with pytest.raises(
             BadInput, match=r"the command of elevator moves .* times as much as in the flights"
         ):
-            refuse_columns_not_as_identified(more, model)
+            refuse_columns(more, model)
     else:
-        assert refuse_columns_not_as_identified(more, model) is None
+        assert refuse_columns(more, model) is None

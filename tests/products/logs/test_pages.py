@@ -7,7 +7,7 @@ from pyarrow import parquet
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, pages
 from beaver_ftc_logs.findings import verdict_document
-from beaver_ftc_logs.fitting import FlightWithUsableRows, fit_least_squares_of_order, flights_with_usable_rows
+from beaver_ftc_logs.fitting import FitPart, fit_order, fit_parts
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.samples import Samples
 from kept import page, picture
@@ -88,7 +88,7 @@ def test_the_page_of_a_flight(changed, monkeypatch, flown, name):
 def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypatch):
     monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     ages = {"roll": 0.126, "pitch": 0.05}
-    samples = small.flight(TAIL, gap=100, mean_age_s_by_held_column=ages, notes=("a < remark",), name="a & b")
+    samples = small.flight(TAIL, gap=100, held_age_s=ages, notes=("a < remark",), name="a & b")
     rows = small.rows([(20, "", [1.0] * 3), (20, "left_aileron+right_aileron", [0.5, 1.0, 0.5])], 3)
     assert not changed(
         page(pages.render_diagnosis(samples, TAIL, rows, verdict_document(samples, TAIL, rows)))
@@ -155,21 +155,21 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):
     path = tmp_path / "page.html"
-    pages.refuse_to_replace_foreign_file(path)  # there is none
+    pages.refuse_foreign_file(path)  # there is none
     head = "<html>"
     for before, ours in (
         (0, True),
-        (2000 - len(pages.IDENTIFICATION_PAGE_MARK), True),
-        (2001 - len(pages.IDENTIFICATION_PAGE_MARK), False),
+        (2000 - len(pages.PAGE_MARK), True),
+        (2001 - len(pages.PAGE_MARK), False),
     ):
-        path.write_text((head + " " * before)[:before] + pages.IDENTIFICATION_PAGE_MARK + " " * 5000)
+        path.write_text((head + " " * before)[:before] + pages.PAGE_MARK + " " * 5000)
         if ours:
-            pages.refuse_to_replace_foreign_file(path)
+            pages.refuse_foreign_file(path)
         else:
             with pytest.raises(BadInput, match="it is no page of `identify`, allowed: another --out"):
-                pages.refuse_to_replace_foreign_file(path)
+                pages.refuse_foreign_file(path)
     with pytest.raises(BadInput, match="will not replace"):
-        pages.refuse_to_replace_foreign_file(tmp_path)
+        pages.refuse_foreign_file(tmp_path)
 
 
 IDENTIFIED = {
@@ -211,15 +211,15 @@ def test_the_page_of_an_identification(changed, monkeypatch):
 
 def test_the_pictures_of_an_identification(changed):
     model = small.model(identified=IDENTIFIED)
-    usable_flights = flights_with_usable_rows([small.flight(model, 900, lost=((1, 300, 400, 0.5),))])
+    usable_flights = fit_parts([small.flight(model, 900, lost=((1, 300, 400, 0.5),))])
     fits = pages._prediction_figure(usable_flights, model)
     assert not changed(picture(fits), part="fits")
     assert [axis.get_legend()._ncols for axis in fits.axes if axis.get_legend()] == [3, 3]
     spectrum = pages._spectrum_figure(usable_flights, model)
     assert not changed(picture(spectrum), part="spectrum")
-    fit = fit_least_squares_of_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    fit = fit_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
     names = ["constant", *regressor_names(model)]
-    correlation = pages._coefficient_correlation_figure(fit, names)
+    correlation = pages._correlation_figure(fit, names)
     assert not changed(picture(correlation), part="correlation")
 
 
@@ -229,7 +229,7 @@ def test_parts_of_which_nothing_is_known_are_not_drawn():
     flights = [small.flight(model, 200, name=name, seed=seed) for seed, name in enumerate("abcde")]
     flights[1] = changed(flights[1], labels=np.full_like(flights[1].labels, np.nan),
                          logged_failures=small.FAILURE[:1], t_s=flights[1].t_s + 100.0)  # fmt: skip
-    figure = pages._prediction_figure(flights_with_usable_rows(flights), model)
+    figure = pages._prediction_figure(fit_parts(flights), model)
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert [title for title in titles if title] == [f"{name}, not fitted: one sample ahead" for name in "acd"]
 
@@ -238,11 +238,9 @@ def test_parts_of_which_nothing_is_known_are_not_drawn():
 def test_a_picture_of_one_part_or_none(known, shown):
     model = small.model()
     flights = [small.flight(model, 200, name=str(seed), seed=seed) for seed in (1, 2)]
-    fitted, kept_part = flights_with_usable_rows(flights)
-    part = FlightWithUsableRows(
-        kept_part.samples, kept_part.is_usable if known else np.zeros(200, dtype=bool)
-    )
-    nothing = FlightWithUsableRows(fitted.samples, np.zeros(200, dtype=bool))
+    fitted, kept_part = fit_parts(flights)
+    part = FitPart(kept_part.samples, kept_part.is_usable if known else np.zeros(200, dtype=bool))
+    nothing = FitPart(fitted.samples, np.zeros(200, dtype=bool))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             fitting,
@@ -260,12 +258,12 @@ def test_the_liveliest_window():
     rates[[2, 3, 8, 9]] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
     rates[6] = np.nan
     known = np.array([0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11])
-    assert pages._first_row_of_liveliest_window(rates, known, 2) == 8
-    assert pages._first_row_of_liveliest_window(rates, known[:6], 2) == 2
-    assert pages._first_row_of_liveliest_window(rates, known, 3) == 7
-    assert pages._first_row_of_liveliest_window(rates, known, 11) == 0
-    assert pages._first_row_of_liveliest_window(rates, known, 12) == 0
-    assert pages._first_row_of_liveliest_window(rates[1:], known[:-1] - 0, 10) == 0
+    assert pages._liveliest_row(rates, known, 2) == 8
+    assert pages._liveliest_row(rates, known[:6], 2) == 2
+    assert pages._liveliest_row(rates, known, 3) == 7
+    assert pages._liveliest_row(rates, known, 11) == 0
+    assert pages._liveliest_row(rates, known, 12) == 0
+    assert pages._liveliest_row(rates[1:], known[:-1] - 0, 10) == 0
 
 
 def test_a_prediction_is_shown_over_forty_seconds():
@@ -273,7 +271,7 @@ def test_a_prediction_is_shown_over_forty_seconds():
     model = small.model()
     samples = small.flight(model, 1200, lost=())
     samples.rates[150:200] *= 5.0
-    figure = pages._prediction_figure(flights_with_usable_rows([samples]), model)
+    figure = pages._prediction_figure(fit_parts([samples]), model)
     axis = figure.axes[0]
     t_s = axis.lines[0].get_xdata()
     assert t_s[-1] - t_s[0] <= 40.0 + 1e-9
@@ -284,7 +282,7 @@ def test_no_line_is_drawn_over_what_is_not_known():
     """Around both edges of a label 1.5 s are not; before them and after are."""
     model = small.model()
     samples = small.flight(model, 900, lost=((1, 300, 400, 0.5),))
-    usable_flights = flights_with_usable_rows([samples])
+    usable_flights = fit_parts([samples])
     second = pages._prediction_figure(usable_flights, model).axes[3]
     assert "first half" in second.get_title(loc="left")
     for line in second.lines:
@@ -296,7 +294,7 @@ def test_no_line_is_drawn_over_what_is_not_known():
 
 def test_a_spectrum_has_lines_within_the_decades_too():
     flights = [small.flight(small.model(), 600)]
-    figure = pages._spectrum_figure(flights_with_usable_rows(flights), small.model())
+    figure = pages._spectrum_figure(fit_parts(flights), small.model())
     ((axis,), fine) = figure.axes, figure.axes[0].xaxis.get_minor_ticks()
     assert axis.get_xscale() == "log"
     assert fine

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import fitting, trust
-from beaver_ftc_logs.fitting import FlightWithUsableRows
-from beaver_ftc_logs.regression import RateRegression, ordinary_least_squares, unexplained_rates_and_responses
+from beaver_ftc_logs.fitting import FitPart
+from beaver_ftc_logs.regression import Regression, fit_ols, unexplained_rates
 from products.logs import small
 from telling import apart
 
@@ -40,15 +40,13 @@ def flown(gains=(0.8, 1.25), loud=1.0, n=150, seed=5, **changes):
     flight = small.flight(small.model(noise=(loud * NOISE).tolist()), n, lost, seed=seed, gap=60)
     use = ~np.isin(np.arange(n), [3, 40, 41, n - 1])
     commands = flight.commands / np.array(gains)
-    return FlightWithUsableRows(
-        replace(flight, commands=commands, noise_ma_coefficients=COLOUR, **changes), use
-    )
+    return FitPart(replace(flight, commands=commands, noise_ma_coefficients=COLOUR, **changes), use)
 
 
 def in_white(of, model=MODEL):
     """Places, residual and answers of a flight, less what those of the two samples before foretell, in sd of
     the noise: by its symmetric root."""
-    ok, left, answers = unexplained_rates_and_responses(of.samples, model, scales_by_labels=True)
+    ok, left, answers = unexplained_rates(of.samples, model, labelled=True)
     rest = left - np.array(model.intercept) - answers.sum(axis=1)
     places = [k for k in np.flatnonzero(of.is_usable) if k > 1 and ok[k - 2 : k + 1].all()]
     size, turn = np.linalg.eigh(WIDER * HEARD)
@@ -77,18 +75,18 @@ def test_how_far_gains_are_from_one_beyond_what_the_noise_allows(loud):
     size = max(rest.var(axis=0).mean(), 1.0)
     gains, covariance = gains_and_covariance(rest, answers)
     both = np.maximum(gains**2 - size * np.diag(covariance), 0.0)
-    found = fitting._squared_group_gain_deviations_beyond_noise(known(MODEL, 0.3, 0.4), one)
+    found = fitting._squared_deviations(known(MODEL, 0.3, 0.4), one)
     np.testing.assert_allclose(found, both, rtol=1e-7)
     assert both[0] > 0.01 > both[1] == 0.0
     gains, covariance = gains_and_covariance(rest, answers[:, 1:])
-    found = fitting._squared_group_gain_deviations_beyond_noise(known(MODEL, 0.99, 0.4), one)
+    found = fitting._squared_deviations(known(MODEL, 0.99, 0.4), one)
     assert np.isnan(found[0])
     assert found[1] == pytest.approx(max(gains[0] ** 2 - size * covariance[0, 0], 0.0), abs=1e-12)
     still = replace(one.samples, commands=one.samples.commands * [0.0, 1.0])
-    found = fitting._squared_group_gain_deviations_beyond_noise(MODEL, replace(one, samples=still))
+    found = fitting._squared_deviations(MODEL, replace(one, samples=still))
     assert np.isnan(found).tolist() == [True, False]
     nothing = replace(one, is_usable=np.zeros(150, dtype=bool))
-    found = fitting._squared_group_gain_deviations_beyond_noise(MODEL, nothing)
+    found = fitting._squared_deviations(MODEL, nothing)
     assert np.isnan(found).tolist() == [True, True]
 
 
@@ -110,7 +108,7 @@ def test_a_gain_is_misread_by_as_much_as_the_past_of_the_residual_explains(monke
     asked = []
     monkeypatch.setattr(
         trust,
-        "effect_power_unexplained_by_other_regressors",
+        "untied_power",
         lambda used, model: asked.append(used) or np.array([2.5, 60.0]),
     )
     apart_by_colour = {}
@@ -118,7 +116,7 @@ def test_a_gain_is_misread_by_as_much_as_the_past_of_the_residual_explains(monke
         rest = []
         for one in flights:
             if one.samples.noise_ma_coefficients == colour:
-                ok, left, answers = unexplained_rates_and_responses(one.samples, MODEL, True)
+                ok, left, answers = unexplained_rates(one.samples, MODEL, True)
                 rest += list((left - MODEL.intercept - answers.sum(axis=1))[one.is_usable & ok])
         apart_by_colour[colour] = np.cov(np.array(rest).T), len(rest)
     for share_by_colour in ((0.6, 0.2), (0.2, 0.25), (0.1, 0.05)):
@@ -132,10 +130,10 @@ def test_a_gain_is_misread_by_as_much_as_the_past_of_the_residual_explains(monke
         n = apart_by_colour[COLOUR][1]
         share = max(share_by_colour[0] - 60.0 / n, share_by_colour[1], 0.0)
         expected = np.minimum(np.sqrt(3.0 * share / np.array([2.5, 60.0])), 0.33)
-        np.testing.assert_allclose(fitting._max_gain_bias_under_one_law(flights, model), expected)
+        np.testing.assert_allclose(fitting._max_gain_bias(flights, model), expected)
     assert [[one.samples for one in flights]] * 3 == [[samples for samples, _ in used] for used in asked]
     bare = small.model()
-    assert fitting._max_gain_bias_under_one_law(flights, bare).tolist() == [0.0, 0.0]
+    assert fitting._max_gain_bias(flights, bare).tolist() == [0.0, 0.0]
     assert len(asked) == 3
 
 
@@ -148,16 +146,16 @@ def test_the_squares_of_gains_are_in_their_covariance_and_what_lies_between_flig
     between = root @ root.T
     gains = np.linalg.lstsq(responses, residual, rcond=None)[0]
     spread = np.linalg.inv(responses.T @ responses) + between
-    found, n = fitting._normalized_squared_gain_error_and_rank(responses, residual, between)
+    found, n = fitting._error_and_rank(responses, residual, between)
     assert (found, n) == (pytest.approx(gains @ np.linalg.solve(spread, gains)), 3)
-    some, n = fitting._normalized_squared_gain_error_and_rank(responses[:, :2], residual, between[:2, :2])
+    some, n = fitting._error_and_rank(responses[:, :2], residual, between[:2, :2])
     idle = responses * [1.0, 1.0, 0.0]
-    assert fitting._normalized_squared_gain_error_and_rank(idle, residual, between) == (
+    assert fitting._error_and_rank(idle, residual, between) == (
         pytest.approx(some), n,
     )  # fmt: skip
     assert n == 2
     twice = np.column_stack([responses[:, 0], responses[:, 0]])
-    assert fitting._normalized_squared_gain_error_and_rank(twice, residual, between[:2, :2])[1] == 1
+    assert fitting._error_and_rank(twice, residual, between[:2, :2])[1] == 1
 
 
 @pytest.fixture
@@ -168,12 +166,8 @@ def two_folds(monkeypatch):
     idle = replace(idle, is_usable=np.zeros(90, dtype=bool))
     folds = [(known(MODEL, 0.3, 0.4), [one, idle, other]), (known(MODEL, 0.99, 0.4), [last])]
     asked = []
-    monkeypatch.setattr(
-        fitting, "_fold_models_and_held_out_flights", lambda *of: asked.append(of[2]) or folds
-    )
-    monkeypatch.setattr(
-        trust, "effect_share_explained_by_other_regressors", lambda used, model: np.array([0.31, 0.42])
-    )
+    monkeypatch.setattr(fitting, "_folds", lambda *of: asked.append(of[2]) or folds)
+    monkeypatch.setattr(trust, "tied_shares", lambda used, model: np.array([0.31, 0.42]))
     return folds, asked
 
 
@@ -183,10 +177,10 @@ def test_gains_of_parts_left_out_are_counted_over_all_of_them(monkeypatch, two_f
     given, told = [], iter([(5.0, 2), (7.0, 1), (11.0, 1)])
     monkeypatch.setattr(
         fitting,
-        "_normalized_squared_gain_error_and_rank",
+        "_error_and_rank",
         lambda *of: given.append(of) or next(told),
     )
-    found = fitting.gain_error_overdispersion(folds[0][1], MODEL)
+    found = fitting.gain_overdispersion(folds[0][1], MODEL)
     assert found == pytest.approx((2.0 + 5.0 + 7.0 + 11.0) / (2.0 + 2.0 + 1.0 + 1.0))
     assert asked == [[0.31, 0.42]]
     flights = [(model, one) for model, several in folds for one in several if one.is_usable.any()]
@@ -209,13 +203,13 @@ def test_noise_is_as_much_wider_as_the_gains_of_ten_seconds_are_farther_off(monk
     told = iter([(90.0, 6), (8000.0, 4), (30.0, 5), (12.0, 0), (2.0, 1)])
     monkeypatch.setattr(
         fitting,
-        "_normalized_squared_gain_error_and_rank",
+        "_error_and_rank",
         lambda *of: given.append(of) or next(told),
     )
-    model = fitting._with_noise_inflated_for_gain_errors([one for _, of in folds for one in of], MODEL)
+    model = fitting._with_inflated_noise([one for _, of in folds for one in of], MODEL)
     sizes = [15.0, 200.0, 6.0, 12.0, 2.0]
-    assert model.covariance_inflation_of_noise_model(COLOUR) == pytest.approx(np.mean(sizes))
-    assert model.covariance_inflation_of_noise_model((1.0, 0.3)) == 1.0
+    assert model.inflation_of(COLOUR) == pytest.approx(np.mean(sizes))
+    assert model.inflation_of((1.0, 0.3)) == 1.0
     assert asked == [[0.31, 0.42]]
     windows = []
     for fold, several in folds:
@@ -238,17 +232,17 @@ def test_noise_is_as_much_wider_as_the_gains_of_ten_seconds_are_farther_off(monk
 
 
 def test_each_flight_is_left_out_once_of_many_every_twelfth():
-    flights = [FlightWithUsableRows(small.flight(MODEL, 9), np.ones(9, dtype=bool)) for _ in range(14)]
+    flights = [FitPart(small.flight(MODEL, 9), np.ones(9, dtype=bool)) for _ in range(14)]
     name = {id(one): i for i, one in enumerate(flights)}
     found = [
         ([name[id(one)] for one in fitted], [name[id(one)] for one in left_out])
-        for fitted, left_out in fitting._fitted_and_held_out_by_split(flights)
+        for fitted, left_out in fitting._splits(flights)
     ]
     lots = [[0, 12], [1, 13], *([i] for i in range(2, 12))]
     assert found == [([i for i in range(14) if i not in lot], lot) for lot in lots]
-    few = fitting._fitted_and_held_out_by_split(flights[:2])
+    few = fitting._splits(flights[:2])
     assert [[name[id(one)] for one in part] for split in few for part in split] == [[1], [0], [0], [1]]
-    (half, (other,)), (again, (first,)) = fitting._fitted_and_held_out_by_split(flights[:1])
+    (half, (other,)), (again, (first,)) = fitting._splits(flights[:1])
     assert (half, again) == ([first], [other])
     assert np.flatnonzero(first.is_usable).tolist() == [0, 1, 2, 3]
 
@@ -259,7 +253,7 @@ def regression_by_hand(rows):
     root = rng.uniform(-1.0, 1.0, (rows, rows)) + 2.0 * np.eye(rows)
     covariance = root @ root.T
     size = np.sqrt(np.diag(covariance))
-    return RateRegression(
+    return Regression(
         coefficients=rng.uniform(0.2, 0.9, (rows, 3)) * rng.choice([-1.0, 1.0], (rows, 3)),
         residual_covariance=NOISE,
         standard_errors=rng.uniform(0.02, 0.06, (rows, 3)),
@@ -274,7 +268,7 @@ def test_the_error_of_a_gain_follows_from_those_of_its_response(of, other_laws):
     """Of its sum over lags along itself, in sd of the noise; of laws unlike those seen the factor of the
     whole response, by the information of every axis."""
     model = small.model(of | {"other_laws": other_laws})
-    first = 1 + len(model.lagged_rate_and_signal_coefficients)
+    first = 1 + len(model.past_coefficients)
     fit = regression_by_hand(first + 6)
     sd, errors = np.sqrt(np.diag(NOISE)), []
     for group in range(2):
@@ -291,21 +285,21 @@ def test_the_error_of_a_gain_follows_from_those_of_its_response(of, other_laws):
             information += answer @ np.linalg.solve(covariance, answer)
         errors.append(information**-0.5 if other_laws else np.sqrt(variance) / (total @ total))
     assert max(errors) < 0.33
-    np.testing.assert_allclose(fitting.group_gain_standard_error(fit, model), errors, rtol=1e-7)
+    np.testing.assert_allclose(fitting.group_gain_sd(fit, model), errors, rtol=1e-7)
     loose = replace(fit, standard_errors=100.0 * fit.standard_errors)
-    assert fitting.group_gain_standard_error(loose, model).tolist() == [0.33, 0.33]
+    assert fitting.group_gain_sd(loose, model).tolist() == [0.33, 0.33]
 
 
 def test_a_fold_has_the_errors_of_its_own_fit_and_what_is_tied_in_all_flights():
-    flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300, seed=seed) for seed in (1, 2)])
+    flights = fitting.fit_parts([small.flight(MODEL, 300, seed=seed) for seed in (1, 2)])
     model = small.model()
-    folds = [*fitting._fold_models_and_held_out_flights(flights, model, [0.31, 0.42])]
+    folds = [*fitting._folds(flights, model, [0.31, 0.42])]
     for (fold, left_out), fitted, held in zip(folds, flights[::-1], flights, strict=True):
         assert left_out == [held]
-        fit = fitting.fit_least_squares_of_order([fitted], model.vehicle, 2, 3)
-        errors = fitting.group_gain_standard_error(fit, model)
-        assert fold.fitted_ranges.group_gain_standard_error == errors.tolist()
-        assert fold.fitted_ranges.effect_share_explained_by_other_regressors == [0.31, 0.42]
+        fit = fitting.fit_order([fitted], model.vehicle, 2, 3)
+        errors = fitting.group_gain_sd(fit, model)
+        assert fold.fitted_ranges.group_gain_sd == errors.tolist()
+        assert fold.fitted_ranges.tied_shares == [0.31, 0.42]
         assert fold.intercept == fit.coefficients[0].tolist()
         assert fold.settings == model.settings
 
@@ -315,14 +309,14 @@ def test_a_model_fitted_again_keeps_how_much_wider_each_colour_is():
     flights = []
     for seed, colour in ((1, COLOUR), (2, (1.0, 0.5))):
         flight = replace(small.flight(MODEL, 400, seed=seed), noise_ma_coefficients=colour)
-        flights.append(FlightWithUsableRows(flight, np.arange(400) % 97 != 50))
-    again = fitting.fit_with_same_order(flights, MODEL)
+        flights.append(FitPart(flight, np.arange(400) % 97 != 50))
+    again = fitting.refit(flights, MODEL)
     by_colour = {tuple(one.ma_coefficients): one for one in again.noise_models}
     assert {colour: one.covariance_inflation for colour, one in by_colour.items()} == {
         COLOUR: WIDER, (1.0, 0.5): 1.0,
     }  # fmt: skip
     for one in flights:
-        _, rest = fitting.rows_and_one_step_residuals(again, one)
+        _, rest = fitting.one_step_residual(again, one)
         found = np.array(by_colour[one.samples.noise_ma_coefficients].residual_covariance)
         np.testing.assert_allclose(found, np.cov(rest.T), rtol=1e-9)
 
@@ -362,16 +356,16 @@ def test_the_drift_of_a_trim_from_means_that_follow_one_another(monkeypatch):
         for _ in range(2)
     ]
     sd = np.sqrt(WIDER * np.diag(HEARD))
-    flights = [FlightWithUsableRows(flown(n=9 + i).samples, np.ones(9 + i, dtype=bool)) for i in range(2)]
+    flights = [FitPart(flown(n=9 + i).samples, np.ones(9 + i, dtype=bool)) for i in range(2)]
     monkeypatch.setattr(
         fitting,
-        "_fitted_and_held_out_by_split",
+        "_splits",
         lambda of: [([flights[1]], [flights[0]]), ([flights[0]], [flights[1]])],
     )
-    monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
+    monkeypatch.setattr(fitting, "refit", lambda fitted, like: like)
     monkeypatch.setattr(
         fitting,
-        "rows_whitened_residual_and_responses",
+        "whitened_residual",
         lambda like, held: (rows, series[0 if held is flights[0] else 1], None),
     )
     variance = {}
@@ -386,13 +380,13 @@ def test_the_drift_of_a_trim_from_means_that_follow_one_another(monkeypatch):
     # 2 c / n + 2 n w / 3 of both, less one another
     walk = 1.5 * (80 * variance[80] - 20 * variance[20]) / (80**2 - 20**2)
     usual = [1e-4, 3e-4, 2e-4]
-    monkeypatch.setattr(fitting, "FilterSettings", lambda: SimpleNamespace(trim_walk_sd_per_sample=usual))
+    monkeypatch.setattr(fitting, "FilterSettings", lambda: SimpleNamespace(trim_step_sd=usual))
     expected = np.maximum(np.sqrt(np.maximum(walk, 0.0)), usual)
     assert (expected[[0, 2]] > [1e-2, 1e-2]).all()
     assert expected[1] == 3e-4
-    np.testing.assert_allclose(fitting._estimate_trim_walk_sd_per_sample(flights, MODEL), expected)
+    np.testing.assert_allclose(fitting._estimate_trim_walk(flights, MODEL), expected)
     rows, series = rows[:100], [one[:100] for one in series]  # no mean of 80 follows another
-    assert fitting._estimate_trim_walk_sd_per_sample(flights, MODEL) == usual
+    assert fitting._estimate_trim_walk(flights, MODEL) == usual
 
 
 def test_a_part_left_out_is_read_wrongly_by_its_rows_in_use(monkeypatch):
@@ -401,10 +395,10 @@ def test_a_part_left_out_is_read_wrongly_by_its_rows_in_use(monkeypatch):
     told = iter([{"a": -0.2, "b": 0.4, "c": 0.3}, {"a": -0.2}, {}])
     monkeypatch.setattr(
         trust,
-        "min_log_likelihood_gains_and_part_size",
+        "mistake_gains",
         lambda samples, model: given.append((samples, model)) or (next(told), 7.0),
     )
-    found = [fitting._max_column_mistake_log_likelihood_gain(MODEL, one) for _ in range(3)]
+    found = [fitting._misread_gain(MODEL, one) for _ in range(3)]
     assert found == [0.4, 0.0, 0.0]
     samples, model = given[0]
     np.testing.assert_array_equal(samples.rates, np.where(one.is_usable[:, None], one.samples.rates, np.nan))
@@ -421,20 +415,18 @@ def test_peaks_and_hours_are_of_rows_in_health_that_answer(monkeypatch):
     posterior = np.tile([0.6, 0.1, 0.3], (n, 1))
     posterior[9] = 0.3, 0.2, 0.5
     bank = SimpleNamespace(no_response_hypothesis_index=2)
-    monkeypatch.setattr(fitting, "build_hypothesis_bank", lambda model: bank)
-    monkeypatch.setattr(fitting, "hypothesis_state_and_noise_posterior", lambda *of: (posterior, None, None))
-    monkeypatch.setattr(fitting, "any_fault_log_odds_gains", lambda of, by: gained)
+    monkeypatch.setattr(fitting, "build_bank", lambda model: bank)
+    monkeypatch.setattr(fitting, "bank_posterior", lambda *of: (posterior, None, None))
+    monkeypatch.setattr(fitting, "fault_evidence", lambda of, by: gained)
     samples = SimpleNamespace(labels=labels, dt_s=1.5)
-    peaks, hours = fitting._healthy_alarm_peaks_and_hours(
-        MODEL, SimpleNamespace(samples=samples, is_usable=use)
-    )
+    peaks, hours = fitting._healthy_peaks(MODEL, SimpleNamespace(samples=samples, is_usable=use))
     # rows 1; 3, 4, 5, 6; 8; 10, 11
     assert peaks.tolist() == [2.0, 8.0, 48.0, 128.0, 1536.0]
     assert hours == pytest.approx(8 * 1.5 / 3600.0)
 
 
 def test_what_is_computed_once_is_of_these_flights_and_this_question():
-    first, second, third = flights = fitting.flights_with_usable_rows(
+    first, second, third = flights = fitting.fit_parts(
         [small.flight(MODEL, 160, seed=seed) for seed in (1, 2, 3)]
     )
     its, bare = small.vehicle(), small.vehicle(labels={})
@@ -442,12 +434,12 @@ def test_what_is_computed_once_is_of_these_flights_and_this_question():
         (flights, its, 2, 3), ([first, second], its, 2, 3), ([first, third], its, 2, 3),
         (flights, bare, 2, 3), (flights, its, 1, 3), (flights, its, 2, 2),
     ]  # fmt: skip
-    fits = [fitting.fit_least_squares_of_order(*of) for of in asked]
-    models = [fitting._fit_model_of_order(*of) for of in asked]
+    fits = [fitting.fit_order(*of) for of in asked]
+    models = [fitting._model_of_order(*of) for of in asked]
     assert len({*map(id, fits)}) == len({*map(id, models)}) == 6
     for of, fit, model in zip(asked, fits, models, strict=True):
-        assert fitting.fit_least_squares_of_order(*of) is fit
-        assert fitting._fit_model_of_order(*of) is model
+        assert fitting.fit_order(*of) is fit
+        assert fitting._model_of_order(*of) is model
         assert model.intercept == fit.coefficients[0].tolist()
         assert (model.vehicle, model.n_rate_lags, model.n_command_lags) == of[1:]
     halves = fitting.validation_folds([first])
@@ -456,18 +448,18 @@ def test_what_is_computed_once_is_of_these_flights_and_this_question():
 
 def test_a_flight_weighs_in_a_fit_by_its_weight_and_time_is_that_of_most_flights():
     one, other, slow = (small.flight(MODEL, n, seed=n) for n in (150, 170, 160))
-    flights = fitting.flights_with_usable_rows(
+    flights = fitting.fit_parts(
         [replace(one, fit_weight=0.3), replace(other, dt_s=0.125), replace(slow, dt_s=0.4)]
     )
-    x, y, run = fitting.stacked_regression_data(flights, MODEL.vehicle, 2, 3)
-    bare = fitting.flights_with_usable_rows([one])
-    plain, rates, _ = fitting.stacked_regression_data(bare, MODEL.vehicle, 2, 3)
+    x, y, run = fitting.stack_data(flights, MODEL.vehicle, 2, 3)
+    bare = fitting.fit_parts([one])
+    plain, rates, _ = fitting.stack_data(bare, MODEL.vehicle, 2, 3)
     np.testing.assert_allclose(x[: len(plain)], 0.3 * plain)
     np.testing.assert_allclose(y[: len(plain)], 0.3 * rates)
-    model = fitting._fit_model_of_order(flights, MODEL.vehicle, 2, 3)
+    model = fitting._model_of_order(flights, MODEL.vehicle, 2, 3)
     assert model.rate_hz == 8.0
-    errors = ordinary_least_squares(x, y, run, 16).standard_errors[7:]  # over two seconds of them
-    assert model.command_response_standard_error == errors.reshape(2, 3, 3).tolist()
+    errors = fit_ols(x, y, run, 16).standard_errors[7:]  # over two seconds of them
+    assert model.response_error == errors.reshape(2, 3, 3).tolist()
 
 
 @pytest.mark.parametrize("laws", [False, True])
@@ -475,10 +467,10 @@ def test_a_flight_that_fails_at_once_leaves_nothing_out(laws):
     """Of three flights one has no sample that is known: the settings are those of the other two."""
     vehicle = small.vehicle(small.TAIL | {"other_laws": laws})
     like = small.model(small.TAIL)
-    flights = fitting.flights_with_usable_rows([small.flight(like, 300, seed=seed) for seed in (1, 2)])
-    idle = FlightWithUsableRows(small.flight(like, 200, seed=3), np.zeros(200, dtype=bool))
+    flights = fitting.fit_parts([small.flight(like, 300, seed=seed) for seed in (1, 2)])
+    idle = FitPart(small.flight(like, 200, seed=3), np.zeros(200, dtype=bool))
     found, expected = (
-        fitting.gain_error_overdispersion(of, fitting._fit_model_of_order(of, vehicle, 2, 3))
+        fitting.gain_overdispersion(of, fitting._model_of_order(of, vehicle, 2, 3))
         for of in ([*flights, idle], flights)
     )
     assert found == pytest.approx(expected)
@@ -508,23 +500,23 @@ TOGETHER = small.TAIL | {
 def test_settings_are_by_law_and_air_and_by_what_labels_say(monkeypatch, laws, air, most):
     """Of surfaces that move together no label says which has lost: their levels count for nothing."""
     walk, asked = [1e-3, 2e-3, 3e-3], []
-    monkeypatch.setattr(fitting, "_estimate_trim_walk_sd_per_sample", lambda of, model: walk)
+    monkeypatch.setattr(fitting, "_estimate_trim_walk", lambda of, model: walk)
     told = iter([1.0, 4.0])
     monkeypatch.setattr(
-        fitting, "gain_error_overdispersion", lambda of, model: asked.append(model.settings) or next(told)
+        fitting, "gain_overdispersion", lambda of, model: asked.append(model.settings) or next(told)
     )
     flags = {"other_laws": laws, "moving_air": air}
     model = small.model(TOGETHER | flags)
     more = (LAWS | (AIR if air else {})) if laws else {}
     delays = {"delays_s": [0.0] if air else pytest.approx([-0.04, 0.0, 0.04])}
     usual = fitting.FilterSettings().model_dump(by_alias=True)
-    bare = fitting.flights_with_usable_rows([small.flight(small.model(small.TAIL | {"signals": []}), 120)])
+    bare = fitting.fit_parts([small.flight(small.model(small.TAIL | {"signals": []}), 120)])
     for power in (most, 0.25):
         found = fitting.estimate_filter_settings(bare, model).model_dump(by_alias=True)
         assert found == usual | more | delays | {"trim_walk": walk, "power": power}
     assert [one.model_dump(by_alias=True) for one in asked] == [usual | more | {"trim_walk": walk}] * 2
     flight = small.flight(model, 300, lost=((0, 80, 140, 0.3), (1, 180, 240, 0.6)))
-    labelled = fitting.flights_with_usable_rows([flight])
+    labelled = fitting.fit_parts([flight])
     found = fitting.estimate_filter_settings(labelled, model).model_dump(by_alias=True)
     hours = labelled[0].is_usable.sum() / 36000.0
     assert found == usual | DAYS | more | delays | {
@@ -550,21 +542,19 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     used = [SimpleNamespace(samples=f"flight {i}", is_usable=f"rows {i}") for i in range(flights)]
     folds, given = [("one", [1, 2]), ("other", [3])], {}
     stubs = {
-        "_fold_models_and_held_out_flights": lambda of, model, tied: given.update(tied=tied) or folds,
-        "_healthy_alarm_peaks_and_hours": lambda model, one: (np.array([7.0 * one]), one / 60.0),
-        "_max_column_mistake_log_likelihood_gain": lambda model, one: 0.1 * one,
-        "_squared_group_gain_deviations_beyond_noise": lambda model, one: one * np.array([0.01, 0.02]),
-        "_max_gain_bias_under_one_law": lambda of, model: np.array([0.1, 0.2]),
-        "fit_least_squares_of_order": lambda *of: of[2:],
-        "group_gain_standard_error": lambda fit, model: np.array([0.05, 0.3]),
-        "_choose_alarm_threshold": lambda tail, rate, model: (tail, rate),
-        "_cross_validate_alarm_threshold": lambda parts, rate, model: {"parts": len(parts), "rate": rate},
+        "_folds": lambda of, model, tied: given.update(tied=tied) or folds,
+        "_healthy_peaks": lambda model, one: (np.array([7.0 * one]), one / 60.0),
+        "_misread_gain": lambda model, one: 0.1 * one,
+        "_squared_deviations": lambda model, one: one * np.array([0.01, 0.02]),
+        "_max_gain_bias": lambda of, model: np.array([0.1, 0.2]),
+        "fit_order": lambda *of: of[2:],
+        "group_gain_sd": lambda fit, model: np.array([0.05, 0.3]),
+        "_choose_threshold": lambda tail, rate, model: (tail, rate),
+        "_cross_validate": lambda parts, rate, model: {"parts": len(parts), "rate": rate},
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(fitting, name, stub)
-    monkeypatch.setattr(
-        trust, "effect_share_explained_by_other_regressors", lambda of, model: np.array([0.3, 0.4])
-    )
+    monkeypatch.setattr(trust, "tied_shares", lambda of, model: np.array([0.3, 0.4]))
     bare = trust.FittedRanges(commands=[], rates=[])
     monkeypatch.setattr(
         trust,
@@ -573,9 +563,9 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     )
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: given.update(parts=parts) or tail)
     model = small.model(small.WING | {"other_laws": laws, "false_alarms_per_hour": asked})
-    settings = model.settings.model_copy(update={"likely_effectiveness_levels_by_group": levels})
+    settings = model.settings.model_copy(update={"likely_levels": levels})
     model = model.model_copy(update={"settings": settings})
-    found = fitting.add_fitted_ranges_and_alarm_threshold(used, model)
+    found = fitting.add_ranges_and_threshold(used, model)
     expected = np.minimum(np.sqrt(np.array([0.0025, 0.09]) + wide), 0.33)
     np.testing.assert_allclose(given["errors"], expected)
     assert given["of"] == [(one.samples, one.is_usable) for one in used]
@@ -585,7 +575,7 @@ def test_what_is_known_of_other_laws_widens_gains_and_sets_the_alarm(
     ]
     ranges = found.fitted_ranges
     assert ranges.alarm_peak_tail == tail
-    assert ranges.max_column_mistake_log_likelihood_gain == pytest.approx(0.3)
+    assert ranges.misread_gain == pytest.approx(0.3)
     threshold = (tail, aimed) if aimed else None
     assert found.settings == settings.model_copy(
         update={"false_alarms_per_hour": aimed, "alarm_threshold": threshold}
@@ -597,11 +587,11 @@ def test_a_fit_may_misread_an_effect_by_what_its_noise_model_foretells():
     """By hand: the root of the lacking power over that of the effect, axes weighed as least squares does."""
     one, other = flown(seed=5), flown(seed=6, gains=(0.4, 1.0))
     noise = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
-    rest = np.vstack([fitting.rows_and_one_step_residuals(MODEL, flight)[1] for flight in (one, other)])
-    answers = [fitting.rows_whitened_residual_and_responses(MODEL, flight)[2] for flight in (one, other)]
+    rest = np.vstack([fitting.one_step_residual(MODEL, flight)[1] for flight in (one, other)])
+    answers = [fitting.whitened_residual(MODEL, flight)[2] for flight in (one, other)]
     answers = np.vstack([each - each.mean(axis=0) for each in answers])
     lacking = [max(np.var(rest[:, axis]) / HEARD[axis, axis] - 1.0, 0.0) for axis in range(3)]
-    for group, found in enumerate(fitting.hidden_gain_errors([one, other], MODEL, noise)):
+    for group, found in enumerate(fitting.hidden_errors([one, other], MODEL, noise)):
         power = [np.mean(answers[:, group, axis] ** 2) / HEARD[axis, axis] for axis in range(3)]
         by_hand = np.sqrt(sum(q * p for q, p in zip(lacking, power, strict=True))) / sum(power)
         assert found == pytest.approx(min(by_hand, 0.33) / np.sqrt(3.0))  # the sd of anything below
@@ -613,12 +603,12 @@ def test_responses_are_usually_as_quick_as_in_nine_tenths_of_the_samples_of_a_no
     noise = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
     powers = []
     for flight in (one, other):
-        answers = fitting.rows_whitened_residual_and_responses(MODEL, flight)[2]
+        answers = fitting.whitened_residual(MODEL, flight)[2]
         last = round(0.5 * MODEL.rate_hz)
         for k, now in enumerate(answers):
             quick = now - answers[max(k + 1 - last, 0) : k + 1].mean(axis=0)
             powers.append(sum(each @ np.linalg.inv(HEARD) @ each for each in quick) / 3.0)
-    found = fitting.usual_quick_response_power([one, other], MODEL, noise)
+    found = fitting.usual_quick_power([one, other], MODEL, noise)
     assert found == pytest.approx(np.quantile(powers, 0.9))
 
 
@@ -631,9 +621,7 @@ def test_the_error_of_quick_responses_is_that_of_the_worst_flight_left_out(monke
     less. Without such a step nothing is known of it, and all of it may be missing."""
     rng, root, n = np.random.default_rng(4), np.linalg.cholesky(HEARD), 40_000
     usual = next(one for one in MODEL.noise_models if one.ma_coefficients == list(COLOUR))
-    model = MODEL.model_copy(
-        update={"noise_models": [usual.model_copy(update={"usual_quick_response_power": 4.0})]}
-    )
+    model = MODEL.model_copy(update={"noise_models": [usual.model_copy(update={"usual_quick_power": 4.0})]})
     steps = np.zeros((n, 2, 3))
     steps[:, 1, 2] = 20.0 * (np.arange(n) // 100 % 2)
     begin = np.maximum(np.arange(n) - round(0.5 * MODEL.rate_hz) + 1, 0)
@@ -647,18 +635,16 @@ def test_the_error_of_quick_responses_is_that_of_the_worst_flight_left_out(monke
 
     monkeypatch.setattr(
         fitting,
-        "rows_whitened_residual_and_responses",
+        "whitened_residual",
         lambda model, flight: rows_residual_answers(model, flight.error),
     )
-    monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, model: model)
+    monkeypatch.setattr(fitting, "refit", lambda fitted, model: model)
     flights = [
         SimpleNamespace(error=error, samples=SimpleNamespace(noise_ma_coefficients=COLOUR))
         for error in errors
     ]
-    monkeypatch.setattr(
-        fitting, "_fitted_and_held_out_by_split", lambda of: [([], [flight]) for flight in of]
-    )
-    assert fitting.quick_response_error_share(flights, model) == pytest.approx(share, abs=0.02)
+    monkeypatch.setattr(fitting, "_splits", lambda of: [([], [flight]) for flight in of])
+    assert fitting.quick_error_share(flights, model) == pytest.approx(share, abs=0.02)
 
 
 def test_a_flight_louder_than_all_that_were_fitted_widens_no_noise_under_other_laws():

@@ -31,7 +31,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (topic, field, _) in enumerate(alfa._load_column_sources_and_failure_names()["columns"].values()):
+    for i, (topic, field, _) in enumerate(alfa._alfa_names()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])
@@ -293,7 +293,7 @@ def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_fil
     ):
         t_s = np.arange(float(rows))
         path = synthetic.write_parquet(tmp_path / f"log{rows}.parquet", {"t_s": t_s, "p": 3.0 * t_s})
-        parts = [*table.read_parts(path, rows_per_part=20)]
+        parts = [*table.read_parts(path, part_rows=20)]
         names = (
             [f"log{rows}-part-{k}" for k in range(1, len(begins) + 1)] if len(begins) > 1 else [f"log{rows}"]
         )
@@ -304,7 +304,7 @@ def test_parts_of_a_stored_table_begin_a_tenth_before_and_say_the_row_in_the_fil
     t_s[40] = t_s[45] = 1.0
     path = synthetic.write_parquet(tmp_path / "back.parquet", {"t_s": t_s, "p": t_s})
     with pytest.raises(BadInput, match=r"back\.parquet: t_s: row 41: time does not increase"):
-        [*table.read_parts(path, rows_per_part=20)]
+        [*table.read_parts(path, part_rows=20)]
 
 
 def test_two_columns_of_a_name_are_refused_if_used_and_have_their_places_as_names(tmp_path):
@@ -364,7 +364,7 @@ def test_what_counts_as_a_number():
         pa.bool_(): False,
         pa.list_(pa.int8()): False,
     }
-    assert {kind: table._is_integer_or_float_type(kind) for kind in kinds} == kinds
+    assert {kind: table._is_numeric_type(kind) for kind in kinds} == kinds
 
 
 def test_columns_of_topics_count_from_the_first_stamp_of_all():
@@ -428,11 +428,11 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     assert [one.n_rows_before for one in blocks] == [
         sum(each.n_rows for each in blocks[:k]) for k in range(len(blocks))
     ]
-    assert {name: found for one in reversed(blocks) for name, found in one.text_cell_summaries.items()} == {
+    assert {name: found for one in reversed(blocks) for name, found in one.text_cells.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
-    whole = text.join_and_consume_blocks(blocks)
-    assert whole.text_cell_summaries == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
+    whole = text.join_blocks(blocks)
+    assert whole.text_cells == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
         400,
         2,
@@ -455,7 +455,7 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     parquet.write_table(pa.table(columns), path)
     monkeypatch.setattr(table, "_check_parquet_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._check_size_and_list_parquet_columns(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._parquet_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
 
 

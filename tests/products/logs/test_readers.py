@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.recording import package_errors_as_bad_input
-from beaver_ftc_logs.samples import _latest_values_and_mean_age, load_flights_for_fit
+from beaver_ftc_logs.samples import _latest_and_age, load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
@@ -42,7 +42,7 @@ def test_an_alfa_folder(tmp_path):
 def test_a_held_column_is_never_newer_than_its_row(tmp_path):
     folder = synthetic.write_alfa(tmp_path / "flight", duration_s=20.0)
     recording = read_flight(folder)
-    held, age_s = _latest_values_and_mean_age(
+    held, age_s = _latest_and_age(
         recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s
     )
     np.testing.assert_allclose(held[1:], recording.columns["roll_error_rad"].values[:-1])
@@ -102,7 +102,7 @@ def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
     columns = {name: np.sin(t_s) for name in synthetic.fly(5.0)} | {"t_s": t_s}
     samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "fast.csv", columns)], wing)[0]
     assert samples.dt_s == pytest.approx(0.05)
-    assert samples.mean_age_s_by_held_column["p_rad_s"] == pytest.approx(0.025)
+    assert samples.held_age_s["p_rad_s"] == pytest.approx(0.025)
     late = np.sin(samples.t_s - 0.02)  # five stamps, 0 to 0.04 s old
     np.testing.assert_allclose(samples.rates[5:, 0], late[5:], atol=2e-3)
 

@@ -11,9 +11,9 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.fitting import (
-    add_fitted_ranges_and_alarm_threshold,
+    add_ranges_and_threshold,
     fit_model,
-    flights_with_usable_rows,
+    fit_parts,
     validation_folds,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
@@ -31,7 +31,7 @@ def enac(real_flights):
 
 def test_halves_of_a_flying_wing(enac):
     vehicle, samples = enac
-    usable_flights = flights_with_usable_rows([samples])
+    usable_flights = fit_parts([samples])
     whole = fit_model(usable_flights, vehicle)
     for fitted, kept, _ in validation_folds(usable_flights):
         model = fit_model(fitted, vehicle, whole.settings)
@@ -45,13 +45,13 @@ def test_halves_of_a_flying_wing(enac):
 
 def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     vehicle, samples = enac
-    model = fit_model(flights_with_usable_rows([samples]), vehicle)
+    model = fit_model(fit_parts([samples]), vehicle)
     whole = diagnose(samples, model)
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
         cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
-        still_s = {name: still[:n] for name, still in samples.time_since_change_s_by_column.items()}
-        short = diagnose(replace(samples, time_since_change_s_by_column=still_s, **cut), model)
+        still_s = {name: still[:n] for name, still in samples.unchanged_s.items()}
+        short = diagnose(replace(samples, unchanged_s=still_s, **cut), model)
         assert np.array_equal(short.credible, whole.credible[:n])
         assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
         assert np.array_equal(short.fault_probability, whole.fault_probability[:n])
@@ -62,9 +62,9 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())
     flights = load_flights_for_fit(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
-    others = flights_with_usable_rows([one for one in flights if one is not kept])
-    model = add_fitted_ranges_and_alarm_threshold(others, fit_model(others, vehicle))
-    read = {*model.vehicle.command_column_names, *model.vehicle.signal_column_names}
+    others = fit_parts([one for one in flights if one is not kept])
+    model = add_ranges_and_threshold(others, fit_model(others, vehicle))
+    read = {*model.vehicle.command_columns, *model.vehicle.signal_columns}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)
     assert found["false_alarms"] == 0
@@ -75,10 +75,10 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
 def test_another_day_of_the_wing_is_read_whole_and_its_columns_are_not_doubted(enac, real_flights):
     """17 July: the wing is twisted, and the residual's variance is six times that of the model's day."""
     vehicle, trained = enac
-    model = fit_model(flights_with_usable_rows([trained]), vehicle)
+    model = fit_model(fit_parts([trained]), vehicle)
     other = load_flights_for_fit([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
     rows = diagnose(other, model)
-    assert all("nothing answers the commands" in reason for reason in rows.not_credible_rows_by_reason)
+    assert all("nothing answers the commands" in reason for reason in rows.doubtful_rows)
     assert score_against_labels(rows, other.labels)["classes"] > 0.93
     mistakes = {
         "exchanged": replace(other, commands=other.commands[:, ::-1]),

@@ -51,8 +51,8 @@ BOUNDS = {  # low and high of each row
 
 def columns_of(is_ours=True, pairs=False):
     fdi = SimpleNamespace(is_ours=is_ours, pairs=pairs)
-    rows = stepped.diagnosis_rows_from_replay(
-        0.5 * ROW, stepped.ReplayedVerdicts(SAYS, *ALONE, np.ones(4), np.ones(4)), SURFACES, fdi
+    rows = stepped.rows_of_replay(
+        0.5 * ROW, stepped.Replayed(SAYS, *ALONE, np.ones(4), np.ones(4)), SURFACES, fdi
     )
     return {name: list(values) for name, values in of.diagnosis_columns(rows, SURFACES).items()}
 
@@ -109,7 +109,7 @@ def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
     assert found.verdicts == [f"verdict {k}" for k in range(1, 7)]
     for k, sample in enumerate(shown):
         assert [part.tolist() for part in sample] == [of[k].tolist() for of in samples]
-    assert found.relative_command_gain_upper_bounds.tolist() == [1.0, 1.0]
+    assert found.command_gain_bounds.tolist() == [1.0, 1.0]
     thetas, bounded = np.linspace(-1.0, 0.0, 2001), 0
     for k in range(6):
         for s in range(2):
@@ -120,8 +120,8 @@ def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
             ends = 1.0 + thetas[explains][[0, -1]] if explains.any() else (0.0, 1.0)
             bounded += 0.0 < ends[0] < ends[1] < 1.0
             assert (
-                found.single_fault_effectiveness_low[k, s],
-                found.single_fault_effectiveness_high[k, s],
+                found.alone_low[k, s],
+                found.alone_high[k, s],
             ) == pytest.approx(ends, abs=1e-3)
     assert bounded > 2
 
@@ -149,11 +149,11 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
 
 def test_what_is_withdrawn_is_not_what_is_named():
     """The name that stands at the end, since it has stood there."""
-    assert of._last_isolation_start_and_name(T_S[:4], SAID[:4]) == (1.5, "rudder")
-    assert of._last_isolation_start_and_name(T_S[:5], SAID[:5]) == (1.5, "rudder")
-    assert of._last_isolation_start_and_name(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    assert of._last_isolation(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._last_isolation(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._last_isolation(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
     again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
-    assert of._last_isolation_start_and_name(T_S[:5], again) == (1.5, "elevator")
+    assert of._last_isolation(T_S[:5], again) == (1.5, "elevator")
 
 
 def test_a_replay_that_finds_nothing(tmp_path):
@@ -172,7 +172,7 @@ def test_a_replay_that_finds_nothing(tmp_path):
 def test_errors_of_the_flow_sensors_are_left_out():
     """Those of the gyros are in the measured rates."""
     flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
-    assert of._unreplayed_input_texts(flawed) == ["the declared errors of alpha: the log has the true value"]
+    assert of._lacking_inputs(flawed) == ["the declared errors of alpha: the log has the true value"]
 
 
 FOUND = {
@@ -210,7 +210,7 @@ def test_columns_that_a_log_must_have(tmp_path):
     with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
         of._read_columns(path, ["t_s", "c"])
     aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
-    assert stepped.log_column_names_of_each_input(aircraft) == (
+    assert stepped.input_columns(aircraft) == (
         ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
         ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
         [f"{name}_cmd_rad" for name in SURFACES],

@@ -9,7 +9,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
-from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_hypothesis_bank
+from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_bank
 from kept import in_short
 from products.logs import small
 
@@ -37,8 +37,8 @@ def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
 def test_a_condition_stands_once_it_has_held(hold_s, stands):
     model = small.model(settings={"hold_s": hold_s})
     raised = np.array([0, 1, 1, 1, 1, 0, 1, 0], dtype=bool)
-    assert diagnose._has_held_long_enough(raised, model).astype(int).tolist() == stands
-    assert diagnose._has_held_long_enough(raised[1:], model).astype(int).tolist() == stands[1:]
+    assert diagnose._held_long_enough(raised, model).astype(int).tolist() == stands
+    assert diagnose._held_long_enough(raised[1:], model).astype(int).tolist() == stands[1:]
 
 
 @pytest.mark.parametrize(("raised", "well", "alarm"), [
@@ -51,7 +51,7 @@ def test_a_condition_stands_once_it_has_held(hold_s, stands):
 ])  # fmt: skip
 def test_an_alarm_stands_until_health_is_the_likelier(raised, well, alarm):
     given = (np.array([flag == "1" for flag in flags]) for flags in (raised, well))
-    assert "".join(str(int(flag)) for flag in diagnose._latch_until_healthy(*given)) == alarm
+    assert "".join(str(int(flag)) for flag in diagnose._latched(*given)) == alarm
 
 
 LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
@@ -80,10 +80,10 @@ def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
 
 
 def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
-    bank = build_hypothesis_bank(WING)
+    bank = build_bank(WING)
     posterior = np.arange(1.0, len(bank.hypothesis_kind) + 1)[None, :] / 1000.0
     for group in (0, 1):
-        levels, mass = diagnose._group_level_distribution(
+        levels, mass = diagnose._group_levels(
             bank, posterior[:, : bank.no_response_hypothesis_index], group
         )
         assert levels.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -136,26 +136,26 @@ def held(rows):
 
 @pytest.mark.parametrize("name", SHARES)
 def test_rows_of_probabilities(changed, name):
-    bank = build_hypothesis_bank(WING)
+    bank = build_bank(WING)
     shares = posterior(bank, *SHARES[name])
     samples = small.flight(WING, len(shares))
-    found = diagnose.diagnosis_rows_from_posterior(samples, WING, bank, shares)
+    found = diagnose.rows_of_posterior(samples, WING, bank, shares)
     assert not changed(held(found))
     assert found.t_s is samples.t_s
 
 
 def test_rows_of_surfaces_together_that_may_be_stuck(changed):
-    bank = build_hypothesis_bank(TAIL)
+    bank = build_bank(TAIL)
     shares = posterior(bank, *STUCK)
     assert not changed(
-        held(diagnose.diagnosis_rows_from_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares))
+        held(diagnose.rows_of_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares))
     )
 
 
 def test_names_by_hand():
     """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
-    bank = build_hypothesis_bank(TAIL)
-    found = diagnose.diagnosis_rows_from_posterior(
+    bank = build_bank(TAIL)
+    found = diagnose.rows_of_posterior(
         small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK)
     )
     assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
@@ -179,20 +179,20 @@ def test_names_under_other_laws(monkeypatch):
     settings = WING.settings.model_copy(update={"alarm_threshold": 2.0})
     asks = settings.model_copy(
         update={
-            "isolation_to_alarm_evidence_ratio": 4.0,
-            "isolation_change_hold_s": 1.0,
-            "assumes_one_group_at_fault": True,
+            "name_evidence_ratio": 4.0,
+            "rename_hold_s": 1.0,
+            "one_faulty_group": True,
         }
     )
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "any_fault_log_odds_gains", lambda posterior, bank: gained)
+    monkeypatch.setattr(diagnose, "fault_evidence", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
 
     def named_by(of):
-        found = diagnose.diagnosis_rows_from_posterior(
+        found = diagnose.rows_of_posterior(
             small.flight(of, len(shares)), of, bank, posterior(bank, *shares)
         )
         assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
@@ -211,9 +211,9 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         given.append(of[3:])
         return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
-    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_where_engine_may_have_failed", renamed)
-    model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_energy_height_rate_mps=-1.5))
-    found = diagnose._withdraw_isolation_after_engine_failure(
+    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces", renamed)
+    model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_climb_mps=-1.5))
+    found = diagnose._withdraw_by_engine(
         SimpleNamespace(energy_height_rate_mps="climb"), model, rows
     )
     assert given[0][:2] == ("climb", -1.5)
@@ -224,10 +224,10 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         np.testing.assert_array_equal(getattr(found, name), values)
     for fitted, climb in (
         (None, "climb"),
-        (SimpleNamespace(unpowered_energy_height_rate_mps=None), "climb"),
+        (SimpleNamespace(unpowered_climb_mps=None), "climb"),
         (model.fitted_ranges, None),
     ):
-        alike = diagnose._withdraw_isolation_after_engine_failure(
+        alike = diagnose._withdraw_by_engine(
             SimpleNamespace(energy_height_rate_mps=climb), SimpleNamespace(fitted_ranges=fitted), rows
         )
         assert alike is rows
@@ -239,7 +239,7 @@ def test_rows_at_the_stamps_of_a_faster_log():
         [(1, "", [1.0, 1.0]), (1, "left", [1.0, 0.5]), (1, "right", [0.4, 1.0])]
     )  # at 10, 10.5, 11
     samples = small.flight(WING, 3, log_stamps_s=np.array([9.0, 10.0, 10.4, 10.5, 10.9, 11.0, 20.0]))
-    found = diagnose._rows_at_log_stamps(samples, rows)
+    found = diagnose._at_log_stamps(samples, rows)
     last = [0, 0, 0, 1, 1, 2, 2]
     np.testing.assert_array_equal(found.t_s, samples.log_stamps_s)
     for name in (
@@ -252,9 +252,9 @@ def test_rows_at_the_stamps_of_a_faster_log():
     ):
         np.testing.assert_array_equal(getattr(found, name), getattr(rows, name)[last])
     same = small.flight(WING, 3, log_stamps_s=rows.t_s)
-    assert diagnose._rows_at_log_stamps(same, rows) is rows
+    assert diagnose._at_log_stamps(same, rows) is rows
     late = replace(same, log_stamps_s=rows.t_s + 0.1)
-    np.testing.assert_array_equal(diagnose._rows_at_log_stamps(late, rows).t_s, rows.t_s + 0.1)
+    np.testing.assert_array_equal(diagnose._at_log_stamps(late, rows).t_s, rows.t_s + 0.1)
 
 
 @pytest.mark.parametrize(("of", "settings"), [
@@ -309,7 +309,7 @@ def test_a_surface_of_unknown_effect_is_named_along_once_its_command_has_moved(
     pitch = np.array([5.0, 5.0 + 9e-7, 5.0, 5.0, 5.1, 5.0, 5.0, 5.0])
     roll = np.linspace(-1.0, 1.0, 8)
     flown = replace(small.flight(model, 8), commands=np.column_stack([roll, pitch, 2.0 * roll]))
-    found = diagnose._add_unknown_effect_surfaces_widening_bounds(flown, model, rows)
+    found = diagnose._add_unknown_surfaces(flown, model, rows)
     assert found.isolated_surfaces.tolist() == names
     for k, high in enumerate(highs):
         left = rows.effectiveness_high[k]
@@ -324,7 +324,7 @@ def test_where_a_gain_may_be_wrong_by_all_of_it_no_bound_is_given():
     told = {"commands": [], "rates": [], "tied": [0.3, 0.4], "gain_sd": [0.3, 0.1]}
     model = small.model(small.TAIL | {"other_laws": True}, fitted=told)
     rows = small.rows([(4, "elevator", [0.9, 0.5, 0.7])], 3)
-    found = diagnose.finalize_rows_at_log_stamps(small.flight(model, 4, log_stamps_s=rows.t_s), model, rows)
+    found = diagnose.finish_rows(small.flight(model, 4, log_stamps_s=rows.t_s), model, rows)
     for field, value in (("effectiveness", 1.0), ("effectiveness_low", 0.0), ("effectiveness_high", 1.0)):
         expected = getattr(rows, field).copy()
         expected[:, [0, 2]] = value
@@ -344,7 +344,7 @@ def test_a_name_is_taken_back_where_another_group_explains_the_last_second_bette
     flown = small.flight(model, 60, seed=4)
     offset = np.repeat([[0.0, 0.0, 0.0], [0.12, 0.01, 0.0], [0.0, 0.1, 0.0]], 20, axis=0)
     flown = replace(flown, rates=flown.rates + offset)
-    ok, left, answers = diagnose.unexplained_rates_and_responses(flown, model)
+    ok, left, answers = diagnose.unexplained_rates(flown, model)
     rest = left - np.array(model.intercept) - answers.sum(axis=1)
     inverse = np.linalg.inv(noise)
     gains = np.zeros((60, 3))
@@ -356,7 +356,7 @@ def test_a_name_is_taken_back_where_another_group_explains_the_last_second_bette
         gains[:, g] = [0.5 * 0.6 * sum(along[max(k - 9, 0) : k + 1]) for k in range(60)]
     names = ["a", "b", "c", "a+b", "b+c", "unknown", ""]
     rows = small.rows([(1, names[k % 7], [0.3, 0.4, 0.2]) for k in range(60)], 3)
-    found = diagnose._withdraw_contradicted_isolation(flown, model, rows, 3.0)
+    found = diagnose._withdraw_contradicted(flown, model, rows, 3.0)
     withdrawn = []
     for k in range(60):
         named = [g for g, name in enumerate("abc") if name in names[k % 7] and names[k % 7] != "unknown"]
@@ -375,13 +375,13 @@ def test_a_name_is_taken_back_where_another_group_explains_the_last_second_bette
 def test_under_other_laws_each_level_is_as_likely_before_the_flight():
     """The probability of a level over that before; health is not excluded before an alarm excludes it."""
     model = small.model(small.WING | {"other_laws": True}, settings=SETTINGS)
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     shares = np.random.default_rng(4).uniform(size=(5, len(bank.hypothesis_kind))) * bank.prior_probability
     shares[:, (bank.effectiveness == LEFT).all(axis=1)] += [[2.0], [0.001], [0.05], [0.2], [0.0]]
     shares[:, 0] *= [0.0, 1.0, 0.3, 0.0, 1.0]
     shares[:, -1] *= 0.1
     shares /= shares.sum(axis=1, keepdims=True)
-    found = diagnose.diagnosis_rows_from_posterior(small.flight(model, 5), model, bank, shares)
+    found = diagnose.rows_of_posterior(small.flight(model, 5), model, bank, shares)
     levels, edges = [0.0, 0.25, 0.5, 0.75, 1.0], [0.0, 0.125, 0.375, 0.625, 0.875, 1.0]
     for g, (k, row) in product((0, 1), enumerate(shares)):
         its = [bank.effectiveness[:-1, g] == level for level in levels]
@@ -403,10 +403,10 @@ def test_evidence_began_where_its_sum_was_last_at_zero(monkeypatch, threshold):
     """However high it may rise; in the first row where it never was."""
     model = small.model(settings=SETTINGS | {"threshold": threshold})
     gained = np.array([1.0, 2.0, -9.0, 2.0, 5.0, -6.0, 1.0, -3.0, -1.0, 2.0])
-    monkeypatch.setattr(diagnose, "any_fault_log_odds_gains", lambda of, by: gained)
-    bank = build_hypothesis_bank(model)
+    monkeypatch.setattr(diagnose, "fault_evidence", lambda of, by: gained)
+    bank = build_bank(model)
     samples = small.flight(model, 10, t_s=7.0 + 0.25 * np.arange(10))
-    found = diagnose.diagnosis_rows_from_posterior(
+    found = diagnose.rows_of_posterior(
         samples, model, bank, posterior(bank, *[{SOUND: 1.0}] * 10)
     )
     # sums 1 3 0 2 7 1 2 0 0 2, and 1 3 0 2 4 0 1 0 0 2 where 4 is the most
@@ -426,17 +426,17 @@ def test_a_diagnosis_is_of_rates_that_live_and_doubts_names_under_other_laws(
     bank, samples, rows = SimpleNamespace(no_response_hypothesis_index=1), small.flight(model, 3), "rows"
     posterior, told = np.array([[0.5, 0.5], [0.49, 0.51], [0.9, 0.1]]), {}
     stubs = {
-        "build_hypothesis_bank": lambda by: bank,
-        "hypothesis_state_and_noise_posterior": lambda *of: (
+        "build_bank": lambda by: bank,
+        "bank_posterior": lambda *of: (
             told.update(filtered=of) or (posterior, None, None)
         ),
-        "diagnosis_rows_from_posterior": lambda *of: told.update(read=of) or rows,
-        "_withdraw_contradicted_isolation": lambda *of: told.update(doubted=of) or "doubted rows",
-        "finalize_rows_at_log_stamps": lambda *of: (of[:3], of[3].tolist()),
+        "rows_of_posterior": lambda *of: told.update(read=of) or rows,
+        "_withdraw_contradicted": lambda *of: told.update(doubted=of) or "doubted rows",
+        "finish_rows": lambda *of: (of[:3], of[3].tolist()),
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(diagnose, name, stub)
-    monkeypatch.setattr(diagnose.trust, "with_rates_unknown_where_frozen_or_clipped", lambda of, by: "alive")
+    monkeypatch.setattr(diagnose.trust, "without_dead_rows", lambda of, by: "alive")
     found = diagnose._diagnose_checked_log(samples, model)
     assert found == ((samples, model, "doubted rows" if doubts else rows), [False, True, False])
     assert told["filtered"] == ("alive", model, bank)
@@ -452,7 +452,7 @@ def test_where_one_group_is_at_fault_all_are_named_that_are_not_excluded(losses,
     """A thousandth of the likeliest is excluded, other kinds of faults count for nothing; where no group is
     excluded none is named."""
     model = small.model(THREE, settings=SETTINGS | {"one_group": True})
-    bank = build_hypothesis_bank(model)
+    bank = build_bank(model)
     single = [{tuple(0.5 if i == g else 1.0 for i in range(3)): share} for g, share in enumerate(losses)]
     pair = {(1.0, 0.5, 0.25): 0.09}
     shares = posterior(bank, {key: value for one in (*single, pair) for key, value in one.items()})

@@ -35,9 +35,9 @@ def stamps(step, n=60):
 def test_rates_that_a_log_may_have(t_s, rate_hz, says):
     if says:
         with pytest.raises(BadInput, match=says):
-            of._check_stamps_and_make_time_base("log", t_s, 20.0)
+            of._time_base("log", t_s, 20.0)
         return
-    found, run, step = of._check_stamps_and_make_time_base("log", t_s, 20.0)
+    found, run, step = of._time_base("log", t_s, 20.0)
     assert 1.0 / step == pytest.approx(rate_hz)
     assert set(run.tolist()) == {0}
     assert (found is t_s) is (rate_hz != 20.0)
@@ -48,36 +48,36 @@ def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
     t_s = stamps(0.125)
     t_s[20:] += (gap - 1.0) * 0.125
     t_s[40:] += (gap - 1.0) * 0.125
-    run = of._check_stamps_and_make_time_base("log", t_s, 20.0)[1]
+    run = of._time_base("log", t_s, 20.0)[1]
     assert run.tolist() == [0] * 20 + [gaps] * 20 + [2 * gaps] * 20
 
 
 def test_the_usual_step_is_that_of_the_first_fifty_stamps():
     t_s = np.concatenate([stamps(0.1, 26), 2.6 + stamps(0.2, 40)])
-    assert of._median_step_of_first_stamps_s(t_s) == pytest.approx(0.1)
-    assert of._median_step_of_first_stamps_s(t_s[2:]) == pytest.approx(0.2)
-    assert of._median_step_of_first_stamps_s(t_s[:1]) == np.inf
-    assert of._median_step_of_first_stamps_s(t_s[:2]) == pytest.approx(0.1)
+    assert of._median_step_s(t_s) == pytest.approx(0.1)
+    assert of._median_step_s(t_s[2:]) == pytest.approx(0.2)
+    assert of._median_step_s(t_s[:1]) == np.inf
+    assert of._median_step_s(t_s[:2]) == pytest.approx(0.1)
 
 
 def test_a_fast_log_is_sampled_over_each_stretch_from_its_first_stamp():
     """To the last stamp, or half a step beyond it; no sample in a gap."""
     t_s = np.array([0.0, 0.1, 0.2, 0.28, 1.0, 1.15, 1.28, 5.0])
-    found, run, step = of._regular_time_base(t_s, 0.2)
+    found, run, step = of._even_time_base(t_s, 0.2)
     np.testing.assert_allclose(found, [0.0, 0.2, 1.0, 1.2, 5.0])
     assert (run.tolist(), step) == ([0, 0, 1, 1, 2], 0.2)
-    longer, run, _ = of._regular_time_base(np.array([0.0, 0.31, 2.0]), 0.2)
+    longer, run, _ = of._even_time_base(np.array([0.0, 0.31, 2.0]), 0.2)
     np.testing.assert_allclose(longer, [0.0, 0.2, 0.4, 2.0])
-    edge = of._regular_time_base(np.array([0.0, 3.49 * 0.2, 2.0]), 0.2)[1]
+    edge = of._even_time_base(np.array([0.0, 3.49 * 0.2, 2.0]), 0.2)[1]
     assert edge.tolist() == [0] * 4 + [1]
 
 
 def test_a_column_with_these_very_stamps_is_as_it_is():
     t_s = stamps(0.1, 5)
     same = column(t_s.copy(), np.arange(5.0))
-    assert of.values_and_mean_age_at(same, t_s, 0.1) == (same.values, None)
+    assert of.sample_column(same, t_s, 0.1) == (same.values, None)
     other = column(t_s + 0.01, np.arange(5.0))
-    values, age_s = of.values_and_mean_age_at(other, t_s, 0.1)
+    values, age_s = of.sample_column(other, t_s, 0.1)
     np.testing.assert_array_equal(values, [np.nan, 0.0, 1.0, 2.0, 3.0])
     assert age_s == pytest.approx(0.09)
 
@@ -86,8 +86,8 @@ def test_a_column_with_these_very_stamps_is_as_it_is():
 def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
     fast = column(stamps(step, 40), np.arange(40.0))
     t_s = stamps(0.1, 10) + 0.3
-    found = of.values_and_mean_age_at(fast, t_s, 0.1)
-    expected = (of._interval_means_and_mean_age if averaged else of._latest_values_and_mean_age)(
+    found = of.sample_column(fast, t_s, 0.1)
+    expected = (of._means_and_age if averaged else of._latest_and_age)(
         fast, *((t_s, 0.1) if averaged else (t_s,))
     )
     np.testing.assert_array_equal(found[0], expected[0])
@@ -96,28 +96,28 @@ def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
 
 def test_a_held_column_is_the_last_value_known():
     held = column([1.0, 2.0, 3.0, 4.0], [5.0, np.nan, 7.0, 8.0])
-    values, age_s = of._latest_values_and_mean_age(held, np.array([0.5, 1.0, 2.5, 3.0, 3.75]))
+    values, age_s = of._latest_and_age(held, np.array([0.5, 1.0, 2.5, 3.0, 3.75]))
     np.testing.assert_array_equal(values, [np.nan, 5.0, 5.0, 7.0, 7.0])
     assert age_s == pytest.approx((0.0 + 1.5 + 0.0 + 0.75) / 4)
-    assert np.isnan(of._latest_values_and_mean_age(held, np.array([0.0, 0.5]))[1])
+    assert np.isnan(of._latest_and_age(held, np.array([0.0, 0.5]))[1])
 
 
 def test_the_mean_over_the_interval_that_ends_at_a_sample():
     """Its end is in it, its begin is not, to a millionth of a step; of nothing, the last value."""
     fast = column([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.2], [1.0, 2.0, 4.0, np.nan, 16.0, 32.0, 64.0])
     t_s = np.array([-0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.2])
-    values, delay_s = of._interval_means_and_mean_age(fast, t_s, 0.2)
+    values, delay_s = of._means_and_age(fast, t_s, 0.2)
     np.testing.assert_allclose(values, [np.nan, 1.0, 3.0, 16.0, 32.0, 32.0, 64.0])
     assert delay_s == pytest.approx(0.1)
     near = column([0.1, 0.2 + 1e-8, 0.3], [1.0, 2.0, 4.0])
     np.testing.assert_allclose(
-        of._interval_means_and_mean_age(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0]
+        of._means_and_age(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0]
     )
     off = column([0.1, 0.2 + 1e-6, 0.3], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(of._interval_means_and_mean_age(off, np.array([0.2, 0.4]), 0.2)[0], [1.0, 3.0])
+    np.testing.assert_allclose(of._means_and_age(off, np.array([0.2, 0.4]), 0.2)[0], [1.0, 3.0])
     both = column([-0.2 + 1e-8, 0.0, 0.2 - 1e-8], [1.0, 2.0, 4.0])
     np.testing.assert_allclose(
-        of._interval_means_and_mean_age(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0]
+        of._means_and_age(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0]
     )
 
 
@@ -135,8 +135,8 @@ def test_the_angles_of_a_log_confirm_its_rates():
     vehicle = small.vehicle(attitude={"roll": "phi", "pitch": "theta"})
     angles = {"phi": column(t_s, 0.1 * np.sin(t_s)), "theta": column(t_s, 0.01 * np.sin(7.0 * t_s))}
     found = of.resample(recording(300, **rates, **angles), vehicle)
-    assert found.rates_confirmed_by_attitude == {"p_rad_s"}
-    assert not of.resample(recording(300, **rates), vehicle).rates_confirmed_by_attitude
+    assert found.confirmed_rates == {"p_rad_s"}
+    assert not of.resample(recording(300, **rates), vehicle).confirmed_rates
 
 
 def test_a_log_on_one_time_base():
@@ -157,7 +157,7 @@ def test_a_log_on_one_time_base():
     label = np.where(t_s < 0.99, np.nan, np.where(t_s < 2.99, 1.0, 0.5))
     np.testing.assert_array_equal(found.labels[:, 1], label)
     assert (found.name, found.dt_s, found.signals.shape) == ("log", pytest.approx(0.1), (60, 0))
-    assert found.mean_age_s_by_held_column == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
+    assert found.held_age_s == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
     assert found.notes == ("said of the log", "a row is left out")
     assert (found.logged_failures, found.log_stamps_s is given.columns["p_rad_s"].t_s) == (
         given.logged_failures,
@@ -183,10 +183,8 @@ def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
     assert np.isnan(found.rates[late, 0]).all()
     assert np.isfinite(found.rates[early, 0]).mean() > 0.6
     assert np.isfinite(found.rates[:, 1:]).all()
-    np.testing.assert_allclose(
-        found.time_since_change_s_by_column["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9
-    )
-    assert found.time_since_change_s_by_column["p_rad_s"][early].max() < 0.5
+    np.testing.assert_allclose(found.unchanged_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
+    assert found.unchanged_s["p_rad_s"][early].max() < 0.5
 
 
 def test_the_mixer_has_a_row_a_surface():
@@ -271,7 +269,7 @@ def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
 def test_labels_are_the_last_ones_of_each_surface_that_has_them():
     vehicle = small.vehicle(labels={"left": {"column": "left_left", "scale": 0.01}, "right": "right_left"})
     known = RecordedFlight("log", {"left_left": column([1.0, 3.0], [40.0, 70.0])})
-    labels = of._labelled_surface_effectiveness(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
+    labels = of._sampled_labels(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
     assert np.isnan(labels[:, 0]).all()
     np.testing.assert_allclose(labels[:, 1], [np.nan, 0.4, 0.4, 0.7])
 
@@ -283,14 +281,14 @@ def test_airspeed_and_energy_are_known_where_their_columns_are():
     for altitude, speed, there in (("alt", "V", True), ("alt", "W", False), ("one", "V", False)):
         vehicle = small.vehicle(energy={"altitude": altitude, "airspeed": speed}, airspeed=speed)
         climb, airspeed = (
-            of._sampled_energy_height_rate_mps(log, vehicle, base),
+            of._sampled_height_rate(log, vehicle, base),
             of._sampled_airspeed(log, vehicle, t_s, 1.0),
         )
         assert (climb is not None, airspeed is not None) == (there, speed == "V")
         if there:
             np.testing.assert_allclose(climb, [np.nan] * 5 + [3.0] * 3)
     assert (
-        of._sampled_energy_height_rate_mps(log, WING, base)
+        of._sampled_height_rate(log, WING, base)
         is of._sampled_airspeed(log, WING, t_s, 1.0)
         is None
     )
@@ -353,9 +351,9 @@ def test_what_a_reader_is_asked_for_is_what_the_vehicle_names():
     )
     names = ["gx", "gy", "gz", "pwm", "share", "wind", "phi", "theta", "psi", "acc", "tas", "alt", "alpha"]
     names += ["extra", "left_left", "out"]
-    assert of._positional_reader_arguments(vehicle, None) == ("alfa", ("clock", "us"), names)
-    assert of._positional_reader_arguments(vehicle, "ulog") == ("ulog", ("clock", "us"), names)
-    assert of._positional_reader_arguments(WING, None)[:2] == (None, None)
+    assert of._reader_arguments(vehicle, None) == ("alfa", ("clock", "us"), names)
+    assert of._reader_arguments(vehicle, "ulog") == ("ulog", ("clock", "us"), names)
+    assert of._reader_arguments(WING, None)[:2] == (None, None)
 
 
 IN_G = np.where(T_S < 50.0, -1.0, 20.0)
@@ -436,7 +434,7 @@ def test_a_rate_that_spreads_as_hardly_an_aircraft_does_is_said(spread, says):
 def test_too_few_samples_of_a_fast_log_are_told_with_its_span():
     t_s = 5.0 + stamps(0.001, 2000)
     with pytest.raises(BadInput) as refused:
-        of._check_stamps_and_make_time_base("log", t_s, 20.0)
+        of._time_base("log", t_s, 20.0)
     assert str(refused.value) == (
         "log: 2000 rows within 2 s are 41 samples at 20 Hz, allowed: at least 50; is time in another unit?"
     )
@@ -460,7 +458,7 @@ def test_how_long_a_column_has_stood_still_counts_its_age():
     """Rows without a number stand still; before the first row nothing does."""
     values = np.concatenate([np.arange(10.0), np.full(20, 9.5), [np.nan, np.nan, 4.0]])
     one = column(stamps(0.5, 33), values)
-    found = of._time_since_column_change_s(one, np.array([-1.0, 4.7, 10.8, 11.2, 15.6, 16.0, 17.0]))
+    found = of._unchanged_s(one, np.array([-1.0, 4.7, 10.8, 11.2, 15.6, 16.0, 17.0]))
     np.testing.assert_allclose(found, [0.0, 0.2, 0.3, 6.2, 10.6, 0.0, 1.0])
 
 
@@ -485,12 +483,12 @@ def filled(n=12, first=0.0, **changes):
         "energy_height_rate_mps": -2.0 - at,
     }  # fmt: skip
     given = {
-        "name": "all", "dt_s": 0.1, "mean_age_s_by_held_column": {"roll": 0.02},
+        "name": "all", "dt_s": 0.1, "held_age_s": {"roll": 0.02},
         "logged_failures": (LoggedFailure(3.0, "fin"),), "log_stamps_s": 0.01 * np.arange(99.0),
         "notes": ("one",),
-        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+        "unchanged_s": {"roll": 4.0 * at, "pitch": 5.0 * at},
         "noise_ma_coefficients": (1.0, 0.5), "fit_weight": 1.5, "n_log_parts": 1,
-        "rates_confirmed_by_attitude": frozenset({"roll", "yaw"}),
+        "confirmed_rates": frozenset({"roll", "yaw"}),
     }  # fmt: skip
     assert {one.name for one in fields(of.Samples)} == {*per_row, *given}
     return of.Samples(**(per_row | given | changes)), per_row, given
@@ -503,7 +501,7 @@ def assert_same(found, expected):
         one = getattr(found, name)
         if isinstance(value, np.ndarray):
             np.testing.assert_array_equal(one, value, err_msg=name)
-        elif name == "time_since_change_s_by_column":
+        elif name == "unchanged_s":
             assert one.keys() == value.keys()
             for key in value:
                 np.testing.assert_array_equal(one[key], value[key], err_msg=key)
@@ -514,9 +512,9 @@ def assert_same(found, expected):
 def test_some_rows_of_samples_are_those_rows_of_every_field():
     whole, per_row, given = filled()
     rows = slice(3, 8)
-    still = {name: one[rows] for name, one in given["time_since_change_s_by_column"].items()}
+    still = {name: one[rows] for name, one in given["unchanged_s"].items()}
     cut = {name: one[rows] for name, one in per_row.items()}
-    expected = {**given, **cut, "time_since_change_s_by_column": still, "log_stamps_s": per_row["t_s"][rows]}
+    expected = {**given, **cut, "unchanged_s": still, "log_stamps_s": per_row["t_s"][rows]}
     assert_same(of._select_rows(whole, rows), expected)
     bare = replace(whole, airspeed=None, is_rate_clipped=None, energy_height_rate_mps=None)
     without = {"airspeed": None, "is_rate_clipped": None, "energy_height_rate_mps": None}
@@ -529,7 +527,7 @@ def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
     """The second has a gap of its own; remarks are said once, after what is said of the whole."""
     (one, *_), (other, *_) = filled(4), filled(9, first=20.0, notes=("two", "one"))
     other = replace(other, stretch_number=np.repeat([7, 9], [6, 3]), dt_s=0.3, name="other")
-    other = replace(other, rates_confirmed_by_attitude=frozenset({"pitch", "yaw"}))
+    other = replace(other, confirmed_rates=frozenset({"pitch", "yaw"}))
     found = of._concatenate_samples("long", [one, other], 5)
     per_row, (_, _, given) = {}, filled()
     for name in ("t_s", "rates", "commands", "signals", "labels", "airspeed", "is_rate_clipped"):
@@ -539,8 +537,8 @@ def test_stretches_one_after_the_other_are_samples_with_a_gap_between():
     at = np.concatenate([np.arange(4.0), 20.0 + np.arange(9.0)])
     assert_same(found, given | per_row | {
         "name": "long", "n_log_parts": 5, "notes": (note, "one", "two"), "log_stamps_s": per_row["t_s"],
-        "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]), "rates_confirmed_by_attitude": frozenset({"yaw"}),
-        "time_since_change_s_by_column": {"roll": 4.0 * at, "pitch": 5.0 * at},
+        "stretch_number": np.repeat([0, 1, 2], [4, 6, 3]), "confirmed_rates": frozenset({"yaw"}),
+        "unchanged_s": {"roll": 4.0 * at, "pitch": 5.0 * at},
     })  # fmt: skip
 
 
@@ -572,9 +570,9 @@ def test_of_a_log_in_parts_every_so_many_stretch_is_kept(monkeypatch):
     samples are kept at most: each stretch that is begun before is not begun again, and once there are more
     than five every second one is left out, and of those that come."""
     monkeypatch.setattr(of, "MAX_FIT_SAMPLES", 20)
-    monkeypatch.setattr(of, "_FIT_STRETCH_SAMPLES", 4)
+    monkeypatch.setattr(of, "_FIT_SAMPLES", 4)
     parts = [filled(14, first=10.0 * k, stretch_number=np.zeros(14, dtype=np.int64))[0] for k in range(9)]
-    monkeypatch.setattr(of, "read_parts_for_vehicle", lambda *asked: parts)
+    monkeypatch.setattr(of, "read_vehicle_parts", lambda *asked: parts)
     monkeypatch.setattr(of, "resample", lambda recording, vehicle: recording)
     found = of._read_flight_for_fit(of.Path("logs/long.csv"), WING, None)
     # of the first part samples 0 to 13 in stretches of 4, 4, 4 and 2; of each other 10 new ones in 4, 4 and 2
@@ -590,7 +588,7 @@ def test_of_a_log_in_parts_every_so_many_stretch_is_kept(monkeypatch):
     assert found.t_s == pytest.approx(0.1 * np.array([k for at, n in kept for k in range(at, at + n)]))
     assert found.stretch_number.tolist() == [j for j, (_, n) in enumerate(kept) for _ in range(n)]
     assert (found.name, found.n_log_parts) == ("long", 9)
-    monkeypatch.setattr(of, "read_parts_for_vehicle", lambda *asked: parts[:1])
+    monkeypatch.setattr(of, "read_vehicle_parts", lambda *asked: parts[:1])
     assert of._read_flight_for_fit(of.Path("logs/short.csv"), WING, None) is parts[0]
 
 
@@ -606,7 +604,7 @@ def test_flights_come_one_by_one_and_a_long_one_in_all_its_parts(monkeypatch):
     paths = [of.Path(name) for name in "abc"]
     loaded = flights, (paths, WING, "ulog")
     monkeypatch.setattr(of, "load_flights_for_fit", lambda *given: loaded[0] if given == loaded[1] else [])
-    monkeypatch.setattr(of, "read_parts_for_vehicle", parts_of)
+    monkeypatch.setattr(of, "read_vehicle_parts", parts_of)
     monkeypatch.setattr(of, "resample", lambda recording, vehicle: (recording, vehicle))
     found = [*of.stream_flights(paths, WING, "ulog")]
     assert found == [flights[0], *((part, WING) for part in ("b-1", "b-2", "b-3")), flights[2]]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.recording import LoggedFailure
 from products.logs import small
 
@@ -16,7 +16,7 @@ def rows(estimate, low, high, faulty=None):
     faulty = np.zeros(len(estimate), dtype=int) if faulty is None else np.array(faulty)
     n = len(estimate)
     named = np.full(n, "", dtype=object)
-    return DiagnosisRows(
+    return LogRows(
         np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n)
     )
 
@@ -62,7 +62,7 @@ def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one
 def test_the_nearest_setting_is_the_first_of_two():
     settings = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
     estimate = np.array([[0.9, 0.9], [0.4, 1.0], [0.5, 0.5], [0.6, 0.3]])
-    assert scoring.nearest_label_setting_index(estimate, settings).tolist() == [0, 1, 0, 2]
+    assert scoring.nearest_setting(estimate, settings).tolist() == [0, 1, 0, 2]
 
 
 FAILURE = (
@@ -136,7 +136,7 @@ RIGHT = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_whether_the_group_is_the_right_one(name):
     named, surfaces, right = RIGHT[name]
-    assert scoring._is_most_frequent_name_right(named, surfaces, GROUPS) is right
+    assert scoring._is_main_name_right(named, surfaces, GROUPS) is right
 
 
 def test_a_score_is_by_labels_where_there_are_any():
@@ -153,5 +153,5 @@ def test_rows_before_the_first_sample_have_its_label():
     model = small.model()
     samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))
     given = small.rows([(3, "left", [1.0, 0.5])])  # at 10, 10.5, 11
-    early = DiagnosisRows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
+    early = LogRows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
     assert scoring.score_diagnosis(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)

@@ -24,7 +24,7 @@ def test_for_how_long_a_signal_stands_still():
     assert still[212] == pytest.approx(0.6)
     assert still[260] == pytest.approx(3.0)
     assert not still[261:].any()
-    assert signals.column_defect_texts("p", Column(T_S, values), is_measured_rate=True) == [
+    assert signals.column_defect_texts("p", Column(T_S, values), is_rate=True) == [
         "p: frozen, the same to the last bit for 3.0 s"
     ]
 
@@ -35,9 +35,7 @@ def test_a_clipped_rate_and_one_that_is_not():
         rows = signals.find_clipped_rows(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
-        said = signals.column_defect_texts(
-            "p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_measured_rate=True
-        )
+        said = signals.column_defect_texts("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), is_rate=True)
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
     assert not signals.find_clipped_rows(free).any()
     assert not signals.find_clipped_rows(np.zeros(500)).any()
@@ -66,18 +64,18 @@ def test_jumps_are_single_rows_that_come_back():
     held = np.repeat(noise(), 3)
     held[[400, 2200]] -= 50.0
     assert signals.find_spike_rows(held).tolist() == [400, 2200]  # a log of more rows than readings
-    said = signals.column_defect_texts("p", Column(T_S, values), is_measured_rate=True)
+    said = signals.column_defect_texts("p", Column(T_S, values), is_rate=True)
     assert said == ["p: 2 jumps, the first at 5.00 s"]
 
 
 def test_rows_without_a_number_are_counted():
     values = noise()
     values[3:10] = np.nan
-    (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), is_measured_rate=True)
+    (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), is_rate=True)
     assert said == "p: rows without a number: 7 of 1200"
-    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_measured_rate=False)[
-        -1
-    ].startswith("u: does not move")
+    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), is_rate=False)[-1].startswith(
+        "u: does not move"
+    )
 
 
 def turning(seed=1):
@@ -105,11 +103,11 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     phi, theta, rates = turning()
     columns = [Column(T_S, rate * one) for one in rates]
     pitch = Column(T_S, theta) if angle == 1.0 else None
-    found = physics.fit_roll_angle_to_rates(columns, Column(T_S, angle * phi), pitch)
+    found = physics.fit_roll(columns, Column(T_S, angle * phi), pitch)
     if pitch is not None:
         assert found.slope == pytest.approx(1.0 / rate, rel=2e-3)
         assert abs(found.correlation) > 0.9999
-    said = physics.angle_rate_factor_remark(found, "p", "roll")
+    said = physics.factor_remark(found, "p", "roll")
     assert (said is None) if says is None else (says in said)
 
 
@@ -123,19 +121,19 @@ def test_of_a_short_log_more_is_needed(seconds, rate, says):
     kept = T_S - T_S[0] <= seconds
     t_s = T_S[kept]
     columns = [Column(t_s, rate * one[kept]) for one in rates]
-    found = physics.fit_roll_angle_to_rates(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
-    assert (found is not None and physics.angle_rate_factor_remark(found, "p", "roll") is not None) is says
+    found = physics.fit_roll(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
+    assert (found is not None and physics.factor_remark(found, "p", "roll") is not None) is says
 
 
 @pytest.mark.parametrize("drift_rad_s", [0.0, 7e-6])
 def test_nothing_is_said_of_an_angle_that_does_not_move(drift_rad_s):
     """In steady flight at 45 m/s the level turns by 45 / 6.37e6 rad/s, and no gyro does: alpha is no rate."""
     still = Column(T_S, np.zeros(len(T_S)))
-    assert physics.fit_roll_angle_to_rates([still] * 3, Column(T_S, drift_rad_s * T_S), None) is None
+    assert physics.fit_roll([still] * 3, Column(T_S, drift_rad_s * T_S), None) is None
     angles = [("roll", still), ("pitch", Column(T_S, 0.14 + drift_rad_s * T_S)), None]
     rates = {name: Column(T_S, 1e-8 * np.sin(T_S)) for name in ("gx", "gy", "gz")}
     alpha = {"alpha": Column(T_S, 0.14 + 0.0 * T_S)}
-    assert physics.find_attitude_mistake(rates, angles, alpha) is None
+    assert physics.attitude_mistake(rates, angles, alpha) is None
 
 
 @pytest.mark.parametrize(("mean", "says"), [
@@ -151,10 +149,10 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
     phi, theta, (p, q, r) = turning()
     swapped = {"gx": Column(T_S, q), "gy": Column(T_S, p), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), None]
-    said = physics.find_attitude_mistake(swapped, angles, {})
+    said = physics.attitude_mistake(swapped, angles, {})
     assert said.endswith("gy is the roll rate")
     right = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, r)}
-    assert physics.find_attitude_mistake(right, angles, {}) is None
+    assert physics.attitude_mistake(right, angles, {}) is None
 
 
 @pytest.mark.parametrize(("factor", "angle", "says"), [
@@ -166,13 +164,13 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
 ])  # fmt: skip
 def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
-    found = physics.fit_pitch_angle_to_rates(
+    found = physics.fit_pitch(
         [Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta)
     )
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, angle * theta)), None]
-    said = physics.find_attitude_mistake(rates, angles, {})
+    said = physics.attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)
 
 
@@ -191,7 +189,7 @@ def yawed(seed=1):
 def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
     columns = [Column(T_S, one) for one in (p, q, r)]
-    found = physics.fit_yaw_angle_to_rates(
+    found = physics.fit_yaw(
         columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed())
     )
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
@@ -201,7 +199,7 @@ def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
         ("pitch", Column(T_S, theta)),
         ("yaw", Column(T_S, angle * yawed())),
     ]
-    said = physics.find_attitude_mistake(rates, angles, {})
+    said = physics.attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)
 
 
@@ -212,7 +210,7 @@ def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
 def test_a_wrong_yaw_rate_is_found_in_a_flight_that_banks_and_pitches_more_than_it_yaws(factor, says):
     (p, q, r), angles = banked_and_pitched()
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, factor * r)}
-    said = physics.find_attitude_mistake(rates, angles, {})
+    said = physics.attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)
 
 
@@ -244,15 +242,15 @@ def test_the_attitude_confirms_the_rates_that_make_it(factors, without, confirme
     angles = [None if k == without else one for k, one in enumerate(angles)]
     named = ("gx", "gy", "gz")
     given = {name: Column(T_S, f * one) for name, f, one in zip(named, factors, rates, strict=True)}
-    assert physics.rates_confirmed_by_attitude(given, angles) == confirmed
+    assert physics.confirmed_rates(given, angles) == confirmed
 
 
 def test_another_column_in_the_place_of_a_rate_is_found_by_the_angle_that_follows_it():
     phi, theta, (p, q, r) = turning()
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), ("yaw", Column(T_S, yawed()))]
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, np.sin(2.1 * T_S)), "gz": Column(T_S, r)}
-    assert physics.find_attitude_mistake(rates, angles, {}) is None
-    said = physics.find_attitude_mistake(
+    assert physics.attitude_mistake(rates, angles, {}) is None
+    said = physics.attitude_mistake(
         rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)}
     )
     assert said is not None
@@ -269,8 +267,8 @@ def test_nothing_is_said_where_the_nose_is_steep():
     still = Column(t_s, 1e-3 * np.sin(t_s))
     rates = {"gx": still, "gy": Column(t_s, np.full(len(t_s), 0.3)), "gz": still}
     angles = [("roll", Column(t_s, phi)), ("pitch", Column(t_s, theta)), ("yaw", Column(t_s, psi))]
-    assert physics.find_attitude_mistake(rates, angles, {}) is None
-    assert physics.fit_roll_angle_to_rates(list(rates.values()), angles[0][1], angles[1][1]) is None
+    assert physics.attitude_mistake(rates, angles, {}) is None
+    assert physics.fit_roll(list(rates.values()), angles[0][1], angles[1][1]) is None
 
 
 def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
@@ -281,7 +279,7 @@ def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
     late = t_s >= 10.0
     t_s, roll = t_s + 5.0 * late, roll + 1.0 * late
     zero = Column(t_s, np.zeros(len(t_s)))
-    found = physics.fit_roll_angle_to_rates([Column(t_s, p), zero, zero], Column(t_s, roll), None)
+    found = physics.fit_roll([Column(t_s, p), zero, zero], Column(t_s, roll), None)
     assert (found.slope, found.correlation) == (pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=1e-3))
 
 
@@ -323,7 +321,7 @@ FIT_OF = "the change of roll is {} times the integral of gx: "
 ])  # fmt: skip
 def test_what_is_said_of_an_angle_and_its_rate(fit, says):
     """By slope, correlation, windows, largest angle and largest rate; on either side of each bound."""
-    said = physics.angle_rate_factor_remark(physics.AngleRateFit(*fit), "gx", "roll")
+    said = physics.factor_remark(physics.AngleFit(*fit), "gx", "roll")
     slope, _, rest = (says or "").partition(";")
     assert said == (None if says is None else FIT_OF.format(slope) + rest)
 
@@ -334,8 +332,8 @@ def test_what_is_said_of_an_angle_and_its_rate(fit, says):
     (-0.94, 20, False, 0.99), (0.96, 20, True, np.inf), (-0.96, 19, False, np.inf),
 ])  # fmt: skip
 def test_how_well_another_column_must_agree_with_an_angle(correlation, windows, is_rate, least):
-    fit = physics.AngleRateFit(1.0, correlation, windows, 1.0, 1.0)
-    assert physics._min_correlation_to_replace_rate(fit, is_rate) == least
+    fit = physics.AngleFit(1.0, correlation, windows, 1.0, 1.0)
+    assert physics._replacing_correlation(fit, is_rate) == least
 
 
 @pytest.mark.parametrize(("largest", "circle"), [
@@ -350,7 +348,7 @@ def test_the_circle_of_angles_is_the_least_that_holds_them(largest, circle):
 def test_the_unit_of_a_pitch_angle_is_that_of_roll_or_what_a_right_angle_allows():
     """4 and 5 may be radians of a roll angle, but never of a pitch angle; in cdeg roll says so."""
     for roll, pitch, to_rad in ((5.0, 4.0, np.pi / 180), (2.0, 1.6, 1.0), (400.0, 1.6, np.pi / 18000)):
-        found = physics._interpolated_pitch_rad(
+        found = physics._pitch_rad(
             Column(np.arange(2.0), np.array([0.1, -roll])), Column(np.arange(2.0), np.array([-pitch, 0.4])),
             np.array([0.0, 0.5]),
         )  # fmt: skip
@@ -365,7 +363,7 @@ def test_the_unit_of_a_pitch_angle_is_that_of_roll_or_what_a_right_angle_allows(
 def test_no_pitch_angle_is_more_than_a_right_angle(largest, says):
     pitch = Column(np.arange(4.0), np.array([0.3, np.nan, -largest, 1.0]))
     told = f"theta reaches {largest:.4g} rad, a pitch angle at most 1.571: {says}; look at the rates' too"
-    assert physics.pitch_angle_unit_remark(pitch, "theta") == (None if says is None else told)
+    assert physics.pitch_remark(pitch, "theta") == (None if says is None else told)
 
 
 @pytest.mark.parametrize(("down", "says"), [
@@ -396,16 +394,16 @@ def test_angles_with_stamps_of_their_own_are_taken_between_their_rows():
     )
     deg = 180.0 / np.pi
     for found, slope, largest in (
-        (physics.fit_roll_angle_to_rates(columns, roll, pitch), 2.0, phi),
-        (physics.fit_pitch_angle_to_rates(columns, roll, pitch), 4.0, theta),
-        (physics.fit_yaw_angle_to_rates(columns, roll, pitch, yaw), 4.0, None),
+        (physics.fit_roll(columns, roll, pitch), 2.0, phi),
+        (physics.fit_pitch(columns, roll, pitch), 4.0, theta),
+        (physics.fit_yaw(columns, roll, pitch, yaw), 4.0, None),
     ):
         assert found.slope == pytest.approx(slope * deg, rel=5e-3)
         assert found.correlation == pytest.approx(1.0, abs=2e-3)
         assert 50 <= found.n_windows <= 54
         if largest is not None:
             assert found.max_angle_magnitude == pytest.approx(deg * np.abs(largest[rows]).max(), rel=1e-3)
-    found = physics.fit_roll_angle_to_rates(columns, roll, pitch)
+    found = physics.fit_roll(columns, roll, pitch)
     assert found.max_rate_magnitude == pytest.approx(0.5 * np.abs(rates[0]).max())
 
 
@@ -414,7 +412,7 @@ def test_an_angle_wants_eight_windows_in_which_the_nose_is_not_steep(rows, steep
     """A last window that is not over is none; one steep row in it spoils a window."""
     t_s, rate = T_S[:rows], np.cos(T_S[:rows])
     pitch = np.where(np.arange(rows) == 50, -steep, 0.3)
-    found = physics._fit_angle_to_rate(t_s, np.sin(t_s), [rate], None, pitch)
+    found = physics._fit_angle(t_s, np.sin(t_s), [rate], None, pitch)
     assert (found and found.n_windows) == windows
 
 
@@ -425,8 +423,8 @@ def test_without_a_pitch_angle_the_nose_is_taken_to_be_level():
     rates = [0.72 * np.cos(0.8 * T_S), psi_dot * np.sin(phi), psi_dot * np.cos(phi)]
     columns, roll = [Column(T_S, one) for one in rates], Column(T_S, phi)
     for found in (
-        physics.fit_yaw_angle_to_rates(columns, roll, None, Column(T_S, psi % 6.283185307)),
-        physics.fit_roll_angle_to_rates(columns, roll, None),
+        physics.fit_yaw(columns, roll, None, Column(T_S, psi % 6.283185307)),
+        physics.fit_roll(columns, roll, None),
     ):
         assert found.slope == pytest.approx(1.0, rel=2e-3)
         assert found.correlation > 0.999
@@ -441,8 +439,8 @@ def test_an_exchange_is_told_whole_with_how_well_each_agrees():
         (("gx", "roll rate", "roll"), ("gy", "pitch rate", "pitch"), ("gz", "yaw rate", "yaw"))
     ):
         rates = {name: other if name == of else one for name, one in columns.items()}
-        said = physics.find_attitude_mistake(rates, angles, {"spare": columns[of]})
-        fit = physics._fit_angle_of_axis(list(rates.values()), angles, axis)
+        said = physics.attitude_mistake(rates, angles, {"spare": columns[of]})
+        fit = physics._fit_axis(list(rates.values()), angles, axis)
         assert said == (
             f"{angle} does not follow {of} (correlation {fit.correlation:.2f}) but spare (1.00): "
             f"spare is the {title}"
@@ -450,17 +448,17 @@ def test_an_exchange_is_told_whole_with_how_well_each_agrees():
         assert abs(fit.correlation) < 0.7
         without_it = [None if k == axis else one for k, one in enumerate(angles)]
         if axis:
-            assert physics.find_attitude_mistake(columns, without_it, {"spare": other}) is None
+            assert physics.attitude_mistake(columns, without_it, {"spare": other}) is None
 
 
 @pytest.mark.parametrize("values", [[np.nan] * 3, [np.nan, np.inf, -np.inf]])
 def test_a_column_without_a_number_has_none_at_other_times_either(values):
-    found = physics._interpolate_column(Column(np.array([0.0, 1.0, 2.5]), np.array(values)), T_S[:7])
+    found = physics._interpolate(Column(np.array([0.0, 1.0, 2.5]), np.array(values)), T_S[:7])
     assert found.shape == (7,)
     assert np.isnan(found).all()
 
 
 def test_a_column_at_other_times_lies_on_the_line_between_its_numbers():
     column = Column(np.array([1.0, 2.0, 3.0, 5.0]), np.array([4.0, np.nan, 10.0, -2.0]))
-    found = physics._interpolate_column(column, np.array([0.5, 1.0, 2.0, 4.0, 5.5]))
+    found = physics._interpolate(column, np.array([0.5, 1.0, 2.0, 4.0, 5.5]))
     np.testing.assert_allclose(found, [np.nan, 4.0, 7.0, 4.0, np.nan])

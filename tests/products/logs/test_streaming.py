@@ -8,9 +8,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
     detector_names,
     diagnose_with_detector,
-    diagnosis_rows_from_verdicts,
     loop_detector_context,
     loop_detector_inputs,
+    rows_of_verdicts,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
@@ -26,7 +26,7 @@ def by_hand(samples, model, k):
     """Residual of sample k and the groups' answers, summed term by term from the model file."""
     predicted = np.array(model.intercept)
     past = [samples.rates[k - lag] for lag in range(1, model.n_rate_lags + 1)]
-    predicted = predicted + np.concatenate(past) @ np.array(model.lagged_rate_and_signal_coefficients)
+    predicted = predicted + np.concatenate(past) @ np.array(model.past_coefficients)
     answers = [
         sum(
             samples.commands[k - lag, g] * np.array(model.command_response[g][lag - 1])
@@ -58,9 +58,7 @@ def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     context = loop_detector_context(wing_model)
     step = np.array([0.0, 0.3, 0.0])
     changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
-    np.testing.assert_allclose(
-        changed, 0.3 * np.array(wing_model.lagged_rate_and_signal_coefficients)[1], atol=1e-12
-    )
+    np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past_coefficients)[1], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["multiple-models", "sliding-least-squares"])
@@ -84,7 +82,7 @@ def test_every_detector_gives_rows(flown, wing_model):
 def test_verdicts_become_rows(flown, wing_model):
     said = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
     unknown = Verdict(True, None, "unanticipated", statistic=3.0)
-    rows = diagnosis_rows_from_verdicts(
+    rows = rows_of_verdicts(
         [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
     )
     assert rows.faulty.tolist() == [0, 1, 1, 0]

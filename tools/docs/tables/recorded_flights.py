@@ -12,7 +12,7 @@ from benchmarks import own_logs as own
 
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.recorded.benchmark import LABEL_SCORE_TITLES, SURFACE_KINDS, result_files, run_benchmark
+from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, result_files, run_benchmark
 from tools.docs.tables import shared
 
 Document = dict[str, Any]
@@ -175,7 +175,7 @@ def _delay(of: Document) -> tuple[str, str]:
 
 def _enac(document: Document) -> str:
     part = _part(document, "enac")
-    return markdown_table(("method", *(LABEL_SCORE_TITLES[key] for key in SHOWN)), [
+    return markdown_table(("method", *(LABEL_TITLES[key] for key in SHOWN)), [
         (row["method"], *_shares(row, SHOWN)) for row in (*part["rows"], *part["published"])
     ])  # fmt: skip
 

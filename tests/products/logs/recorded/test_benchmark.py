@@ -61,7 +61,7 @@ def test_tables_have_a_line_a_method(document):
 
 def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
     days = other_days.random_days(2, range(2))
-    monkeypatch.setattr(other_days, "unchanged_and_one_change_days", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: days[:1])
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: days[1:])
     page = tmp_path / "page.md"
     page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
@@ -109,21 +109,21 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
     recordings = [SimpleNamespace(name=name) for name in reversed(names)]
     folds = [([one for one in flights if one is not kept], kept, kept.samples.name) for kept in flights]
     stubs = {
-        "flights_with_usable_rows": list,
+        "fit_parts": list,
         "validation_folds": lambda stretches: folds,
         "fit_model": lambda fitted, *of: ([one.samples.name for one in fitted], *of),
-        "add_fitted_ranges_and_alarm_threshold": lambda fitted, model: (len(fitted), *model),
-        "_diagnose_with_each_method": lambda recording, kept, model: [
+        "add_ranges_and_threshold": lambda fitted, model: (len(fitted), *model),
+        "_diagnose_each": lambda recording, kept, model: [
             (method, (recording.name, kept.samples.name)) for method in ("ours", "other")
         ],
         "_score_against_log": lambda kept, rows, model: {
             "of": kept.samples.name, "rows": rows, "model": model
         },
-        "summarize_failure_scores": lambda scores: {"flights": [one["of"] for one in scores]},
+        "summarize_failures": lambda scores: {"flights": [one["of"] for one in scores]},
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(benchmark, name, stub)
-    data_set = benchmark.FlightDataSet(
+    data_set = benchmark.DataSet(
         "mine", SimpleNamespace(name="wing"), tuple(recordings), tuple(flights)
     )
     found = benchmark._compare_methods(data_set)

@@ -11,8 +11,8 @@ from beaver_ftc_logs.recorded import benchmark, other_days
 from beaver_ftc_logs.recorded.other_days import (
     DayChanges,
     apply_day_changes,
+    one_change_days,
     random_days,
-    unchanged_and_one_change_days,
     unchanged_day,
 )
 from kept import in_short
@@ -21,12 +21,12 @@ from products.logs import small
 MODEL = small.model()
 LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
 MIXER = np.array([[0.5, 0.5], [0.5, -0.5]])
-PAST = np.array(MODEL.lagged_rate_and_signal_coefficients)
+PAST = np.array(MODEL.past_coefficients)
 NOISE = np.array(MODEL.residual_covariance)
 
 
 def test_the_days_on_which_one_thing_changes(changed):
-    assert not changed([vars(day) for day in unchanged_and_one_change_days(MIXER, ["roll", "pitch"])])
+    assert not changed([vars(day) for day in one_change_days(MIXER, ["roll", "pitch"])])
 
 
 def test_drawn_days(changed):
@@ -107,7 +107,7 @@ def response_to_noise():
 def test_air_by_its_recursion():
     """Past samples of the rates alone, newest first; what signals do is no air."""
     past = np.vstack([PAST, [[9.0, 9.0, 9.0]]])  # a signal's row
-    found = other_days._rate_response_to_noise(np.random.default_rng(3), past, NOISE, 40)
+    found = other_days._response_to_noise(np.random.default_rng(3), past, NOISE, 40)
     moments = np.random.default_rng(3).standard_normal((40, 3)) @ np.linalg.cholesky(NOISE).T
     one = two = np.zeros(3)
     for k in range(40):
@@ -130,13 +130,13 @@ def test_a_wander_of_its_length():
 @pytest.mark.parametrize("length", [0.4, -0.4, 0.0])
 def test_commands_that_act_later_were_logged_earlier(length):
     values = np.column_stack([np.arange(6.0), np.arange(6.0) ** 2])
-    found = other_days._shift_values_earlier(values, length)
+    found = other_days._shifted(values, length)
     at = np.clip(np.arange(6) + length, 0, 5)
     np.testing.assert_allclose(found[:, 0], at)
     np.testing.assert_allclose(found[:, 1], np.interp(at, np.arange(6), values[:, 1]))
 
 
-ROW = dict(zip((*benchmark.LABEL_SCORE_TITLES, "beside"), (0.9, 0.8, 0.7, 0.1, 0.6, 0.5), strict=True))
+ROW = dict(zip((*benchmark.LABEL_TITLES, "beside"), (0.9, 0.8, 0.7, 0.1, 0.6, 0.5), strict=True))
 
 
 def test_mean_and_worst_of_days():
@@ -151,18 +151,18 @@ def test_mean_and_worst_of_days():
 @pytest.fixture(scope="module")
 def data():
     flight = small.flight(MODEL, 1000, lost=LOST)
-    return benchmark.FlightDataSet("set", MODEL.vehicle, (), (flight,))
+    return benchmark.DataSet("set", MODEL.vehicle, (), (flight,))
 
 
 def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = FilterSettings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
-    monkeypatch.setattr(benchmark, "settings_of_whole_flight", lambda usable_flights, data: quick)
+    monkeypatch.setattr(benchmark, "whole_settings", lambda usable_flights, data: quick)
     monkeypatch.setattr(
-        other_days, "unchanged_and_one_change_days", lambda mixer, commands: [unchanged_day(2)]
+        other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)]
     )
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
-    document = other_days._test_data_set_on_days(data)
+    document = other_days._test_data_set(data)
     assert not changed(document)
     assert [(row["kind"], row["day"]) for row in document["rows"]] == [
         ("one change", "as it was"), ("drawn, settings chosen on these", "drawn 0"),
@@ -173,14 +173,14 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     given = replace(data, recordings=data.flights)
     ours, beside = benchmark._compare_methods(given)["rows"]
     as_it_was = document["rows"][0]
-    for key in benchmark.LABEL_SCORE_TITLES:
+    for key in benchmark.LABEL_TITLES:
         assert as_it_was[key] == pytest.approx(ours[key])
     assert as_it_was["beside"] == pytest.approx(beside["classes"])
 
 
 def test_only_labelled_data_sets_have_other_days(monkeypatch, tmp_path, data):
     bare = replace(data, flights=(replace(data.flights[0], labels=np.full((1000, 2), np.nan)),))
-    monkeypatch.setattr(other_days, "_test_data_set_on_days", lambda one: one.name)
+    monkeypatch.setattr(other_days, "_test_data_set", lambda one: one.name)
     monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare, data])
     assert other_days.run_other_days(tmp_path) == {"sets": ["set"]}
     mixed = replace(data, name="mixed", flights=(*data.flights, *bare.flights))

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting
-from beaver_ftc_logs.fitting import FlightWithUsableRows
+from beaver_ftc_logs.fitting import FitPart
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from beaver_ftc_logs.samples import Samples
@@ -43,7 +43,7 @@ EVENTS = {
     "rows": [
         {
             "method": method,
-            **benchmark.summarize_failure_scores([of for of in FLIGHTS if of["method"] == method]),
+            **benchmark.summarize_failures([of for of in FLIGHTS if of["method"] == method]),
         }
         for method in DELAYS
     ],
@@ -132,7 +132,7 @@ def recording(samples):
 
 
 def data_set(model, flights):
-    return benchmark.FlightDataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
+    return benchmark.DataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def two_methods(monkeypatch):
 
 
 def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_methods):
-    monkeypatch.setattr(fitting, "_COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES", (0.0,))  # quick
+    monkeypatch.setattr(fitting, "_DELAYS_SAMPLES", (0.0,))  # quick
     flight = small.flight(MODEL, 1000, lost=LOST)
     data = data_set(MODEL, [flight])
     document = benchmark._compare_methods(data)
@@ -153,11 +153,11 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
         for method in ("bank of filters (ours)", "sliding least squares, 20 s")
     ]
     assert document["rows"][0]["classes"] > document["rows"][1]["classes"] > 0.4
-    usable_flights = fitting.flights_with_usable_rows([flight])
+    usable_flights = fitting.fit_parts([flight])
     whole = fitting.fit_model(usable_flights, MODEL.vehicle)
-    bounds = fitting.score_folds_and_choose_credible_mass(usable_flights, whole)[1]
+    bounds = fitting.score_folds(usable_flights, whole)[1]
     expected = whole.settings.model_copy(update={"credible_mass": bounds})
-    assert benchmark.settings_of_whole_flight(usable_flights, data) == expected
+    assert benchmark.whole_settings(usable_flights, data) == expected
 
 
 def test_flights_with_a_failure_are_left_out_in_turn(changed, monkeypatch, two_methods):
@@ -181,16 +181,16 @@ def test_settings_of_several_flights_are_those_of_the_fit():
     flights = [
         small.flight(MODEL, 500, seed=seed, name=str(seed), lost=((1, 100, 200, 0.5),)) for seed in (1, 2)
     ]
-    usable_flights = fitting.flights_with_usable_rows(flights)
-    settings = benchmark.settings_of_whole_flight(usable_flights, data_set(MODEL, flights))
+    usable_flights = fitting.fit_parts(flights)
+    settings = benchmark.whole_settings(usable_flights, data_set(MODEL, flights))
     assert settings == fitting.fit_model(usable_flights, MODEL.vehicle).settings
 
 
 def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
     monkeypatch.setattr(benchmark, "diagnose_with_detector", lambda name, samples, model: name)
-    usable_flight = FlightWithUsableRows(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._diagnose_with_each_method(recording(usable_flight.samples), usable_flight, MODEL))
+    usable_flight = FitPart(small.flight(MODEL, 10), np.ones(10, dtype=bool))
+    found = list(benchmark._diagnose_each(recording(usable_flight.samples), usable_flight, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip
@@ -200,26 +200,24 @@ def test_labels_count_in_the_span_of_what_is_kept():
     samples = small.flight(MODEL, 10)
     use = np.zeros(10, dtype=bool)
     use[[2, 3, 7]] = True
-    labels = benchmark.labels_nan_outside_usable_span(FlightWithUsableRows(samples, use))
+    labels = benchmark.labels_in_span(FitPart(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
     assert np.isnan(
-        benchmark.labels_nan_outside_usable_span(FlightWithUsableRows(samples, np.zeros(10, dtype=bool)))
+        benchmark.labels_in_span(FitPart(samples, np.zeros(10, dtype=bool)))
     ).all()
 
 
 def test_a_flight_is_scored_by_what_its_log_has():
     rows = small.rows([(10, "left", [1.0, 0.5])], step_s=0.1)
     use = np.ones(10, dtype=bool)
-    assert "classes" in benchmark._score_against_log(
-        FlightWithUsableRows(small.flight(MODEL, 10), use), rows, MODEL
-    )
+    assert "classes" in benchmark._score_against_log(FitPart(small.flight(MODEL, 10), use), rows, MODEL)
     bare = changed(
         small.flight(MODEL, 10),
         labels=np.full((10, 2), np.nan),
         logged_failures=(LoggedFailure(10.2, "left"),),
     )
-    assert benchmark._score_against_log(FlightWithUsableRows(bare, use), rows, MODEL)["failure"] == "left"
+    assert benchmark._score_against_log(FitPart(bare, use), rows, MODEL)["failure"] == "left"
 
 
 def test_data_sets_below_a_folder(tmp_path):

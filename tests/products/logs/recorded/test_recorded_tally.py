@@ -30,7 +30,7 @@ SCORES = [
 
 
 def test_flights_are_found_missed_or_falsely_alarmed():
-    found = benchmark.summarize_failure_scores(SCORES)
+    found = benchmark.summarize_failures(SCORES)
     assert (found["surface_failures"], found["found"]) == (6, 4)
     assert found["precision"] == pytest.approx(4 / 6)  # two flights with a false alarm
     assert found["recall"] == pytest.approx(4 / 6)
@@ -46,25 +46,25 @@ def test_flights_are_found_missed_or_falsely_alarmed():
 
 def test_delays_are_by_what_failed_first_in_the_name():
     """An aileron beside a rudder counts as an aileron; five seconds are soon."""
-    delays = benchmark.summarize_failure_scores(SCORES)["delay_s"]
+    delays = benchmark.summarize_failures(SCORES)["delay_s"]
     assert delays["aileron"] == {"failures": 3, "found": 3, "within_5_s": 2, "mean": pytest.approx(6.0)}
     assert delays["rudder"] == {"failures": 2, "found": 1, "within_5_s": 1, "mean": 2.0}
     assert delays["elevator"] == {"failures": 1, "found": 0, "within_5_s": 0, "mean": None}
 
 
 def test_where_there_is_nothing_to_count_shares_are_none_of_one():
-    found = benchmark.summarize_failure_scores([score(ENGINE, healthy_s=0.0)])
+    found = benchmark.summarize_failures([score(ENGINE, healthy_s=0.0)])
     assert [found[key] for key in ("precision", "recall", "accuracy")] == [0.0, 0.0, 0.0]
-    once = benchmark.summarize_failure_scores([score("rudder", True, 1.0)])
+    once = benchmark.summarize_failures([score("rudder", True, 1.0)])
     assert [once[key] for key in ("precision", "recall", "accuracy")] == [1.0, 1.0, 1.0]
-    assert benchmark.summarize_failure_scores([score()])["accuracy"] == 1.0
+    assert benchmark.summarize_failures([score()])["accuracy"] == 1.0
 
 
 def test_figures_by_labels_are_weighted_by_rows():
     names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
     one = {"rows": 1} | {name: 0.1 * k for k, name in enumerate(names)}
     other = {"rows": 3} | {name: 0.5 + 0.1 * k for k, name in enumerate(names)}
-    found = benchmark.summarize_label_scores([one, other])
+    found = benchmark.summarize_labels([one, other])
     assert found == {"rows": 4} | {name: pytest.approx(0.375 + 0.1 * k) for k, name in enumerate(names)}
 
 
@@ -72,14 +72,14 @@ def test_a_flight_without_a_row_of_all_labels_does_not_count():
     names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
     known = {"rows": 3} | {name: 0.5 + 0.1 * k for k, name in enumerate(names)}
     nothing = {"rows": 0} | dict.fromkeys(names)
-    found = benchmark.summarize_label_scores([nothing, known])
+    found = benchmark.summarize_labels([nothing, known])
     assert found == {"rows": 3} | {name: pytest.approx(0.5 + 0.1 * k) for k, name in enumerate(names)}
-    assert benchmark.summarize_label_scores([nothing]) == nothing
+    assert benchmark.summarize_labels([nothing]) == nothing
 
 
 EVENTS = {
     "set": "gliders", "left_out": "a flight at a time", "scored_by": "events",
-    "rows": [{"method": "ours", **benchmark.summarize_failure_scores(SCORES)}],
+    "rows": [{"method": "ours", **benchmark.summarize_failures(SCORES)}],
     "published": [
         {"method": "theirs", "precision": 0.5, "delay_s": {"aileron": {"mean": 3.0}, "rudder": {}}},
     ],

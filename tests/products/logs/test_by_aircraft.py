@@ -191,9 +191,7 @@ def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_
     path, vehicle = exported(tmp_path / "noisy", "table", tmp_path)
     declared = load_diagnosed("beaver", str(tmp_path / "noisy" / "scenario.yaml"))
     recording = read_vehicle_columns(path, vehicle)
-    assert diagnose_aircraft(recording, vehicle, declared)[2]["isolated"] == (
-        "aileron" if loss else None
-    )
+    assert diagnose_aircraft(recording, vehicle, declared)[2]["isolated"] == ("aileron" if loss else None)
     if not loss:
         with pytest.raises(BadInput, match=r"command of aileron has the other sign, there is no alarm"):
             diagnose_aircraft(changed(recording, aileron_command=np.negative), vehicle, declared)
@@ -262,9 +260,7 @@ def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
     found = by_aircraft.read_inputs(labelled, turned, BEAVER)
     np.testing.assert_array_equal(found.samples.commands, plain.samples.commands)
     np.testing.assert_allclose(found.samples.labels, np.tile([0.1, 0.3, 0.5, 0.7], (len(t_s), 1)))
-    for one, other in zip(
-        found.input_arrays, plain.input_arrays, strict=True
-    ):
+    for one, other in zip(found.input_arrays, plain.input_arrays, strict=True):
         np.testing.assert_array_equal(one, other)
     assert (found.rate_hz, found.gap_free_stretches) == (100.0, [(0, len(t_s))])
 
@@ -426,9 +422,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
         verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
     verdicts[5] = by_aircraft.Verdict(True)
     given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._unexplained_starts(
-        np.arange(10) * 0.5, [(1, 5), (5, 10)], given
-    ).items()
+    ((says, mask),) = by_aircraft._unexplained_starts(np.arange(10) * 0.5, [(1, 5), (5, 10)], given).items()
     assert (says.partition(":")[0], true(mask)) == (
         "no fault explains it from the first second on", [5, 6, 7, 8, 9],
     )  # fmt: skip

@@ -485,20 +485,9 @@ def test_names_as_the_patterns_have_them():
     assert {name: check._plain_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
     assert check._shortest_match(check._NAME_PATTERNS["p"], rates) == "GyrX"
-    assert (
-        check._shortest_match(
-            check._NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"]
-        )
-        == "agyro_x"
-    )
-    assert (
-        check._shortest_match(check._NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"])
-        == "GyrX"
-    )
-    assert (
-        check._shortest_match(check._NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"])
-        == "gyro_x"
-    )
+    assert check._shortest_match(check._NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"]) == "agyro_x"
+    assert check._shortest_match(check._NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"]) == "GyrX"
+    assert check._shortest_match(check._NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"]) == "gyro_x"
     assert check._shortest_match(check._NAME_PATTERNS["r"], rates) is None
     wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
     assert check._likely_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]

@@ -79,8 +79,7 @@ def test_a_rate_that_the_attitude_confirms_is_what_it_is(log, confirmed):
     vehicle, samples = log
     of_angles = replace(samples, confirmed_rates=frozenset(confirmed))
     every, fewer = (
-        [one.correction_text for one in corrected_logs(flight, vehicle)]
-        for flight in (samples, of_angles)
+        [one.correction_text for one in corrected_logs(flight, vehicle)] for flight in (samples, of_angles)
     )
     assert fewer == [text for text in every if not any(name in text for name in confirmed)]
     pairs = {0: 0, 1: 2, 2: 3}[len(confirmed)]  # of three rates, those with a confirmed one

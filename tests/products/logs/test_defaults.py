@@ -105,9 +105,7 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {
-        "left"
-    }
+    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {"left"}
     found = _add_unknown_surfaces(flown, model, rows)
     assert set(found.isolated_surfaces[20:]) == {"right+left"}
     assert (found.effectiveness_high[20:] == 1.0).all()

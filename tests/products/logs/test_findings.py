@@ -52,9 +52,7 @@ def test_an_event_says_what_stood_for_most_of_it():
 def test_three_seconds_are_not_brief(count, brief):
     events = fault_events(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
     assert [event["brief"] for event in events] == [brief]
-    assert (
-        events_to_show(events) == events
-    )  # where every one is brief they are all there is to say
+    assert events_to_show(events) == events  # where every one is brief they are all there is to say
 
 
 def test_what_is_estimated_in_health_parts_no_event():
@@ -216,9 +214,7 @@ def test_odds_against_a_change_are_those_of_its_median_share():
         transition_share=weight, is_fault_of_group=lambda group: np.arange(4) % 2 == (1 if group else 5)
     )
     model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._alarm_odds(model, bank, 1, 0.1) == pytest.approx(
-        np.log(9.0) - np.log(0.00025)
-    )
+    assert findings._alarm_odds(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
     assert findings._alarm_odds(model, bank, 0, 0.1) == np.inf
 
 

@@ -106,8 +106,6 @@ def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
         )
         change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(
-            np.log(
-                settings.alarm_probability / (1.0 - settings.alarm_probability) / change
-            ),
+            np.log(settings.alarm_probability / (1.0 - settings.alarm_probability) / change),
             rel=1e-9,
         )

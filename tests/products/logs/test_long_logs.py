@@ -273,9 +273,7 @@ def test_a_log_of_more_than_eighty_minutes_at_100_hz_has_parts_of_400_000_sample
 
 def test_parts_of_a_ulog_say_what_the_whole_says(tmp_path, parted_log, wing_model):
     vehicle = wing_of_topic(tmp_path)
-    whole = diagnose(
-        samples.resample(samples.read_vehicle_columns(parted_log, vehicle), vehicle), wing_model
-    )
+    whole = diagnose(samples.resample(samples.read_vehicle_columns(parted_log, vehicle), vehicle), wing_model)
     parts = list(samples.stream_flights([parted_log], vehicle))
     assert len(parts) == 5
     for part in parts:

@@ -42,9 +42,7 @@ def test_an_alfa_folder(tmp_path):
 def test_a_held_column_is_never_newer_than_its_row(tmp_path):
     folder = synthetic.write_alfa(tmp_path / "flight", duration_s=20.0)
     recording = read_flight(folder)
-    held, age_s = _latest_and_age(
-        recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s
-    )
+    held, age_s = _latest_and_age(recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s)
     np.testing.assert_allclose(held[1:], recording.columns["roll_error_rad"].values[:-1])
     assert np.isnan(held[0])
     assert age_s == pytest.approx(0.08, abs=1e-6)

@@ -83,9 +83,7 @@ def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
     bank = build_bank(WING)
     posterior = np.arange(1.0, len(bank.hypothesis_kind) + 1)[None, :] / 1000.0
     for group in (0, 1):
-        levels, mass = diagnose._group_levels(
-            bank, posterior[:, : bank.no_response_hypothesis_index], group
-        )
+        levels, mass = diagnose._group_levels(bank, posterior[:, : bank.no_response_hypothesis_index], group)
         assert levels.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
         for level, found in zip(levels, mass[0], strict=True):
             its = (bank.effectiveness[:-1, group] == level).nonzero()[0]
@@ -147,17 +145,13 @@ def test_rows_of_probabilities(changed, name):
 def test_rows_of_surfaces_together_that_may_be_stuck(changed):
     bank = build_bank(TAIL)
     shares = posterior(bank, *STUCK)
-    assert not changed(
-        held(diagnose.rows_of_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares))
-    )
+    assert not changed(held(diagnose.rows_of_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
 
 
 def test_names_by_hand():
     """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
     bank = build_bank(TAIL)
-    found = diagnose.rows_of_posterior(
-        small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK)
-    )
+    found = diagnose.rows_of_posterior(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
     assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
     aileron = "left_aileron+right_aileron"
     assert found.isolated_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
@@ -192,9 +186,7 @@ def test_names_under_other_laws(monkeypatch):
     bank = build_bank(model)
 
     def named_by(of):
-        found = diagnose.rows_of_posterior(
-            small.flight(of, len(shares)), of, bank, posterior(bank, *shares)
-        )
+        found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
         assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
         return found.isolated_surfaces.tolist()
 
@@ -213,9 +205,7 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
 
     monkeypatch.setattr(diagnose.energy, "withdraw_surfaces", renamed)
     model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_climb_mps=-1.5))
-    found = diagnose._withdraw_by_engine(
-        SimpleNamespace(energy_height_rate_mps="climb"), model, rows
-    )
+    found = diagnose._withdraw_by_engine(SimpleNamespace(energy_height_rate_mps="climb"), model, rows)
     assert given[0][:2] == ("climb", -1.5)
     assert found.isolated_surfaces.tolist() == ["left", UNKNOWN_OFFSET, "right"]
     for name, value in (("effectiveness", 1.0), ("effectiveness_low", 0.0), ("effectiveness_high", 1.0)):
@@ -406,9 +396,7 @@ def test_evidence_began_where_its_sum_was_last_at_zero(monkeypatch, threshold):
     monkeypatch.setattr(diagnose, "fault_evidence", lambda of, by: gained)
     bank = build_bank(model)
     samples = small.flight(model, 10, t_s=7.0 + 0.25 * np.arange(10))
-    found = diagnose.rows_of_posterior(
-        samples, model, bank, posterior(bank, *[{SOUND: 1.0}] * 10)
-    )
+    found = diagnose.rows_of_posterior(samples, model, bank, posterior(bank, *[{SOUND: 1.0}] * 10))
     # sums 1 3 0 2 7 1 2 0 0 2, and 1 3 0 2 4 0 1 0 0 2 where 4 is the most
     since = [0, 0, 2, 2, 2, 2, 2, 7, 8, 8] if threshold is None else [0, 0, 2, 2, 2, 5, 5, 7, 8, 8]
     assert found.evidence_start_time_s.tolist() == samples.t_s[since].tolist()

@@ -110,15 +110,11 @@ def test_the_mean_over_the_interval_that_ends_at_a_sample():
     np.testing.assert_allclose(values, [np.nan, 1.0, 3.0, 16.0, 32.0, 32.0, 64.0])
     assert delay_s == pytest.approx(0.1)
     near = column([0.1, 0.2 + 1e-8, 0.3], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(
-        of._means_and_age(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0]
-    )
+    np.testing.assert_allclose(of._means_and_age(near, np.array([0.2, 0.4]), 0.2)[0], [1.5, 4.0])
     off = column([0.1, 0.2 + 1e-6, 0.3], [1.0, 2.0, 4.0])
     np.testing.assert_allclose(of._means_and_age(off, np.array([0.2, 0.4]), 0.2)[0], [1.0, 3.0])
     both = column([-0.2 + 1e-8, 0.0, 0.2 - 1e-8], [1.0, 2.0, 4.0])
-    np.testing.assert_allclose(
-        of._means_and_age(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0]
-    )
+    np.testing.assert_allclose(of._means_and_age(both, np.array([0.0, 0.2]), 0.2)[0], [2.0, 4.0])
 
 
 def recording(n=60, step=0.1, **changes):
@@ -287,11 +283,7 @@ def test_airspeed_and_energy_are_known_where_their_columns_are():
         assert (climb is not None, airspeed is not None) == (there, speed == "V")
         if there:
             np.testing.assert_allclose(climb, [np.nan] * 5 + [3.0] * 3)
-    assert (
-        of._sampled_height_rate(log, WING, base)
-        is of._sampled_airspeed(log, WING, t_s, 1.0)
-        is None
-    )
+    assert of._sampled_height_rate(log, WING, base) is of._sampled_airspeed(log, WING, t_s, 1.0) is None
 
 
 DEG, CDEG = np.pi / 180.0, np.pi / 18000.0

@@ -16,9 +16,7 @@ def rows(estimate, low, high, faulty=None):
     faulty = np.zeros(len(estimate), dtype=int) if faulty is None else np.array(faulty)
     n = len(estimate)
     named = np.full(n, "", dtype=object)
-    return LogRows(
-        np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n)
-    )
+    return LogRows(np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n))
 
 
 def test_figures_by_labels():

@@ -164,9 +164,7 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
 ])  # fmt: skip
 def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
-    found = physics.fit_pitch(
-        [Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta)
-    )
+    found = physics.fit_pitch([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, angle * theta)), None]
@@ -189,9 +187,7 @@ def yawed(seed=1):
 def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
     columns = [Column(T_S, one) for one in (p, q, r)]
-    found = physics.fit_yaw(
-        columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed())
-    )
+    found = physics.fit_yaw(columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed()))
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": columns[0], "gy": columns[1], "gz": Column(T_S, factor * r)}
     angles = [
@@ -250,9 +246,7 @@ def test_another_column_in_the_place_of_a_rate_is_found_by_the_angle_that_follow
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), ("yaw", Column(T_S, yawed()))]
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, np.sin(2.1 * T_S)), "gz": Column(T_S, r)}
     assert physics.attitude_mistake(rates, angles, {}) is None
-    said = physics.attitude_mistake(
-        rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)}
-    )
+    said = physics.attitude_mistake(rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)})
     assert said is not None
     assert said.startswith("pitch does not follow gy")
     assert said.endswith("alpha is the pitch rate")

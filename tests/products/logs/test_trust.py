@@ -265,9 +265,7 @@ def test_commands_that_nothing_follows_are_not_credible(model):
     rows = finish_rows(flown, model, diagnose(flown, model), silent=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
-    assert [reason.split(":")[0] for reason in rows.doubtful_rows] == [
-        "nothing answers the commands"
-    ]
+    assert [reason.split(":")[0] for reason in rows.doubtful_rows] == ["nothing answers the commands"]
 
 
 def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
@@ -284,9 +282,7 @@ def test_a_model_that_claims_nothing_says_nothing(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
     assert not rows.credible.any()
-    assert list(rows.doubtful_rows) == [
-        "of no surface is the effect known from the flights fitted"
-    ]
+    assert list(rows.doubtful_rows) == ["of no surface is the effect known from the flights fitted"]
 
 
 @pytest.mark.parametrize(

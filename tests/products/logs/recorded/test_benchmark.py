@@ -123,9 +123,7 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(benchmark, name, stub)
-    data_set = benchmark.DataSet(
-        "mine", SimpleNamespace(name="wing"), tuple(recordings), tuple(flights)
-    )
+    data_set = benchmark.DataSet("mine", SimpleNamespace(name="wing"), tuple(recordings), tuple(flights))
     found = benchmark._compare_methods(data_set)
     assert [(one["left_out"], one["method"]) for one in found["flights"]] == [
         (name, method) for name in names for method in ("ours", "other")

@@ -158,9 +158,7 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = FilterSettings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
     monkeypatch.setattr(benchmark, "whole_settings", lambda usable_flights, data: quick)
-    monkeypatch.setattr(
-        other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)]
-    )
+    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)])
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
     document = other_days._test_data_set(data)
     assert not changed(document)

@@ -203,9 +203,7 @@ def test_labels_count_in_the_span_of_what_is_kept():
     labels = benchmark.labels_in_span(FitPart(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
-    assert np.isnan(
-        benchmark.labels_in_span(FitPart(samples, np.zeros(10, dtype=bool)))
-    ).all()
+    assert np.isnan(benchmark.labels_in_span(FitPart(samples, np.zeros(10, dtype=bool)))).all()
 
 
 def test_a_flight_is_scored_by_what_its_log_has():

@@ -6,7 +6,7 @@ About each body axis let xi, rad/s, be the true rate less that of the gyro, and 
 
 nu, rad/s2, is the innovation of the rates; d, rad/s2, the drift of the whitening filters (likelihood.py);
 D, 1/s, the damping of the rates; A, rad, the turn of the attitude beyond that of the gyros; v, rad, the noise
-of the attitude; phi, rad/s2, a fault of a surface. An error of a gyro is part of nu whatever its course. So
+of the attitude; phi, rad/s2, a fault of a surface. An error of a gyro is part of nu for any course of it. So
 the Kalman filter of (psi, xi, d) with the input nu predicts A with a broken gyro, too, and its innovation g,
 of variance S, is white. A fault of a surface is part of nu as well, but the attitude turns with the gyro: g
 contains its response.

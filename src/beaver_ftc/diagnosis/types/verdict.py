@@ -476,8 +476,8 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
     if constant and not fdi["types"]["config"]["has_eG"]:
         ev = srf["evidence"]
         brief = ev["n_anomalous"] - ev["n_rest"] < fdi["types"]["config"]["half_frames"]
-        beside = CONSTANT | registry.MUST_SHOW | CAN_LOOK_LIKE[:, constant].any(axis=1)
-        kinds = [h for h in kinds if brief or beside[h]]
+        alike = CONSTANT | registry.MUST_SHOW | CAN_LOOK_LIKE[:, constant].any(axis=1)
+        kinds = [h for h in kinds if brief or alike[h]]
     pitch_pair = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
     if pitch_pair and (MODE[constant] == GIVE_UP).any():
         # if the other surface is off as well, each constant may be one of another type

@@ -51,8 +51,8 @@ N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with
 The sums are updated once per TONE_INTERVAL_S: no frequency of the grid changes its phase much in that
 time.
 
-Letters of the kernels, in addition to those of likelihood.py: i and k are an axis or a force, j a regressor; in the
-tests of tones k is a frequency, t their record, c their configuration.
+Letters of the kernels, in addition to those of likelihood.py: i and k are an axis or a force, j a regressor;
+in the tests of tones k is a frequency, t their record, c their configuration.
 
     m, col      direction of a view and g / |g|, (5,): roll, pitch, yaw, side force, normal force
     b, f        block of a view; record of a force; `rates`: block of the rates that the view combines

@@ -194,7 +194,7 @@ MISMATCH = {
 IDENTIFY = {
     "beaver_ftc_logs__mixing__load_vehicle_for_logs": ("vehicle", ["mixed"]),
     "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
-    "beaver_ftc_logs__identification__scale_by_dynamic_pressure_if_better": (
+    "beaver_ftc_logs__identification__scale_if_better": (
         [SimpleNamespace(name="pressed", n_log_parts=2, notes=["long"])],
         "described",
     ),
@@ -205,7 +205,7 @@ IDENTIFY = {
     "beaver_ftc_logs__model__model_file_text": "text",
     "studies__engine__store__write_whole": None,
     "beaver_ftc_logs__pages__render_identification": "page",
-    "beaver_ftc_logs__pages__refuse_to_replace_foreign_file": None,
+    "beaver_ftc_logs__pages__refuse_foreign_file": None,
 }
 DIAGNOSE = {
     "beaver_ftc_logs__detectors__check_detector_name": None,
@@ -222,21 +222,21 @@ DIAGNOSE = {
     "beaver_ftc_logs__pages__write_results": "folder",
 }
 BY_AIRCRAFT = {
-    "beaver_ftc_logs__by_aircraft__load_aircraft_and_declared_errors": SimpleNamespace(
+    "beaver_ftc_logs__by_aircraft__load_diagnosed": SimpleNamespace(
         name="diagnosed", aircraft=SimpleNamespace(surfaces=("left", "right"))
     ),
-    "beaver_ftc_logs__by_aircraft__read_diagnosis_inputs": lambda part, *_: SimpleNamespace(
+    "beaver_ftc_logs__by_aircraft__read_inputs": lambda part, *_: SimpleNamespace(
         name=f"inputs of {part}", samples=f"samples of {part}"
     ),
-    "beaver_ftc_logs__by_aircraft__diagnose_aircraft_inputs": lambda inputs, _: (
+    "beaver_ftc_logs__by_aircraft__diagnose_inputs": lambda inputs, _: (
         f"rows by {inputs.name}", {"flight": inputs.samples},
     ),
     "beaver_ftc_logs__by_aircraft__as_text": lambda each: each["flight"],
     "beaver_ftc_logs__readers__check_exists": None,
-    "beaver_ftc_logs__samples__read_parts_for_vehicle": ["part 1", "part 2"],
+    "beaver_ftc_logs__samples__read_vehicle_parts": ["part 1", "part 2"],
     "beaver_ftc_logs__mixing__load_vehicle_for_logs": ("vehicle", ["mixed"]),
     "beaver_ftc_logs__scoring__score_diagnosis": 0.5,
-    "beaver_ftc_logs__pages__write_diagnosis_with_aircraft_model": "folder",
+    "beaver_ftc_logs__pages__write_aircraft_diagnosis": "folder",
 }  # fmt: skip
 IMPORT = {
     "beaver_ftc_aircraft__gtm__conversion__convert": SimpleNamespace(name="gtm", folder=Path("folder/gtm")),

@@ -151,11 +151,11 @@ def test_what_is_dear_is_red_when_its_probe_prints_otherwise():
     assert "the probe has changed" in finding.words
     assert not finding.said
     (finding,) = refreshed(
-        f"{STANDS}It was not flown again since 1ab.\n", {"fly near": Output("0.03")}
+        f"{STANDS}It was not flown again since `1ab`.\n", {"fly near": Output("0.03")}
     ).findings
     assert finding.said
     (finding,) = refreshed(
-        f"{STANDS}It was not flown again since 2cd.\n", {"fly near": Output("0.03")}
+        f"{STANDS}It was not flown again since `2cd`.\n", {"fly near": Output("0.03")}
     ).findings
     assert not finding.said
     (finding,) = refreshed(DEAR.replace(" | at {}", ""), NEAR).findings

@@ -164,7 +164,7 @@ class Refreshed:
         elif origin.at is None:
             self._wrong(made.line, f"never printed: python -m tools.docs {self.page.name} --dear")
         elif probe is not None and origin.at[2] != digest:
-            told = f"not flown again since {origin.at[0]}" in self.page.text.replace("`", "")  # to the readers
+            told = f"not flown again since {origin.at[0]}" in self.page.text.replace("`", "")
             (self._say if told else self._wrong)(
                 made.line,
                 f"the probe has changed, {origin.at[2]} stands, {digest} is printed by {origin.probe}: "

@@ -7,6 +7,7 @@ import pytest
 from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.model import DPT, measured_slipstream
+from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.monitors import (
     ENGINE_MONITOR_RECORD,
@@ -611,7 +612,7 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test = monitor["redundancy"]["test"]
     test["B"][:] = 9.0
     test["B"][TURN_TEST + 1, 0] = 0.02
-    limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
+    limit = 0.02 + H * (0.3 + attitude.DAMPING_TOLERANCE * 0.5)
     test["residual"][TURN_TEST + 1] = size * limit + H * 0.5
     watching.exclude_gyros(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear

@@ -66,9 +66,9 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
-        r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
+        n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
         R_j=(3, n_h, n, n_b),
-        score=float,  # the larger sum of the frame, over its level
+        score=float,  # the larger sum of the frame, over its level, after an alarm
         e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
         T=(3, n_a), E=(3, n_a), T_std=n_a,
         turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
@@ -113,21 +113,30 @@ def add_turn(att, i, turn):
 
 
 @kernel
-def compare_attitude(att, blocks, eta, with_Z, x, dt):
-    """Advance the comparison by a frame of dt s that the blocks have whitened, and fill `score` and `gyro`.
+def compare_attitude(att, blocks, eta, with_Z, x, dt, detected):
+    """Advance the comparison by a frame of dt s that the blocks have whitened.
 
-    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates.
+    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
+    they can decide anything: after an alarm of the rates, `detected`, or if a turn is beyond its level.
     """
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
     for i in range(3):
-        b = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
-        advance_axis(att, i, b, i // 2, eta[i], with_Z, dt)
+        blk = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
+        advance_axis(att, i, blk, i // 2, eta[i], with_Z, dt)
+    att.score, att.gyro = 0.0, -1
+    if detected or max(att.turn_score[0], att.turn_score[1], att.turn_score[2]) > 1.0:
+        fill_score(att, blocks)
+        find_gyro(att)
+
+
+@kernel
+def fill_score(att, blocks):
+    """Fill `score`: the larger of both sums over all axes and losses, over the level."""
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
     for i in range(3):
         att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
-    find_gyro(att)
 
 
 @kernel
@@ -148,7 +157,7 @@ def sum_turns(att, x, dt):
 @kernel
 def find_gyro(att):
     """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1."""
-    att.gyro, worst = -1, 0
+    worst = 0
     for i in range(3):
         if att.turn_score[i] > att.turn_score[worst]:
             worst = i
@@ -160,16 +169,17 @@ def find_gyro(att):
 
 
 @kernel
-def advance_axis(att, i, b, row, eta, with_Z, dt):
+def advance_axis(att, i, blk, row, eta, with_Z, dt):
     """Advance filter, responses and sums of axis i, in this row of its block."""
-    K0, K1, K2, S = advance_P(att, i, b, row, dt)
-    D, a, n = att.D[i, i], b.a, b.n_Z
+    K0, K1, K2, S = advance_P(att, i, blk, row, dt)
+    D, a, n = att.D[i, i], blk.a, blk.n_Z if with_Z else 0
+    att.n[i] = n + N_FURTHER
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
     for j in range(n):
-        att.r[j] = b.regressor[j, row] if with_Z else 0.0
+        att.r[j] = blk.regressor[j, row]
     att.r[n] = eta
-    u = -b.nu[row]
+    u = -blk.nu[row]
     for j in range(3):
         att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
         if j != i:
@@ -177,44 +187,45 @@ def advance_axis(att, i, b, row, eta, with_Z, dt):
     std = np.sqrt(S)
     g = respond(att.s[i], att.A[i], u, D, a, K0, K1, K2, dt) / std
     leak(att.z[i], att.a, g)
-    for j in range(n + N_FURTHER):
+    for j in range(att.n[i]):
         att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K0, K1, K2, dt) / std
         leak(att.z_j[i, j], att.a, att.g_j[j])
-    for h, hypothesis in enumerate(b.hypothesis[: b.n_h]):
+    for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
             leak(att.N[i, h], att.b, g_s * g)
             leak(att.M[i, h], att.b, g_s * g_s)
-            for j in range(n + N_FURTHER):
+            for j in range(att.n[i]):
                 leak(att.R_j[i, h, j], att.b, g_s * att.g_j[j])
 
 
 @kernel
-def tol(b, j):
-    """tol_j of a constant: of a coefficient, of the bounded uncertainty, or of the damping."""
-    if j < b.n_Z:
-        return b.tol[j]
-    return 1.0 if j == b.n_Z else DAMPING_TOLERANCE
+def tol(blk, j, n):
+    """tol_j of constant j of n: of a coefficient, of the bounded uncertainty, or of the damping."""
+    k = j - n + N_FURTHER
+    if k < 0:
+        return blk.tol[j]
+    return 1.0 if k == 0 else DAMPING_TOLERANCE
 
 
 @kernel
-def largest_sum(att, b, i):
+def largest_sum(att, blk, i):
     """The largest leaky sum of axis i that no constant explains, over the level."""
-    largest = 0.0
+    largest, n = 0.0, att.n[i]
     for m, a in enumerate(att.a):
         excess = abs(att.z[i, m])
-        for j in range(b.n_Z + N_FURTHER):
-            excess -= tol(b, j) * abs(att.z_j[i, j, m])
+        for j in range(n):
+            excess -= tol(blk, j, n) * abs(att.z_j[i, j, m])
         largest = max(largest, excess * np.sqrt(1.0 - a * a))
     return largest / att.level
 
 
 @kernel
-def largest_correlation(att, b, first, step):
-    """The largest correlation with a loss, over the axes of a b, every step-th from the first on, that no
+def largest_correlation(att, blk, first, step):
+    """The largest correlation with a loss, over the axes of a block, every step-th from the first on, that no
     constant explains, over the level."""
-    largest = 0.0
-    for h, hypothesis in enumerate(b.hypothesis[: b.n_h]):
+    largest, n = 0.0, att.n[first]
+    for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind != LOSS:
             continue
         for m in range(att.b.size):
@@ -222,11 +233,11 @@ def largest_correlation(att, b, first, step):
             for i in range(first, 3, step):
                 N += att.N[i, h, m]
                 M += att.M[i, h, m]
-            for j in range(b.n_Z + N_FURTHER):
+            for j in range(n):
                 R = 0.0
                 for i in range(first, 3, step):
                     R += att.R_j[i, h, j, m]
-                excess -= tol(b, j) * abs(R)
+                excess -= tol(blk, j, n) * abs(R)
             excess += abs(N)
             if M > 0.0:
                 largest = max(largest, excess / np.sqrt(M))
@@ -244,9 +255,9 @@ def respond(s, A, u, D, a, K0, K1, K2, dt):
 
 
 @kernel
-def advance_P(att, i, b, row, dt):
+def advance_P(att, i, blk, row, dt):
     """Gains K of the frame for axis i, and S, rad2: P <- F P F' + Q, then P <- P - K P[0]."""
-    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], b.a
+    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], blk.a
     for c in range(3):
         F_P[0, c] = P[0, c] + dt * P[1, c]
         F_P[1, c] = (1.0 - dt * D) * P[1, c] + dt * P[2, c]
@@ -255,8 +266,8 @@ def advance_P(att, i, b, row, dt):
         P[c, 0] = F_P[c, 0] + dt * F_P[c, 1]
         P[c, 1] = (1.0 - dt * D) * F_P[c, 1] + dt * F_P[c, 2]
         P[c, 2] = a * F_P[c, 2]
-    P[1, 1] += dt * dt * b.Q_x[row]
-    P[2, 2] += dt * b.Q_d[row, row]
+    P[1, 1] += dt * dt * blk.Q_x[row]
+    P[2, 2] += dt * blk.Q_d[row, row]
     S = P[0, 0] + att.R
     K0, K1, K2 = P[0, 0] / S, P[1, 0] / S, P[2, 0] / S
     for c in range(3):

@@ -173,21 +173,23 @@ def clear_sensors(mon, y):
         broken = broken or is_frozen(mon, i)
     if broken:
         M.cleared[flow] = 1
-    clear_gyros(mon, mon.redundancy.test[alarm])
+    clear_gyros(mon, y)
 
 
 @kernel
-def clear_gyros(mon, flow):
-    """Clear each gyro whose axis does not turn as an error would that explains the test of the flow.
+def clear_gyros(mon, y):
+    """Clear each gyro whose axis does not turn in this sample as an error would that explains the incidence,
+    or the sideslip. Near the vertical the attitude shows no turn.
 
     turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
     """
-    M = mon.memory
+    M, red, alarm = mon.memory, mon.redundancy, mon.output.alarm_test
+    if alarm == SPEED_TEST or too_steep(red, y) or M.turn_max == 0.0:
+        return
     for i in range(3):
-        turn = mon.redundancy.test[TURN_TEST + i]
-        for m in range(flow.r.size):
-            if M.turn_max > 0.0 and abs(turn.r[m]) < M.turn_max < abs(flow.r[m]) - flow.B[m]:
-                M.cleared[i] = 1
+        turn = abs(red.test[TURN_TEST + i].residual)
+        if turn < M.turn_max < abs(red.test[alarm].residual) - red.test[alarm].B[0]:
+            M.cleared[i] = 1
 
 
 @kernel
@@ -308,7 +310,6 @@ VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alo
 RATE_POLE = 1
 
 # Gyro or attitude (judge_gyros)
-DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of w
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 MAX_DYNAMICS_PER_S = 10.0
 JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
@@ -471,7 +472,7 @@ def exclude_gyros(mon):
     for i in range(3):
         test = mon.redundancy.test[TURN_TEST + i]
         leak(M.gap[i], c.decay, test.residual + h * M.w[i])
-        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + DAMPING_TOLERANCE * abs(M.w[i])))
+        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(M.w[i])))
         for m in range(c.decay.size):
             if abs(M.gap[i, m]) > M.gap_bound[i, m] + test.B[m]:
                 rule_out_gyros(mon)

@@ -324,8 +324,9 @@ def update_tests(fdi, prediction, measured, k, t):
     may_end = not fdi.config.abrupt
     statistical.update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end)
     if stat.attitude.enabled:
-        attitude.compare_attitude(stat.attitude, blocks, eta, cfg.regress, measured.x, dt)
-        if fdi.verdict.detected and stat.attitude.score > 1.0:
+        att, detected = stat.attitude, fdi.verdict.detected
+        attitude.compare_attitude(att, blocks, eta, cfg.regress, measured.x, dt, detected)
+        if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
     parity.turn_views(views, force, gust, fdi.bound, means.G_old, means.Gu_old)
     parity.project_innovation(views, cfg.regress, stat.noise, blocks, force, gust, vaneless, nu, y[AIRSPEED])

@@ -115,6 +115,9 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     check_scheme(scenario)
     if scenario.fdi.pairs:
         raise BadInput(f"{scenario.name}: fdi.pairs: two faults leave no one parameter, allowed: false")
+    if not scenario.fdi.bounds.actuators.is_none:
+        says = "fdi.bounds.actuators: where a doublet brings the surfaces is then not certain"
+        raise BadInput(f"{scenario.name}: {says}, allowed with separate: none")
     log, recorder = MemoryLog(), Recorder(scenario)
     landing = fly(scenario, log, watch=recorder.watch)
     if landing.detection_time_s is None:

@@ -26,9 +26,10 @@ class Surface:
         for name, value in properties.items():
             self.plant.write(f"failures/{self.name}/{name.replace('__', '-')}", value)
 
-    def actuator(self, bandwidth=0.0, rate_limit=0.0):
+    def actuator(self, bandwidth=0.0, rate_limit=0.0, dead_band=0.0):
         self.plant.write(f"actuators/{self.name}/bandwidth-rad_sec", bandwidth)
         self.plant.write(f"actuators/{self.name}/rate-limit-rad_sec", rate_limit)
+        self.plant.write(f"actuators/{self.name}/dead-band-rad", dead_band)
 
     def run(self, frames=1):
         """Positions after each of so many frames."""
@@ -228,3 +229,19 @@ def test_the_aircraft_loads_healthy_and_ideal():
         assert {each: plant.read(f"failures/{name}/{each}") for each in healthy} == healthy
         assert plant.read(f"actuators/{name}/bandwidth-rad_sec") == 0
         assert plant.read(f"actuators/{name}/rate-limit-rad_sec") == 0
+
+
+@pytest.mark.parametrize("bandwidth", [0.0, 10.0])
+def test_a_dead_band_is_left_between_command_and_surface(surface, bandwidth):
+    """Within it nothing moves; beyond it the surface goes to where it begins, by its lag."""
+    surface.actuator(bandwidth, dead_band=0.02)
+    surface.command(0.015)
+    assert surface.run(20) == pytest.approx(np.zeros(20), abs=0.0)
+    surface.command(0.05)
+    share = 1.0 - exp(-bandwidth * DT) if bandwidth else 1.0
+    expected = 0.03 * (1.0 - (1.0 - share) ** np.arange(1, 21))
+    assert surface.run(20) == pytest.approx(expected, abs=1e-12)
+    surface.command(0.05 - 0.03)
+    assert surface.run(3) == pytest.approx(expected[-1] * np.ones(3), abs=1e-12)
+    surface.fail(hardover=1)
+    assert surface.run(200)[-1] == TRAVEL[surface.name].max_rad

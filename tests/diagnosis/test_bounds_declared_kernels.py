@@ -44,12 +44,12 @@ def acceleration(design, y, u, off=()):
 
 def test_errors_of_the_model_add_by_their_squares(design):
     """Each measurement, surface and coefficient off by itself: what that moves, one after the other."""
-    air_data, deflection = np.array([0.02, 0.03, 2.0, 60.0]), 0.03
+    air_data, deflection = np.array([0.02, 0.03, 2.0, 60.0]), np.array([0.03, 0.02, 0.05, 0.0])
     tolerance = np.zeros(len(AIRCRAFT.moments))
     tolerance[[1, 5, 8]] = 0.3 * np.abs(design["moments"]["value"][0][[1, 5, 8]])
     here = acceleration(design, Y, U)
     apart = [acceleration(design, Y + np.eye(8)[i] * air_data[i], U) - here for i in range(N_AIR_DATA)]
-    apart += [acceleration(design, Y, U + deflection * e) - here for e in np.eye(4)]
+    apart += [acceleration(design, Y, U + e) - here for e in np.diag(deflection)]
     for k in (1, 5, 8):
         term = AIRCRAFT.moments[k]
         more = 1.0 + 0.3 * np.sign(design["moments"]["value"][0][k])
@@ -62,7 +62,7 @@ def test_errors_of_the_model_add_by_their_squares(design):
 def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
     for i in (0, 1, 3):
         air_data = 0.04 * Y[:N_AIR_DATA] * (np.arange(N_AIR_DATA) == i)
-        found = model_error_std(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
+        found = model_error_std(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), np.zeros(4))
         off = Y.copy()
         off[i] *= 1.04
         assert found == pytest.approx(np.abs(acceleration(design, off, U) - acceleration(design, Y, U)))

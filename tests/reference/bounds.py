@@ -133,25 +133,25 @@ def published_bound(declaration: Declaration, model: DesignModel, x: np.ndarray)
 
 
 class Bounds:
-    """The bounds of one flight, at every instant. x (instants, 3), y, u: readings and healthy positions."""
+    """The bounds of one flight, at every instant. x (instants, 3), y, u, du: readings, healthy
+    positions and their tolerances."""
 
     def __init__(
-        self, declaration: Declaration, model: DesignModel, x: np.ndarray, y: np.ndarray, u: np.ndarray
-    ) -> None:
+        self, declaration: Declaration, model: DesignModel,
+        x: np.ndarray, y: np.ndarray, u: np.ndarray, du: np.ndarray,
+    ) -> None:  # fmt: skip
         self.declaration, self.model, self.sizes = declaration, model, Magnitudes(declaration, model, x, y)
         self.tolerance = [declaration.coefficient_share(t.name) * abs(t.value) for t in model.terms]
         self.inertia_error = model.inertia_errors(declaration["bounds.inertia"])
         self.level = self.box = self.row = None
-        self.x, self.y, self.u = x, y, u
+        self.x, self.y, self.u, self.du = x, y, u, du
         self.mu = self._mapped(x, y, u)
         self.now = published_bound(declaration, model, self.sizes.x_largest) + self._declared(u) + self.mu
 
     def _declared(self, u: np.ndarray) -> np.ndarray:
         """eta_bar_e: sum over the products of the model of prod(|v| + e) - prod |v|."""
         sizes, K, dK = self.sizes, self.model.inertia, self.inertia_error
-        moment, largest = self.moments(
-            np.abs(u), np.abs(u) + np.radians(self.declaration["bounds.deflection_deg"])
-        )
+        moment, largest = self.moments(np.abs(u), np.abs(u) + self.du)
         found = np.zeros((len(u), 3))
         for axis in range(3):
             for i, j, name in RATE_PRODUCTS[axis]:
@@ -251,10 +251,13 @@ class Bounds:
         return aircraft.travel * [factor if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
 
     def _level_of(self, given: dict, u: np.ndarray) -> np.ndarray:
-        """Index of the least share that covers surfaces at u; the last if two surfaces may be anywhere."""
+        """Index of the least share that covers surfaces within du of u; the last if two may be anywhere."""
         shares = given["travel_share"]
         if self.declaration.all_types and self.declaration["pairs"]:
             return np.full(len(u), len(shares) - 1)
         low, high = self.mapped_travel()
-        used = np.where(u > 0, u / high, np.where(u < 0, u / low, 0.0)).max(axis=1)
+        used = np.maximum(
+            *((end > 0) * end / high + (end < 0) * end / low for end in (u - self.du, u + self.du))
+        )
+        used = used.max(axis=1)
         return np.minimum(np.searchsorted(shares, used), len(shares) - 1)

@@ -260,5 +260,6 @@ DEFAULTS: dict[str, Any] = {
     "bounds": {
         "inertia_coupling": dict.fromkeys(AXES, 0.25), "constant_rad_s2": dict.fromkeys(AXES, 0.02),
         "coefficients": 0.0, "inertia": 0.0, "sensors": "ideal", "deflection_deg": 0.0, "turbulence": "none",
+        "actuators": {},
     },
 }  # fmt: skip

@@ -67,10 +67,10 @@ def diagnose(declaration: Declaration, readings: Readings) -> Result:
     n, (x, y) = declaration.n, (readings.x, readings.y)
     model = DesignModel(declaration)
     model.anchor(*readings.trim)
-    u = servo_positions(declaration, readings.command, readings.command[0])
+    u, du = servo_positions(declaration, readings.command, readings.command[0])
     G = model.G(y)
     frames = frames_of(declaration, model.f(x, y), G, u)
-    bounds = Bounds(declaration, model, x, y, u)
+    bounds = Bounds(declaration, model, x, y, u, du)
     at_frames = x[::n]
     nu = np.concatenate([np.full((1, 3), np.nan), np.diff(at_frames, axis=0) / declaration.dt - frames.F[1:]])
     eta_bar, changing = mean_of_frames(n, bounds.now), gyro_error(declaration, at_frames)

@@ -86,9 +86,9 @@ class Noise:
     def _bounded(self) -> np.ndarray:
         """eta_bar of the tests: the published part, deflections at trim, mu of a derived model. The rest of
         eta_bar is unknown constants."""
-        G = np.abs(self.model.nonlinear_G(self.trim[1])).sum(axis=1)
+        G = np.abs(self.model.nonlinear_G(self.trim[1]))
         found = published_bound(self.declaration, self.model, np.abs(self.x))
-        found = found + G * np.radians(self.declaration["bounds.deflection_deg"])
+        found = found + self.bounds.du @ G.T
         return found + np.minimum(self.bounds.mu, MOST_MAPPED_RAD_S2)
 
     def _change(self) -> np.ndarray:

@@ -6,7 +6,6 @@ Arrays have one row for each instant (a JSBSim step), the last axis is that of t
 """
 
 from itertools import product
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ RATE_PRODUCTS = (
     ((0, 1, "Rpq"), (1, 2, "Rqr")),
 )
 MOMENT_FACTORS = ((0, "Pl"), (2, "Pn")), ((1, "Qm"),), ((0, "Rl"), (2, "Rn"))
+ACTUATOR_ERRORS = ("bandwidth", "rate_limit", "dead_band_deg")
 MAIN_PRODUCT = ((1, 2, "Pqr"), (0, 2, "Qpr"), (0, 1, "Rpq"))  # detection.md: C_i x_j x_l
 
 
@@ -171,29 +171,62 @@ class DesignModel:
         return largest
 
 
-def servo_positions(declaration: Declaration, command: np.ndarray, start: np.ndarray) -> np.ndarray:
+class Servos:
+    """The actuators of an aircraft as they are declared, with factors on bandwidth and rate limit.
+
+        u <- u + limited((target - u) (1 - exp(-bandwidth dt_s))),   |limited| <= rate limit times dt_s
+
+    within the travel. Ideal surfaces are at their command.
+    """
+
+    def __init__(self, declaration: Declaration, of_bandwidth: np.ndarray, of_limit: np.ndarray) -> None:
+        given = declaration.design_model.get("actuators") or declaration.scenario.get("actuators") or "ideal"
+        of_all = given if isinstance(given, dict) else {}
+        one = [of_all.get(s, of_all) for s in declaration.aircraft.surfaces]
+        bandwidth = np.array([of.get("bandwidth_rad_s", 0.0) for of in one]) * of_bandwidth
+        limit = np.radians([of.get("rate_limit_deg_s", 0.0) for of in one]) * of_limit
+        dt_s = declaration.dt / declaration.n
+        self.travel, self.ideal = declaration.aircraft.travel, not (bandwidth.any() or limit.any())
+        self.share = np.where(bandwidth > 0, 1.0 - np.exp(-bandwidth * dt_s), 1.0)
+        self.step = np.where(limit > 0, limit * dt_s, np.inf)
+
+    def moved(self, u: np.ndarray, target: np.ndarray) -> np.ndarray:
+        """Where surfaces at u (surfaces,) rad are a JSBSim step later."""
+        if self.ideal:
+            return target
+        way = (np.clip(target, *self.travel) - u) * self.share
+        return np.clip(u + np.clip(way, -self.step, self.step), *self.travel)
+
+
+def servo_positions(
+    declaration: Declaration, command: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Positions u (instants, surfaces) rad of healthy surfaces under the command (instants, surfaces) rad
-    that acts in each JSBSim step:
+    that acts in each JSBSim step, and how far from u they may be by the declared errors, du.
 
-        u <- u + limited((command - u) (1 - exp(-bandwidth dt_s))),   |limited| <= rate limit times dt_s
-
-    within the travel. Ideal surfaces are at their command."""
-    given = declaration.design_model.get("actuators") or declaration.scenario.get("actuators") or "ideal"
-    of_all = given if isinstance(given, dict) else {}
-    one = [of_all.get(s, of_all) for s in declaration.aircraft.surfaces]
-    bandwidth = np.array([of.get("bandwidth_rad_s", 0.0) for of in one])
-    limit = np.radians([of.get("rate_limit_deg_s", 0.0) for of in one])
-    if not (bandwidth.any() or limit.any()):
-        return command.copy()
-    dt_s, (low, high) = declaration.dt / declaration.n, declaration.aircraft.travel
-    share = np.where(bandwidth > 0, 1.0 - np.array([exp(-w * dt_s) for w in bandwidth]), 1.0)
-    step = np.where(limit > 0, limit * dt_s, np.inf)
-    u = np.empty_like(command)
-    u[0] = start
+    The ends of where a surface may be go by the furthest of all steps that errors of bandwidth and rate limit
+    allow, to a target within the dead band of the command."""
+    errors, surfaces = declaration["bounds.actuators"], declaration.aircraft.surfaces
+    each = [{**errors, **errors.get(s, {})} for s in surfaces]
+    w, r, d = (np.array([of.get(key, 0.0) for of in each]) for key in ACTUATOR_ERRORS)
+    known, band, travel = (
+        Servos(declaration, 1.0 + 0.0 * w, 1.0 + 0.0 * r),
+        np.radians(d),
+        declaration.aircraft.travel,
+    )
+    possible = [Servos(declaration, 1.0 + i * w, 1.0 + j * r) for i, j in product((-1.0, 1.0), repeat=2)]
+    u, low, high = command.copy(), command.copy(), command.copy()
+    u[0], low[0], high[0] = start, np.clip(start - band, *travel), np.clip(start + band, *travel)
     for j in range(1, len(command)):
-        wanted = np.clip(command[j], low, high)
-        u[j] = np.clip(u[j - 1] + np.clip((wanted - u[j - 1]) * share, -step, step), low, high)
-    return u
+        u[j] = known.moved(u[j - 1], command[j])
+        low[j] = np.min(
+            [of.moved(low[j - 1], np.clip(command[j] - band, *travel)) for of in possible], axis=0
+        )
+        high[j] = np.max(
+            [of.moved(high[j - 1], np.clip(command[j] + band, *travel)) for of in possible], axis=0
+        )
+    spread = np.maximum(high - u, u - low) if (w + r + d).any() else np.zeros_like(u)
+    return u, np.radians(declaration["bounds.deflection_deg"]) + spread
 
 
 class Frames(NamedTuple):

@@ -59,6 +59,10 @@ SECTIONS: dict[str, dict[str, Document]] = {
     },
     "inertia": {"-": {}, "some": {"inertia": 0.03}},
     "deflection": {"-": {}, "some": {"deflection_deg": 0.1}},
+    "servo errors": {
+        "-": {}, "all": {"actuators": {"bandwidth": 0.2, "rate_limit": 0.1, "dead_band_deg": 0.1}},
+        "some": {"actuators": {"bandwidth": 0.3, "elevator": {"dead_band_deg": 0.2}}},
+    },
 }  # fmt: skip
 OPTIONS = {"adaptation_gain": 800.0, "initial_theta": -0.3, "network_gain": 60.0}
 SCHEMES: dict[str, Document] = {
@@ -68,7 +72,7 @@ SCHEMES: dict[str, Document] = {
     "no dead zone": {"scheme": "zhang2005", "options": {**OPTIONS, "dead_zone": 0}},
     "constant thresholds": {"scheme": "zhang2005", "options": {"adaptive_threshold": 0, "leave_out": 1}},
 }
-BOUNDS = ("constant", "coupling", "coefficients", "inertia", "deflection")
+BOUNDS = ("constant", "coupling", "coefficients", "inertia", "deflection", "servo errors")
 REFERENCES: dict[str, Document] = {
     "sines": {
         "p": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}],

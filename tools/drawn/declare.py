@@ -88,11 +88,28 @@ def _declare_model(truth: Words, bounds: Words) -> None:
     off = [abs(ratio - 1.0) for ratio in truth.get("inertia", {}).values()]
     if off:
         bounds["inertia"] = max(*off, bounds.get("inertia", 0.0))
+    if "actuators" in truth:
+        bounds["actuators"] = _widest_servos(truth["actuators"], bounds.get("actuators", {}))
     couplings = truth.get("inertia_coupling", {})
     amplitudes = {axis: wave.get("amplitude_rad_s2", 0.0) for axis, wave in truth.get("sinusoid", {}).items()}
     for key, sizes in (("inertia_coupling", couplings), ("constant_rad_s2", amplitudes)):
         if key in bounds:
             bounds[key] = {axis: max(abs(sizes.get(axis, 0.0)), bounds[key].get(axis, 0.0)) for axis in AXES}
+
+
+def _widest_servos(truth: Words, known: Words) -> Words:
+    """Errors of the actuators as large as those of the truth, and as those known. A key beside the surfaces
+    is for those without their own."""
+    exact = {"bandwidth": 1.0, "rate_limit": 1.0, "dead_band_deg": 0.0}
+    widest: Words = {}
+    for name in ("", *(name for name in {**truth, **known} if name not in exact)):
+        off, bound = ({**of, **of.get(name, {})} for of in (truth, known))
+        found = {
+            key: max(abs(off.get(key, neutral) - neutral), bound.get(key, 0.0))
+            for key, neutral in exact.items()
+        }
+        widest |= {name: found} if name else found
+    return widest
 
 
 def _declare_air(words: Words, bounds: Words) -> None:

@@ -34,11 +34,14 @@ class DeclaredErrors:
     - `gust_effect` (3, 3) 1/s: angular acceleration for each rad/s of this rotation.
     - `coefficients`: absolute tolerance of each moment coefficient, in the order of `Aircraft.moments`.
     - `inertia`: relative tolerance of the moments of inertia: 0.05 is 5 %.
-    - `deflection_rad`: largest difference between a surface and the model of its actuator, rad.
+    - `deflection_rad`: largest difference between a surface and its actuator, rad.
     - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s². The model error includes all
       errors above, except those of the gyros and of the air.
     - `bandwidth_rad_s`, `rate_limit_rad_s` (surfaces,): bandwidth, rad/s, and rate limit, rad/s, of the
       actuators; 0 if the actuator is ideal.
+    - `bandwidth_error`, `rate_limit_error` (surfaces,): their relative tolerances.
+    - `dead_band_rad` (surfaces,): largest distance from the commanded position at which an actuator does not
+      move, rad.
     """
 
     noise: np.ndarray = field(default_factory=_ZEROS[7])
@@ -58,11 +61,15 @@ class DeclaredErrors:
     model_rad_s2: np.ndarray = field(default_factory=_ZEROS[3])
     bandwidth_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
     rate_limit_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
+    bandwidth_error: np.ndarray = field(default_factory=_ZEROS[4])
+    rate_limit_error: np.ndarray = field(default_factory=_ZEROS[4])
+    dead_band_rad: np.ndarray = field(default_factory=_ZEROS[4])
 
     @cached_property
     def errors(self) -> bool:
         """Whether any error is declared."""
         shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s, self.coefficients
+        shares += self.bandwidth_error, self.rate_limit_error, self.dead_band_rad
         return bool(any(np.any(share) for share in shares) or self.inertia or self.deflection_rad)
 
     @property

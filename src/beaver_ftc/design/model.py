@@ -210,6 +210,8 @@ def actuators_dtype(n: int) -> np.dtype:
         approach=n,  # share of the way to the command in one JSBSim frame; 1 without lag
         step=n,  # rad, the furthest in one JSBSim frame
         low=n, high=n,
+        # least and greatest of both by the declared errors; rad, how far from its command a surface may stay
+        uncertain=int, approaches=(n, 2), steps=(n, 2), band=n,
     )  # fmt: skip
 
 
@@ -217,6 +219,18 @@ def actuators_dtype(n: int) -> np.dtype:
 def nearer(u, wanted, approach, step):
     """Where a surface at u (rad) is one JSBSim frame later; it rises with u, and never passes `wanted`."""
     return u + min(max((wanted - u) * approach, -step), step)
+
+
+@kernel
+def furthest(u, command, sign, approaches, steps, band, low, high):
+    """The greatest (sign 1) or least (-1) position, rad, that a surface at u can have one JSBSim frame later.
+
+    approaches, steps (2,): least and greatest of its actuator. It goes as far as it can to that side, and
+    comes back from it as slowly as it can.
+    """
+    wanted = min(max(command + sign * band, low), high)
+    fast = 1 if sign * (wanted - u) > 0.0 else 0
+    return nearer(u, wanted, approaches[fast], steps[fast])
 
 
 @kernel
@@ -229,6 +243,15 @@ def move(actuators, command, u):
         wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
         there = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
         u[s] = min(max(there, actuators.low[s]), actuators.high[s])
+
+
+@kernel
+def move_ends(act, command, lo, hi):
+    """Move lo and hi (n,) rad, between which the surfaces are, by one JSBSim frame towards command (n,)."""
+    for s in range(lo.size):
+        of = act.approaches[s], act.steps[s], act.band[s], act.low[s], act.high[s]
+        lo[s] = furthest(lo[s], command[s], -1.0, *of)
+        hi[s] = furthest(hi[s], command[s], 1.0, *of)
 
 
 SEA_LEVEL_DENSITY_KG_M3 = 1.225

@@ -102,7 +102,8 @@ def errors_dtype(n: int) -> np.dtype:
         # error of a signal: offset + slope |signal|
         e0=7, e1=7,
         steady=3,  # of the offset of a gyro, what does not change
-        wg=3, du=float,
+        wg=3,
+        du0=float, du=n,  # of a deflection whatever its actuator does, and now, rad
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
         # far the reading of the altitude can be off: offset, m, and slope
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
@@ -222,7 +223,7 @@ def fill_magnitudes(err, x, y, u):
         err.yw[DPT] += slipstream_bound(err, y)
     for s in range(u.size):
         err.ua[s] = abs(u[s])
-        err.uw[s] = abs(u[s]) + err.du
+        err.uw[s] = abs(u[s]) + err.du[s]
     V = y[AIRSPEED]
     err.yw[AIRSPEED] = max(2.0 * V - err.yw[AIRSPEED], _MIN_V_SHARE * V)
 
@@ -331,14 +332,15 @@ def travel_share(emap, s, u):
 
 
 @kernel
-def level_of_positions(emap, u):
-    """Index of the least share of the travel that covers surfaces at u; the last index if all of the travel
-    may be used."""
+def level_of_positions(emap, u, du):
+    """Index of the least share of the travel that covers surfaces within du of u; the last index if all of
+    the travel may be used."""
     if emap.two_free:
         return emap.n_levels - 1
     share = 0.0
     for s in range(u.size):
-        share = max(share, travel_share(emap, s, u[s]))
+        for end in (u[s] - du[s], u[s] + du[s]):
+            share = max(share, travel_share(emap, s, end))
     return level_of_share(emap, share)
 
 
@@ -375,12 +377,12 @@ def map_row(emap):
 
 
 @kernel
-def look_up_map(emap, x, y, u):
+def look_up_map(emap, x, y, u, du):
     """Fill z and e_now, the mapped error at this state."""
     z = emap.coordinates
     z[:3], z[3 : 3 + y.size] = x, y
     z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    j = level_of_positions(emap, u)
+    j = level_of_positions(emap, u, du)
     k = map_row(emap)
     for b in range(emap.n_boxes if k >= 0 else 0):
         if in_box(emap, b):
@@ -457,7 +459,7 @@ def fill_bound(bound, model, meas, u):
             for s in range(u.size):
                 fill_eG(err, model, s)
     if emap.n_boxes > 0:
-        look_up_map(emap, x, y, u)
+        look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
     rates = err.xw if err.given else x
@@ -513,7 +515,8 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     err["dC"][: dC.size] = dC
     err["dI"] = inertia_bounds(declared.inertia, mass)
-    err["du"] = declared.deflection_rad
+    err["du0"] = declared.deflection_rad
+    err["du"] = declared.deflections_rad
     errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     err["wg_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
     err["wg_1m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b)
@@ -524,7 +527,8 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     err["e1"] = errors.each("slope")
     err["steady"] = errors.each("steady", AXES)
     others = (err["dC"], err["dI"], err["du"], err["wg"])
-    err["given"] = any(np.any(e) for e in others) or not errors.is_ideal
+    known = errors.is_ideal and declared.servo_errors.is_none
+    err["given"] = any(np.any(e) for e in others) or not known
 
 
 def fill_engine_errors(err: np.void, declared: Declared) -> None:
@@ -571,12 +575,15 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     """
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
-    aircraft, errors, servos = declared.aircraft, declared.sensors, declared.servos
+    aircraft, errors = declared.aircraft, declared.sensors
+    servos, off = (
+        [getattr(of, s) for s in aircraft.surfaces] for of in (declared.servos, declared.servo_errors)
+    )
     noise, bias, resolution = (errors.each(kind) for kind in ("noise", "steady", "resolution"))
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
     gust, gust_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
     sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_Y0:]
-    du = declared.deflection_rad
+    du = declared.deflections_rad
     return DeclaredErrors(
         noise=noise,
         bias=bias,
@@ -591,10 +598,13 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
         gust_effect=air_rotation_slopes(DesignFunctions(model.copy()), y),
         coefficients=dC,
         inertia=declared.inertia,
-        deflection_rad=du,
+        deflection_rad=declared.deflection_rad,
         model_rad_s2=model_error_std(model, y, u, sigma, dC, du),
-        bandwidth_rad_s=np.array([getattr(servos, s).bandwidth_rad_s for s in aircraft.surfaces]),
-        rate_limit_rad_s=np.radians([getattr(servos, s).rate_limit_deg_s for s in aircraft.surfaces]),
+        bandwidth_rad_s=np.array([servo.bandwidth_rad_s for servo in servos]),
+        rate_limit_rad_s=np.radians([servo.rate_limit_deg_s for servo in servos]),
+        bandwidth_error=np.array([error.bandwidth for error in off]),
+        rate_limit_error=np.array([error.rate_limit for error in off]),
+        dead_band_rad=np.radians([error.dead_band_deg for error in off]),
     )
 
 
@@ -606,17 +616,17 @@ def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
 
 
 def model_error_std(
-    model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: float
+    model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: np.ndarray
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
     sigma (4,): errors of alpha, beta, airspeed, dynamic pressure; dC (terms,): of the coefficients, absolute;
-    du rad: of the deflections.
+    du (surfaces,) rad: of the deflections.
     """
     F = _acceleration_at(model, y, u)
     dy = np.pad(np.diag(sigma), ((0, 0), (0, y.size - sigma.size)))
     dF = [_acceleration_at(model, y + d, u) - F for d in dy]
-    dF += [_acceleration_at(model, y, u + du * e) - F for e in np.eye(u.size)]
+    dF += [_acceleration_at(model, y, u + e) - F for e in np.diag(du)]
     for k in np.flatnonzero(dC):
         changed = model.copy()
         changed["moments"]["value"][0][k] += dC[k]

@@ -14,7 +14,7 @@ from math import exp, radians
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
+from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, move_ends, response
 from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro
 from beaver_ftc.scenario.declared import Declared
 
@@ -54,6 +54,8 @@ def prediction_dtype(n: int) -> np.dtype:
         w=float,  # one over the number of instants in a frame
         commanded=n,
         u=n, u_old=n,  # positions of healthy surfaces under the command: now, and an instant before
+        # where they may be by the declared errors of the actuators, least and greatest, rad
+        u_lo=n, u_hi=n, u_lo_old=n, u_hi_old=n,
         f=3, G=(3, n),  # at this instant
         x_before=3,  # rates measured at the start of the elapsed frame
         sums=frame_sums_dtype(n), means=frame_means_dtype(n),
@@ -68,12 +70,18 @@ def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) 
     pred["design"] = design_of(declared.design_model, declared.aircraft)[0]
     act, h = pred["actuators"], 1.0 / declared.rate_hz / declared.substeps
     act["real"] = not declared.servos.is_ideal
+    act["uncertain"] = not declared.servo_errors.is_none
     act["low"], act["high"] = travel
     for s, name in enumerate(declared.aircraft.surfaces):
         servo = getattr(declared.servos, name)
         omega, rate = servo.bandwidth_rad_s, radians(servo.rate_limit_deg_s)
+        error = getattr(declared.servo_errors, name)
+        slower_faster = np.array([1.0 - error.bandwidth, 1.0 + error.bandwidth])
         act["approach"][s] = 1.0 - exp(-omega * h) if omega else 1.0
         act["step"][s] = rate * h if rate else np.inf
+        act["approaches"][s] = 1.0 - np.exp(-omega * h * slower_faster) if omega else 1.0
+        act["steps"][s] = act["step"][s] * np.array([1.0 - error.rate_limit, 1.0 + error.rate_limit])
+        act["band"][s] = radians(error.dead_band_deg)
 
 
 @kernel
@@ -146,6 +154,7 @@ def fill_change_tolerance(pred):
 def evaluate_frame(pred, bound, meas, k, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
     bound.error_map.time_s = k * dt
+    fill_deflection_errors(pred, bound.declared_errors)
     fill_bound(bound, pred.design, meas, pred.u)
     bound.eta_bar[:] = bound.eta_now
     if bound.declared_errors.given:
@@ -171,16 +180,17 @@ def begin_sums(pred, bound, layout, all_types, meas):
 @kernel
 def redo_move(pred, command):
     """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
-    pred.u[:] = pred.u_old
+    pred.u[:], pred.u_lo[:], pred.u_hi[:] = pred.u_old, pred.u_lo_old, pred.u_hi_old
     move_surfaces(pred, command)
 
 
 @kernel
 def add_instant(pred, bound, layout, all_types, meas):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
+    fill_deflection_errors(pred, bound.declared_errors)
     fill_bound(bound, pred.design, meas, pred.u)
     add_to_sums(pred, bound, layout, all_types)
-    move(pred.actuators, pred.commanded, pred.u)
+    move_healthy(pred)
 
 
 @kernel
@@ -210,5 +220,21 @@ def move_surfaces(pred, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
     for s in range(command.size):
         pred.commanded[s] = command[s]
-    pred.u_old[:] = pred.u
+    pred.u_old[:], pred.u_lo_old[:], pred.u_hi_old[:] = pred.u, pred.u_lo, pred.u_hi
+    move_healthy(pred)
+
+
+@kernel
+def move_healthy(pred):
+    """Move the healthy surfaces, and the ends between which they are, by one JSBSim frame."""
     move(pred.actuators, pred.commanded, pred.u)
+    if pred.actuators.uncertain:
+        move_ends(pred.actuators, pred.commanded, pred.u_lo, pred.u_hi)
+
+
+@kernel
+def fill_deflection_errors(pred, err):
+    """du = du0 + max(u_hi - u, u - u_lo), (n,) rad: how far each healthy surface may be from its model."""
+    if pred.actuators.uncertain:
+        for s in range(pred.u.size):
+            err.du[s] = err.du0 + max(pred.u_hi[s] - pred.u[s], pred.u[s] - pred.u_lo[s])

@@ -60,14 +60,14 @@ class Actuator(NamedTuple):
     """The actuator of a surface as fault types take it; rad, rad/s.
 
     min_runaway_rate_rad_s: of a hardover. slow_step_rad: of a rate limit, in an
-    instant. approach_share: share of the way to the command that is made in an instant.
+    instant. lag_distance_rad: from its command, within which its steps are smaller.
     """
 
     travel_low_rad: float
     travel_high_rad: float
     min_runaway_rate_rad_s: float
     slow_step_rad: float
-    approach_share: float
+    lag_distance_rad: float
 
 
 class SurfaceFaultTypes(NamedTuple):
@@ -404,7 +404,7 @@ def _read_estimator(fie: np.void) -> IsolationEstimator:
 
 
 def _read_surface(srf: np.void) -> SurfaceFaultTypes:
-    names = ("stop_lo", "stop_hi", "runaway", "slow_step", "approach_share")
+    names = ("stop_lo", "stop_hi", "runaway", "slow_step", "near")
     actuator = Actuator(*(float(srf["actuator"][name]) for name in names))
     return SurfaceFaultTypes(actuator, srf["sets"]["excluded"].astype(bool))
 

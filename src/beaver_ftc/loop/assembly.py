@@ -267,6 +267,9 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     prediction, fdi, declared = frame["prediction"], frame["fdi"], Declared.of(scenario)
     design = prediction["design"]
     prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.command
+    servos = prediction["actuators"]
+    for end, sign in (("u_lo", -1.0), ("u_hi", 1.0)):
+        prediction[end] = np.clip(trim.command + sign * servos["band"], servos["low"], servos["high"])
     anchor(design, trim.x, trim.y, trim.u)
     redundancy.configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
     mass = mass_of(declared.design_model, declared.aircraft)

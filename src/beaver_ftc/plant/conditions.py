@@ -27,7 +27,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
 from beaver_ftc.plant.trim import TrimPoint, configure, take_off, trim_of
-from beaver_ftc.scenario.airframe import Environment
+from beaver_ftc.scenario.airframe import Environment, checked_against
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.schema import Scenario, ScenarioLike, Uncertainty, load
 
@@ -151,11 +151,9 @@ def known_trim(scenario: Scenario) -> KnownTrim:
     """The trim of the aircraft in its file, at the start of the scenario and in still air. The designer finds
     it without the truth: neither its errors nor its air are in it. Raises BadInput if there is none.
     """
-    nominal = scenario.model_copy(
-        update={
-            "uncertainty": Uncertainty(), "environment": Environment(), "actuators": scenario.known_actuators,
-        }
-    )  # fmt: skip
+    with checked_against(scenario.airframe):
+        truth = {"uncertainty": Uncertainty(), "environment": Environment()}
+    nominal = scenario.model_copy(update=truth | {"actuators": scenario.known_actuators})
     aircraft, rates = scenario.airframe, (scenario.rate_hz, scenario.substeps)
     key = _origin(aircraft), texts_of(nominal, ("initial", "actuators")), rates
     if key not in _known_trims:

@@ -382,8 +382,11 @@ def _actuators(plant: Plant, scenario: Scenario) -> None:
         plant.write(DELAY, 0.0)  # of servos as built: a scenario's have none
     for surface in plant.aircraft.surfaces:
         dynamics = getattr(scenario.actuators, surface)
-        plant.write(f"actuators/{surface}/bandwidth-rad_sec", dynamics.bandwidth_rad_s)
-        plant.write(f"actuators/{surface}/rate-limit-rad_sec", radians(dynamics.rate_limit_deg_s))
+        off = getattr(scenario.uncertainty.actuators, surface)
+        plant.write(f"actuators/{surface}/bandwidth-rad_sec", off.bandwidth * dynamics.bandwidth_rad_s)
+        rate_rad_s = off.rate_limit * radians(dynamics.rate_limit_deg_s)
+        plant.write(f"actuators/{surface}/rate-limit-rad_sec", rate_rad_s)
+        plant.write(f"actuators/{surface}/dead-band-rad", radians(off.dead_band_deg))
         if dynamics.travel_deg is not None:
             low, high = dynamics.travel_deg
             plant.write(f"actuators/{surface}/position-min-rad", radians(low))

@@ -7,10 +7,10 @@ are ideal, a preset, one set of numbers for all, or one a surface. The air has s
 gusts.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from math import degrees
 from pathlib import Path
@@ -75,6 +75,17 @@ def checked_aircraft() -> Aircraft:
     """The aircraft of the scenario being read; outside of one, the built-in aircraft."""
     checked = _CHECKED.get()
     return checked[0] if checked else load()
+
+
+def left_out(section: type[Section]) -> Callable[[], Section]:
+    """What makes a section that a scenario leaves out: the same object in every flight of an aircraft, so
+    that what is worked out of it is kept."""
+    return lambda: _left_out(section, checked_aircraft().surfaces)
+
+
+@cache
+def _left_out(section: type[Section], surfaces: tuple[str, ...]) -> Section:
+    return section()
 
 
 def aircraft_called(reference: str | None, beside: Path | None) -> Aircraft:
@@ -275,24 +286,19 @@ PRESETS: dict[str, dict[str, float]] = {
 }
 
 
-class Actuators(Section, extra="allow"):
-    """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
-    in the section of a surface applies only to this surface, and replaces the common value. The surfaces
-    below are those of the Beaver. For another aircraft, use the names of its surfaces."""
+class OfSurfaces(Section, extra="allow"):
+    """The same keys for every surface. A key directly in this section applies to all surfaces; one in the
+    section of a surface applies only to this surface."""
 
-    __pydantic_extra__: dict[str, ActuatorDynamics]
+    of_one: ClassVar[type[Section]]
+    presets: ClassVar[Mapping[str, dict[str, float]]] = {}
 
     @model_validator(mode="before")
     @classmethod
     def _expand(cls, given: Any) -> Any:
         if isinstance(given, str):
-            given = PRESETS.get(given, given)
-        return _by_surface(given) if isinstance(given, dict) else given
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether no surface has a lag or a rate limit."""
-        return all(dynamics.is_ideal for _, dynamics in self)
+            given = cls.presets.get(given, given)
+        return _by_surface(given, tuple(cls.of_one.model_fields)) if isinstance(given, dict) else given
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -300,16 +306,55 @@ class Actuators(Section, extra="allow"):
         reference = mapping["additionalProperties"]
         one = handler.resolve_ref_schema(reference)
         mapping["properties"] = {**one["properties"], **dict.fromkeys(load().surfaces, reference)}
-        preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
-        return {"anyOf": [preset, mapping]}
+        preset = {"enum": list(cls.presets), "type": "string", "description": "a preset"}
+        return {"anyOf": [preset, mapping]} if cls.presets else mapping
 
 
-def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
+class Actuators(OfSurfaces):
+    """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
+    in the section of a surface applies only to this surface, and replaces the common value. The surfaces
+    below are those of the Beaver. For another aircraft, use the names of its surfaces."""
+
+    __pydantic_extra__: dict[str, ActuatorDynamics]
+    of_one, presets = ActuatorDynamics, PRESETS
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether no surface has a lag or a rate limit."""
+        return all(dynamics.is_ideal for _, dynamics in self)
+
+
+DeadBand = Annotated[Number, Field(ge=0, le=10)]
+
+
+class TrueActuator(Section):
+    """What the actuator of one surface has in the truth.
+
+    bandwidth: bandwidth, divided by that in `actuators`
+    rate_limit: rate limit, divided by that in `actuators`
+    dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
+    """
+
+    bandwidth: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])
+    rate_limit: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])
+    dead_band_deg: DeadBand = number(0.0, "deg", examples=[0.1])
+
+
+class TrueActuators(OfSurfaces):
+    """Actuators of the truth, compared with `actuators`. A key directly in this section applies to all
+    surfaces, a key in the section of a surface only to this surface. An ideal actuator has no bandwidth and
+    no rate limit that could differ."""
+
+    __pydantic_extra__: dict[str, TrueActuator]
+    of_one = TrueActuator
+
+
+def _by_surface(given: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
     """Numbers given for all surfaces become each surface's own, unless it has its own already."""
     surfaces = checked_aircraft().surfaces
-    for_all = {key: value for key, value in given.items() if key in ActuatorDynamics.model_fields}
+    for_all = {key: value for key, value in given.items() if key in keys}
     rest = {key: value for key, value in given.items() if key not in for_all}
-    known = (*ActuatorDynamics.model_fields, *surfaces)
+    known = (*keys, *surfaces)
     wrong = [key for key in rest if key not in surfaces]
     refuse_unknown(wrong, known)
     own = {surface: rest.get(surface, {}) for surface in surfaces}

@@ -26,7 +26,7 @@ from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design import Dryden, altitude_of
 from beaver_ftc.scenario.airframe import Actuators, Initial
 from beaver_ftc.scenario.builtin import KeptBySections
-from beaver_ftc.scenario.diagnosis import ControlConfig, FdiConfig, failing, of_several
+from beaver_ftc.scenario.diagnosis import ActuatorBounds, ControlConfig, FdiConfig, failing, of_several
 from beaver_ftc.scenario.faults import LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor, place_of
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA, PRESETS, SIGNALS, Sensors, sensor_words
 from beaver_ftc.scenario.signals import Autopilot, Chirp
@@ -178,9 +178,20 @@ class Declared:
         return CoefficientErrors(self.fdi.bounds.coefficients)
 
     @property
+    def servo_errors(self) -> ActuatorBounds:
+        """The largest errors of the actuators."""
+        return self.fdi.bounds.actuators
+
+    @property
     def deflection_rad(self) -> float:
-        """How far a surface may be from its actuator's model."""
+        """How far a surface may be from its actuator, whatever that is declared to do."""
         return radians(self.fdi.bounds.deflection_deg)
+
+    @property
+    def deflections_rad(self) -> np.ndarray:
+        """How far each surface may be from its actuator's model at rest, (surfaces,) rad."""
+        bands = [getattr(self.servo_errors, name).dead_band_deg for name in self.aircraft.surfaces]
+        return self.deflection_rad + np.radians(bands)
 
     @property
     def inertia(self) -> float:
@@ -328,13 +339,16 @@ def undeclared(scenario: Any) -> Iterator[Undeclared]:
     yield from _sensors(scenario, declared)
     yield from _severity(scenario, declared)
     yield from filter(_is_beyond, _moments(scenario, declared))
+    yield from filter(_is_beyond, _servos(scenario, declared))
     if any(scenario.uncertainty.cg_m):
         yield Undeclared(Kind.CG, "uncertainty.cg_m", "fdi.bounds.constant_rad_s2")
     if declared.uses_accelerometers:
         yield from filter(_is_beyond, _forces(scenario, declared))
 
 
-_UNDECLARED_DEPENDS_ON = ("airframe", "fdi", "uncertainty", "sensors", "environment", "design_model")
+_UNDECLARED_DEPENDS_ON = (
+    *("airframe", "fdi", "uncertainty", "actuators", "sensors", "environment", "design_model"),
+)
 _declares_all: KeptBySections[bool] = KeptBySections(_MOST)
 
 
@@ -361,6 +375,25 @@ def _moments(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
         yield Undeclared(
             Kind.LARGER, key, "fdi.bounds.inertia", value=ratio, nominal=1.0, allowed=declared.inertia
         )
+
+
+def _servos(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
+    """Actuators, as ratios to the designer's, and their dead bands."""
+    for name in declared.aircraft.surfaces:
+        key, cover = f"uncertainty.actuators.{name}", f"fdi.bounds.actuators.{name}"
+        of = (scenario.actuators, declared.servos, scenario.uncertainty.actuators, declared.servo_errors)
+        nominal, known, off, bound = (getattr(section, name) for section in of)
+        for word, unit in (("bandwidth", "_rad_s"), ("rate_limit", "_deg_s")):
+            true, expected = getattr(nominal, word + unit), getattr(known, word + unit)
+            ratio = getattr(off, word) * true / expected if expected else 1.0 if not true else inf
+            allowed = getattr(bound, word)
+            yield Undeclared(
+                Kind.LARGER, f"{key}.{word}", f"{cover}.{word}", value=ratio, nominal=1.0, allowed=allowed
+            )
+        yield Undeclared(
+            Kind.LARGER, f"{key}.dead_band_deg", f"{cover}.dead_band_deg", value=off.dead_band_deg,
+            allowed=bound.dead_band_deg + degrees(declared.deflection_rad), unit=" deg",
+        )  # fmt: skip
 
 
 def _forces(scenario: Any, declared: Declared) -> Iterator[Undeclared]:

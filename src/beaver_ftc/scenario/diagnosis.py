@@ -16,7 +16,7 @@ from beaver_ftc.design import Severity
 from beaver_ftc.documents.document import Conflict, Location, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, needs_leaders, refusal, wrong_options
-from beaver_ftc.scenario.airframe import checked_aircraft, named
+from beaver_ftc.scenario.airframe import DeadBand, OfSurfaces, checked_aircraft, left_out, named
 from beaver_ftc.scenario.sensors import Sensors
 
 if TYPE_CHECKING:
@@ -139,6 +139,37 @@ def _can_be_bounded(given: Sensors) -> Sensors:
 BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
+class ActuatorBound(Section, strict=True):
+    """Largest errors of the actuator of one surface.
+
+    bandwidth: of the bandwidth, relative
+    rate_limit: of the rate limit, relative
+    dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
+    """
+
+    bandwidth: Share = number(0.0, "share of 1", examples=[0.2])
+    rate_limit: Share = number(0.0, "share of 1", examples=[0.2])
+    dead_band_deg: DeadBand = number(0.0, "deg", examples=[0.1])
+
+    @property
+    def is_none(self) -> bool:
+        """Whether the actuator is known exactly."""
+        return not (self.bandwidth or self.rate_limit or self.dead_band_deg)
+
+
+class ActuatorBounds(OfSurfaces):
+    """Largest errors of the actuators. A key directly in this section applies to all surfaces, a key in the
+    section of a surface only to this surface."""
+
+    __pydantic_extra__: dict[str, ActuatorBound]
+    of_one = ActuatorBound
+
+    @property
+    def is_none(self) -> bool:
+        """Whether every actuator is known exactly."""
+        return all(bound.is_none for _, bound in self)
+
+
 class Bounds(Section, strict=True):
     """Declared uncertainty. The thresholds follow from this uncertainty [Zhang2005, sec. VII].
 
@@ -150,7 +181,10 @@ class Bounds(Section, strict=True):
     has a number for each term
     inertia: largest relative error of Ix, Iy, Iz and Jxz
     sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
-    deflection_deg: largest difference between the position of a surface and the model of its actuator, deg
+    actuators: largest errors of the actuators. Each frame, the position of a surface is between those of the
+    slowest and the fastest actuator
+    deflection_deg: largest further difference between the position of a surface and the model of its
+    actuator, deg
     turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, and depends on
     the height. Its smallest value is that above 2000 ft. The translation of the air needs no bound, because
     airspeed and flow angles contain it. The statistical detector can subtract pitching and yawing gusts,
@@ -164,6 +198,7 @@ class Bounds(Section, strict=True):
     coefficients: Share | dict[str, Share] = number(0.0, "share of 1", examples=[0.05])
     inertia: Share = number(0.0, "share of 1", examples=[0.05])
     sensors: BoundedSensors = entry(Sensors, examples=["tactical-grade"])
+    actuators: ActuatorBounds = entry(ActuatorBounds, examples=[{"bandwidth": 0.2}])
     deflection_deg: Deflection = entry(0.0, examples=[0.2])
     turbulence: Severity = "none"
     vertical_wind_mps: float = entry(1.0, ge=0, le=100, examples=[3])
@@ -291,7 +326,7 @@ class FdiConfig(Section, strict=True):
     detection_pole_per_s: float = entry(10.0, gt=0, le=1000)
     isolation_pole_per_s: float = entry(10.0, gt=0, le=1000)
     forgetting_time_s: float = entry(5.0, gt=0, le=3600)
-    bounds: Bounds = Bounds()
+    bounds: Bounds = entry(left_out(Bounds))
     sharpen: Sharpen = entry(Sharpen(), examples=["none"])
     pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = entry(
         (DEADBEAT_PER_S,), max_length=MAX_POLES - 1, examples=[[20, 100]]

@@ -10,7 +10,6 @@ nothing.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from itertools import pairwise
 from math import isfinite
 from os import PathLike
@@ -62,6 +61,7 @@ from beaver_ftc.scenario.airframe import (
     Initial,
     Ratio,
     Ratios,
+    TrueActuators,
     aircraft_called,
     checked_against,
     default_initial,
@@ -70,6 +70,7 @@ from beaver_ftc.scenario.airframe import (
     given_initial,
     initial_schema,
     known_aircraft,
+    left_out,
 )
 from beaver_ftc.scenario.builtin import read_file, resolve
 from beaver_ftc.scenario.diagnosis import (
@@ -237,6 +238,7 @@ class Uncertainty(Section):
     mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
     inertia: inertia of the truth
     cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
+    actuators: actuators of the truth, compared with `actuators`
     """
 
     inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
@@ -245,6 +247,7 @@ class Uncertainty(Section):
     mass: Number = number(1.0, "1", ge=0.5, le=2)
     inertia: TrueInertia = entry(TrueInertia)
     cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m", examples=[[0.05, 0, 0]])
+    actuators: TrueActuators = entry(TrueActuators, examples=[{"bandwidth": 0.8}])
 
 
 Scale = Annotated[Number, Field(ge=0.1, le=10)]
@@ -430,19 +433,18 @@ class Scenario(Section, title="beaver-ftc scenario"):
     initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = entry(
         default_initial, json_schema_extra=initial_schema
     )
-    # A section that is left out is the same object in every flight: what is worked out of it is kept.
-    reference: Reference = entry(cache(Reference))
+    reference: Reference = entry(left_out(Reference))
     autopilot: Autopilot | None = None
     faults: tuple[Fault, ...] = entry((), max_length=MOST_FAULTS)
-    uncertainty: Uncertainty = entry(cache(Uncertainty))
+    uncertainty: Uncertainty = entry(left_out(Uncertainty))
     actuators: Actuators = entry(Actuators)
-    sensors: Sensors = entry(cache(Sensors), examples=["tactical-grade"])
-    environment: Environment = entry(cache(Environment))
-    fdi: FdiConfig = entry(cache(FdiConfig))
-    control: ControlConfig = entry(cache(ControlConfig))
+    sensors: Sensors = entry(left_out(Sensors), examples=["tactical-grade"])
+    environment: Environment = entry(left_out(Environment))
+    fdi: FdiConfig = entry(left_out(FdiConfig))
+    control: ControlConfig = entry(left_out(ControlConfig))
     changes: tuple[Change, ...] = entry((), max_length=1000)
-    design_model: DesignModel = entry(cache(DesignModel))
-    expect: Expect = entry(cache(Expect))
+    design_model: DesignModel = entry(left_out(DesignModel))
+    expect: Expect = entry(left_out(Expect))
 
     _airframe: Aircraft | None = PrivateAttr(default=None)
 

@@ -185,7 +185,6 @@ def _exclude_rate_limit(
     smaller: in a run of frames beyond all orders, a later one shows a position farther away."""
     min_step = actuator.slow_step_rad
     min_approach = config.n_substeps * config.frames_per_block * min_step  # of a frame, rad
-    lag_distance = min_step / actuator.approach_share  # from the order, within which the steps are smaller
     for axis, lower in enumerate(bounds.lower.T):
         is_beyond = bounds.is_unexplained & (lower > bounds.max_order + MIN_POSITION_DIFFERENCE_RAD)
         starts = run_starts(is_beyond)
@@ -194,7 +193,7 @@ def _exclude_rate_limit(
         for k in np.flatnonzero(is_beyond & (starts < np.arange(len(lower)))).tolist():
             i = int(starts[k]) + int(np.argmin(traced_back[starts[k] : k]))
             run, upper = range(i, k + 1), bounds.smallest_upper[i] - min_approach * (k - i - 1)
-            near = float(bounds.max_order[i : k + 1].max()) + lag_distance
+            near = float(bounds.max_order[i : k + 1].max()) + actuator.lag_distance_rad
             if lower[k] > max(upper, near) + MIN_POSITION_DIFFERENCE_RAD:
                 fields = {"ordered": bounds.max_order[i : k + 1].tolist(), "near": near}
                 fields |= {"step": min_approach} if k - i > 1 else {}

@@ -65,6 +65,7 @@ FORCE_RECORD = record(
     vane=2, vane_roll=float,
     var_trim=2, var=2,  # variance of e in trim and now, with the vane and without it, (rad/s2)2
     L=3, eta_u=float, f_hat=float, e_lag=float,  # bounds on e by errors of deflections and by a time lag
+    G_trim=MAX_SURFACES,  # magnitude of e by each surface in trim, per rad
     var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
     n_Z=int, tol=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
 )  # fmt: skip
@@ -249,8 +250,9 @@ def _configure_force(
     std = errors[ACCELEROMETERS[1 + i]].random
     f["var_acc"] = (forces["c_inv"] * std) ** 2
     _configure_terms(f, declared, terms, y, f_y[vane] / per_C, i, forces["c_inv"])
-    f_u = per_C * sum(abs(term.value) for term in terms if term.surface)
-    f["eta_u"] = f_u * declared.deflection_rad
+    for term in terms:
+        if term.surface:
+            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
     f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
     Q_angle = (DRIFT_CHANGE_PER_S * f["drift"]) ** 2 + dt * (std / y[AIRSPEED]) ** 2
     f["Q_e"] = f_y[vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))

@@ -452,6 +452,10 @@ def turn_views(views, forces, gust, bound, G, Gu):
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
     """
+    for f in forces.component:
+        f.eta_u = 0.0
+        for s, du in enumerate(bound.declared_errors.du):
+            f.eta_u += f.G_trim[s] * du
     for view in views:
         view.used = not uses_force(view) or (forces.in_use and forces.n_seen == MIN_UPDATES)
         if view.used:

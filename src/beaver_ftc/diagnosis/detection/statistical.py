@@ -35,7 +35,7 @@ from sys import float_info
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import (
@@ -332,7 +332,7 @@ def _configure_noise(
     noise["Q0"] = F_x**2 @ sigma[:3] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `add_readings` says
     noise["Q"] = noise["Q0"] + Q_y
-    noise["eta_u"] = np.abs(G).sum(axis=1) * declared.deflection_rad
+    noise["G_trim"][:, : G.shape[1]] = np.abs(G)
 
 
 def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
@@ -483,7 +483,7 @@ NOISE_RECORD = record(
     rate0=float,
     eta=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
     eta_free=3,  # what one surface anywhere in its travel adds to it, rad/s2
-    eta_u=3,  # share of the bound by errors of the deflections, rad/s2
+    G_trim=(3, MAX_SURFACES),  # magnitude of the effect of each surface in trim, rad/s2 per rad
     # variance by noise of all inputs of the model; without the air data; (rad/s2)2
     Q=3, Q0=3,
     # whether errors of the air data count; their noise, units of the readings
@@ -759,7 +759,7 @@ def add_regressors(w, noise, blocks, err, model, meas, u):
 def fill_noise(noise, blocks, gust, bound, model, meas, dt):
     """Fill eta, and of each block the drift's intensity Q_d, model noise Q_x and decay a.
 
-    eta = published bound + eta_u + mapped error
+    eta = published bound + |G| du + mapped error
     Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      Q_x = Q      a = exp(-dt V / length)
     """
     eta, emap, V, gusty = noise.eta, bound.error_map, meas.y[AIRSPEED], gust.output.gusty
@@ -768,7 +768,8 @@ def fill_noise(noise, blocks, gust, bound, model, meas, dt):
         meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
     for i in range(3):
-        eta[i] += noise.eta_u[i]
+        for s, du in enumerate(bound.declared_errors.du):
+            eta[i] += noise.G_trim[i, s] * du
         if emap.n_boxes > 0:
             eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
         if emap.one_free:

@@ -174,7 +174,9 @@ COMMANDS_RECORD = record(
 # to zero.
 ACTUATOR_CONFIG_RECORD = record(
     stop_lo=float, stop_hi=float, reach_lo=float, reach_hi=float, runaway=float,
-    approach_share=float, step=float, slow_step=float,
+    approaches=2, steps=2, band=float, uncertain=int,
+    # the least step of a slow one, and from where on its lag or dead band makes steps smaller
+    slow_step=float, near=float,
 )  # fmt: skip
 
 # The set of each type's parameter: types/__init__.py.
@@ -273,9 +275,13 @@ def configure_types(
         act = srf["actuator"]
         act["stop_lo"], act["stop_hi"] = lo, hi
         act["reach_lo"], act["reach_hi"] = (min(lo, 0.0), max(hi, 0.0))
-        act["approach_share"], act["step"] = (servos["approach"][s], servos["step"][s])
-        act["runaway"] = 0.5 * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
-        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["step"])
+        for field in ("approaches", "steps", "band"):
+            act[field] = servos[field][s]
+        act["uncertain"] = servos["uncertain"]
+        slowest = 1.0 - getattr(declared.servo_errors, name).rate_limit
+        act["runaway"] = 0.5 * slowest * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
+        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["steps"][0])
+        act["near"] = act["slow_step"] / act["approaches"][0] + act["band"]
         srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
         srf["accommodation"]["mode"] = srf["status"]["fault_type"] = -1
 

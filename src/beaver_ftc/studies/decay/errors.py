@@ -19,9 +19,10 @@ from beaver_ftc.scenario.sensors import PRESETS
 
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
+UNDECLARED_SERVO = {"bandwidth": 0.1, "rate_limit": 0.1, "dead_band_deg": 0.05}
 UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
 INTENSITY = {"none": 0.0, "light": 1.0, "moderate": 2.0, "severe": 3.0}  # wind at 20 ft: 15, 30, 45 kt
-_RATIO, _INERTIA = (0.1, 10.0), (0.5, 2.0)  # what the keys of a scenario admit
+_RATIO, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
 _RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
 
 Change = Callable[[float, np.random.Generator], Document]
@@ -41,10 +42,7 @@ class Error(NamedTuple):
 
 
 def errors_of(scenario: Scenario) -> tuple[Error, ...]:
-    """Every kind of error that the bounds of a scenario may declare, and that a truth may have.
-
-    `deflection_deg` is left out: no key of the truth makes a surface miss its actuator's model.
-    """
+    """Every kind of error that the bounds of a scenario may declare, and that a truth may have."""
     bounds, declared = scenario.fdi.bounds, Declared.of(scenario)
     published = (
         _coupling(declared.coupling) if any(declared.coupling) else None,
@@ -54,6 +52,7 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
         _coefficients(scenario, declared),
         _inertia(bounds.inertia),
         *(error for error in published if error),
+        *(() if scenario.actuators.is_ideal and declared.servo_errors.is_none else (_servos(declared),)),
         _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
         _air(bounds.turbulence),
     )
@@ -130,6 +129,25 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
         }
 
     return Error("unstructured acceleration", f"{max(sizes):g} rad/s2", change)
+
+
+def _servos(declared: Declared) -> Error:
+    """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
+    bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
+    known = any(value for bound in bounds.values() for value in bound.values())
+    bounds = bounds if known else dict.fromkeys(bounds, UNDECLARED_SERVO)
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        truth = {}
+        for name, bound in bounds.items():
+            signs = _signs(draws, ("bandwidth", "rate_limit"))
+            truth[name] = {key: _within(1.0 + times * signs[key] * bound[key], _RATIO) for key in signs}
+            truth[name]["dead_band_deg"] = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
+        return {"uncertainty.actuators": truth}
+
+    largest = {key: max(bound[key] for bound in bounds.values()) for key in UNDECLARED_SERVO}
+    says = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
+    return Error("actuators", says if known else _unknown(says), change, known)
 
 
 def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:

@@ -20,10 +20,11 @@ difference.
 
 Healthy actuators are driven by the logged command: what the surfaces would have done with no fault,
 
-    a' = a + min(max(w (demand - a), -rate dt), rate dt),  w = 1 - exp(-bandwidth dt)
+    a' = a + min(max(w e, -rate dt), rate dt),  w = 1 - exp(-bandwidth dt),  e = demand - a
 
-every JSBSim frame of dt, within the stops; with neither lag nor rate limit a is the demand. The command
-of a row was in force in all JSBSim frames that led to it; at the start the actuator rests at its command.
+every JSBSim frame of dt, within the stops; e without what the dead band takes of it. With neither lag, rate
+limit nor dead band a is the demand. The command of a row was in force in all JSBSim frames that led to it; at
+the start the actuator rests at its command.
 
 A declared fault is weighed with the design's G, as in theory. A loss of effectiveness is what it takes from
 the surface where the surface is: the product of all losses, taken one after the other. A fault of the
@@ -81,9 +82,13 @@ class HealthyActuators:
     def __init__(self, scenario: Scenario) -> None:
         dt = 1.0 / (scenario.rate_hz * scenario.substeps)
         each = [getattr(scenario.actuators, surface) for surface in SURFACES]
-        share = [1.0 - exp(-one.bandwidth_rad_s * dt) if one.bandwidth_rad_s else 1.0 for one in each]
-        reach = [radians(one.rate_limit_deg_s) * dt if one.rate_limit_deg_s else inf for one in each]
+        off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
+        bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
+        rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
+        share = [1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths]
+        reach = [rate * dt if rate else inf for rate in rates]
         self._share, self._reach = np.array(share), np.array(reach)  # of the way, rad; in a JSBSim frame
+        self._band = np.array([radians(one.dead_band_deg) for one in off])
         self._low, self._high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
         self._runs = scenario.substeps
         self._at_rad: np.ndarray | None = None
@@ -93,7 +98,8 @@ class HealthyActuators:
         if self._at_rad is None:
             self._at_rad = np.clip(commands[0], self._low, self._high)
         positions, stops = np.empty_like(commands), (self._low, self._high)
-        _follow(commands, self._share, self._reach, *stops, self._runs, self._at_rad, positions)
+        moves = self._share, self._reach, self._band
+        _follow(commands, *moves, *stops, self._runs, self._at_rad, positions)
         return positions
 
 
@@ -104,14 +110,16 @@ def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
 
 
 @kernel
-def _follow(commands, share, reach, low, high, runs, at, positions):
+def _follow(commands, share, reach, band, low, high, runs, at, positions):
     """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
-            ideal = share[s] == 1.0 and reach[s] == np.inf
+            ideal = share[s] == 1.0 and reach[s] == np.inf and band[s] == 0.0
             for _ in range(runs):
-                way = min(max(share[s] * (demand - at[s]), -reach[s]), reach[s])
+                e = demand - at[s]
+                e -= min(max(e, -band[s]), band[s])
+                way = min(max(share[s] * e, -reach[s]), reach[s])
                 at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
             positions[k, s] = at[s]
 

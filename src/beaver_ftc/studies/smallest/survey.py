@@ -162,8 +162,9 @@ def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
         yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
     if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):
         yield "with perfect sensors", {"sensors": "ideal", "fdi.bounds.sensors": "ideal"}
-    if not scenario.actuators.is_ideal:
-        yield "with perfect servos", {"actuators": "ideal", "fdi.bounds.deflection_deg": 0.0}
+    if not (scenario.actuators.is_ideal and declared.servo_errors.is_none):
+        known = {"fdi.bounds.deflection_deg": 0.0, "fdi.bounds.actuators": {}}
+        yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **known}
     exact = {"coefficients": 0.0, "inertia": 0.0, "inertia_coupling": NOTHING, "constant_rad_s2": NOTHING}
     none = {f"fdi.bounds.{key}": value for key, value in exact.items()}
     yield "without uncertainty of the model", {"uncertainty": {}, **none}

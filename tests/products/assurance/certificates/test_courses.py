@@ -37,7 +37,7 @@ ACTUATOR = Actuator(
     1.0,
     min_runaway_rate_rad_s=2.0,
     slow_step_rad=0.025,
-    approach_share=0.5,
+    lag_distance_rad=0.05,
 )
 CONFIG = FaultTypesConfig(
     single_instant=True,

@@ -393,7 +393,7 @@ def narrow_creep(c, srf, M, side):
     side: 1 if the surface is above its command, -1 if it is below.
     """
     motion = c.n_substeps * c.frames_per_block * srf.actuator.slow_step
-    near = srf.actuator.slow_step / srf.actuator.approach_share
+    near = srf.actuator.near
     lo, hi = orders_of_frame(c, srf)
     if side == 1:
         M.hi = min(M.hi, max(M.hi - motion, hi + near))

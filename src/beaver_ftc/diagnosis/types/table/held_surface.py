@@ -28,7 +28,7 @@ b: slot of releases, EARLIER_SLOT or LATER_SLOT; rel: record of the releases. Sy
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import nearer
+from beaver_ftc.design.model import furthest
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
@@ -78,22 +78,23 @@ def empty_held(srf, h):
 
 
 @kernel
-def simulate_return(c, srf, p0, sign=0):
+def simulate_return(c, srf, p0, end, anywhere=False):
     """Mean of p over the judged frame of a surface released at p0 (rad), p at the end of the frame, and
     kappa times the range of p, by which the mean may be off.
 
-    p <- f(p), f a step of the actuator towards u. The release is at the beginning of the frame; with a sign,
-    at any instant of it: the least mean if it is -1, the greatest if it is 1.
+    p <- f(p), f a step of the actuator towards u: of those declared the one that takes it furthest to one
+    side, end 1 or -1. The release is at the beginning of the frame, or `anywhere` in it, where p is furthest.
     """
+    act = srf.actuator
     total, p, p_min, p_max = 0.0, p0, p0, p0
     for k in range(c.frames_per_block):
         u = srf.commands.history[1, k]
         for _ in range(c.n_substeps):
             total += p
             p_min, p_max = min(p_min, p), max(p_max, p)
-            p = nearer(p, u, srf.actuator.approach_share, srf.actuator.step)
-            if sign != 0:
-                p = min(p, p0) if sign == -1 else max(p, p0)
+            p = furthest(p, u, end, act.approaches, act.steps, act.band, act.stop_lo, act.stop_hi)
+            if anywhere:
+                p = min(p, p0) if end < 0.0 else max(p, p0)
     return total / (c.frames_per_block * c.n_substeps), p, srf.judged.kappa * (p_max - p_min)
 
 
@@ -103,8 +104,8 @@ def release_explains(c, srf, h):
     lo, hi = srf.release.held_lo[h], srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
-    low, _, tol_low = simulate_return(c, srf, lo, -1)
-    high, _, tol_high = simulate_return(c, srf, hi, 1)
+    low, _, tol_low = simulate_return(c, srf, lo, -1.0, True)
+    high, _, tol_high = simulate_return(c, srf, hi, 1.0, True)
     return low - tol_low <= srf.judged.hi and high + tol_high >= srf.judged.lo
 
 
@@ -127,16 +128,18 @@ def keep_returns(c, srf, h):
 def narrow_return(c, srf, b, h):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
-    The mean over the frame rises with where the return began, and by no more than that. low, high: means of
-    the returns from the ends of the interval.
+    The mean over the frame rises with where the return began, and by no more than that, if the actuator is
+    known. low, high: means of the returns from the ends of the interval.
     """
     rel, seen = srf.release, srf.judged
-    low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h])
-    high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h])
+    low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h], -1.0)
+    high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h], 1.0)
     tol = max(tol_low, tol_high)
     healthy = max(abs(low - tol - seen.u), abs(high + tol - seen.u)) <= HEALTHY_RAD
     if healthy or low - tol > seen.hi or high + tol < seen.lo:
         return False
+    if srf.actuator.uncertain:
+        return True
     lo = rel.back_lo[b, h] + max(seen.lo - low - tol, 0.0)
     hi = rel.back_hi[b, h] - max(high - tol - seen.hi, 0.0)
     set_return(rel, b, h, lo, hi)
@@ -207,12 +210,12 @@ def propagate_returns(c, srf, h):
         rel.released[h] = 0
     for b in (EARLIER_SLOT, LATER_SLOT):
         if may_return(srf, b, h):
-            _, lo, _ = simulate_return(c, srf, rel.back_lo[b, h])
-            _, hi, _ = simulate_return(c, srf, rel.back_hi[b, h])
+            _, lo, _ = simulate_return(c, srf, rel.back_lo[b, h], -1.0)
+            _, hi, _ = simulate_return(c, srf, rel.back_hi[b, h], 1.0)
             set_return(rel, b, h, lo, hi)
     if c.frames_per_block > 1 and rel.held_lo[h] <= rel.held_hi[h]:
-        _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1)
-        _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1)
+        _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1.0, True)
+        _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1.0, True)
         widen_later(rel, h, lo, hi)
 
 

@@ -8,6 +8,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Gust
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.truth import Truth
 
 SPAN_FT, SCALE_FT, FT = 48.0, 1750.0, 0.3048
 AIR = [f"atmosphere/turb-{to}-fps" for to in ("north", "east", "down")]
@@ -17,9 +18,10 @@ ROTATION = [f"atmosphere/{axis}-turb-rad_sec" for axis in "pqr"]
 def airborne(**given):
     scenario = Scenario.model_validate({"name": "x", **given})
     plant = Plant(100)
-    configure(plant, scenario)
-    trim = trim_of(scenario, plant)
-    take_off(plant, scenario, trim)
+    truth = Truth.of(scenario)
+    configure(plant, truth)
+    trim = trim_of(truth, plant)
+    take_off(plant, truth, trim)
     return plant, trim
 
 
@@ -53,7 +55,7 @@ def test_dryden_turbulence_has_the_variances_and_the_memory_of_the_specification
             "environment": {"turbulence": "dryden", "severity": "light"},
         })  # fmt: skip
         plant = Plant(rate_hz)
-        take_off(plant, scenario, trim_of(scenario, plant))
+        take_off(plant, Truth.of(scenario), trim_of(Truth.of(scenario), plant))
         rows = flown(plant, [*AIR, *ROTATION], 80 * rate_hz)[20 * rate_hz :]
         squares.append(np.mean(rows**2, axis=0))
         products.append(np.mean(rows[2 * rate_hz :, 2] * rows[: -2 * rate_hz, 2]))

@@ -16,6 +16,7 @@ import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import load
+from beaver_ftc.scenario.truth import Truth
 from flying import SINES
 from samples import AT_NIGHT
 from test_architecture import modules, tree
@@ -60,8 +61,18 @@ def test_no_function_takes_a_scenario_or_a_section_of_the_truth(name):
             assert node.module not in HAS_THE_SECTIONS, node.module
 
 
-def test_the_declaration_has_no_section_of_the_truth():
-    assert not {field.name for field in fields(Declared)} & OF_THE_TRUTH
+def test_the_two_worlds_share_what_both_are_told_alone():
+    declared, truth = ({field.name for field in fields(half)} for half in (Declared, Truth))
+    assert not declared & OF_THE_TRUTH
+    assert declared & truth == {"aircraft", "rate_hz", "substeps", "initial"}
+
+
+def test_the_plant_is_configured_from_the_truth_alone():
+    assert "Scenario" not in {name for node in ast.walk(tree("plant.trim")) for name in names_in(node)}
+
+
+def names_in(node):
+    return [one.name for one in node.names] if isinstance(node, ast.ImportFrom) else [getattr(node, "id", "")]
 
 
 LATE = 1.0  # s: until then the two flights of a pair are the same
@@ -102,7 +113,10 @@ DECLARED = {
     "split": {"aircraft": "beaver-split", "fdi.fault_class": "all"},
     "pairs": {"fdi.fault_class": "all", "fdi.pairs": True, "fdi.sensor_monitor": "always"},
     "paper": {"fdi.scheme": "zhang2005", "control.law": "zhang2005"},
-    "servos": {"design_model.linearised": True, "actuators": "servo", "control.law": "adaptive"},
+    "servos": {
+        "design_model.linearised": True, "actuators": "servo", "control.law": "adaptive",
+        "fdi.bounds.actuators": {"bandwidth": 0.2, "elevator": {"dead_band_deg": 0.1}},
+    },
 }  # fmt: skip
 
 
@@ -153,11 +167,13 @@ TRUTHS = {
     "air": {"environment": {"turbulence": "dryden", "severity": "severe", "wind_mps": [9, -4, 1]}},
     "sensors": {"sensors": "consumer-grade"},
     "actuators": {"actuators": {"bandwidth_rad_s": 9, "travel_deg": [-5, 20]}},
+    "servos": {"uncertainty": {"actuators": {"bandwidth": 0.7, "rudder": {"dead_band_deg": 0.2}}}},
     "mass": {"uncertainty": {"mass": 1.05, "inertia": {"Iy": 1.1}, "cg_m": [0.05, 0, 0]}},
     "coefficients": {"uncertainty": {"coefficients": {"Cm_alpha": 1.1, "Cl_p": 0.8}}},
 }  # fmt: skip
 OF_THE_COMMAND = {
-    "prediction.u", "prediction.commanded", "control.layout.trim", "control.allocation.output.command",
+    "prediction.u", "prediction.u_lo", "prediction.u_hi", "prediction.commanded",
+    "control.layout.trim", "control.allocation.output.command",
 }  # fmt: skip
 CONFIGURED = ("prediction", "fdi", "assessment", "supervisor", "control", "autopilot")
 

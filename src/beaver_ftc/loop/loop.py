@@ -33,6 +33,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import HOLDING
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
+from beaver_ftc.scenario.truth import Truth
 
 if TYPE_CHECKING:
     from beaver_ftc.compiled.cache import Wanted
@@ -167,17 +168,18 @@ class Loop:
             raise BadInput(f"{scenario.name}: initial.on_ground: {says}")
         self.scenario = scenario
         self.aircraft = scenario.airframe
-        self.plant, self.trim = ready(scenario)
+        truth, declared = Truth.of(scenario), Declared.of(scenario)
+        self.plant, self.trim = ready(truth)
         self._may_fly_again = prepare is None
         if prepare is not None:
             prepare(self.plant)
             self.plant.executive = 0  # whatever was done to its `run` is to be called
-        take_off(self.plant, scenario, self.trim)
-        self.frames = configure_design(scenario, Declared.of(scenario).travel_rad)
+        take_off(self.plant, truth, self.trim)
+        self.frames = configure_design(scenario, declared.travel_rad)
         self.cockpit = Cockpit(self.plant, self.frames)
         self.cockpit.read()
         command = np.array(list(self.trim.surfaces_rad.values()))
-        self.trimmed = Trim(*known_trim(scenario), command)
+        self.trimmed = Trim(*known_trim(declared), command)
         configure_at_trim(self.frames[0], scenario, self.trimmed)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments

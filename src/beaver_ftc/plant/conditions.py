@@ -27,9 +27,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
 from beaver_ftc.plant.trim import TrimPoint, configure, take_off, trim_of
-from beaver_ftc.scenario.airframe import Environment, checked_against
 from beaver_ftc.scenario.builtin import texts_of
-from beaver_ftc.scenario.schema import Scenario, ScenarioLike, Uncertainty, load
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
+from beaver_ftc.scenario.truth import Truth
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel
@@ -147,15 +148,12 @@ class KnownTrim(NamedTuple):
     u: np.ndarray
 
 
-def known_trim(scenario: Scenario) -> KnownTrim:
-    """The trim of the aircraft in its file, at the start of the scenario and in still air. The designer finds
+def known_trim(declared: Declared) -> KnownTrim:
+    """The trim of the aircraft in its file, at the start of the flight and in still air. The designer finds
     it without the truth: neither its errors nor its air are in it. Raises BadInput if there is none.
     """
-    with checked_against(scenario.airframe):
-        truth = {"uncertainty": Uncertainty(), "environment": Environment()}
-    nominal = scenario.model_copy(update=truth | {"actuators": scenario.known_actuators})
-    aircraft, rates = scenario.airframe, (scenario.rate_hz, scenario.substeps)
-    key = _origin(aircraft), texts_of(nominal, ("initial", "actuators")), rates
+    nominal, aircraft = Truth.as_declared(declared), declared.aircraft
+    key = _origin(aircraft), texts_of(nominal, ("initial", "actuators")), (nominal.rate_hz, nominal.substeps)
     if key not in _known_trims:
         if len(_known_trims) >= _MOST_KNOWN_TRIMS:
             _known_trims.clear()
@@ -176,45 +174,46 @@ _MOST_TRIMS = 256
 _trims: dict[tuple[object, tuple[str, ...]], TrimPoint] = {}
 
 
-def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
-    """A borrowed aircraft with the scenario's errors, and its trim. Raises BadInput.
+def ready(truth: Truth) -> tuple[Plant, TrimPoint]:
+    """A borrowed aircraft with its errors, and its trim. Raises BadInput.
 
     A trim does not depend on what was flown before, so one that is known is not computed again. Engines
     remember the search for it: they take off in an aircraft that has not been through one.
     """
-    plant = _configured(scenario)
-    point, searched = _trim_in(scenario, plant)
-    return (_configured(scenario) if searched and plant.n_engines else plant), point
+    plant = _configured(truth)
+    point, searched = _trim_in(truth, plant)
+    return (_configured(truth) if searched and plant.n_engines else plant), point
 
 
 def find_trim(scenario: Scenario) -> TrimPoint:
     """The scenario's trim, kept for its flights. Raises BadInput."""
-    plant = _configured(scenario)
-    point, _ = _trim_in(scenario, plant)
+    truth = Truth.of(scenario)
+    plant = _configured(truth)
+    point, _ = _trim_in(truth, plant)
     give_back(plant)
     return point
 
 
-def _trim_in(scenario: Scenario, plant: Plant) -> tuple[TrimPoint, bool]:
+def _trim_in(truth: Truth, plant: Plant) -> tuple[TrimPoint, bool]:
     """The trim, and whether it was searched for in this aircraft, which is given back if there is none."""
-    key = plant.origin, texts_of(scenario, _TRIM_DEPENDS_ON)
+    key = plant.origin, texts_of(truth, _TRIM_DEPENDS_ON)
     if key in _trims:
         return _trims[key], False
     if len(_trims) >= _MOST_TRIMS:
         _trims.clear()
     try:
-        _trims[key] = trim_of(scenario, plant)
+        _trims[key] = trim_of(truth, plant)
     except BadInput:
         give_back(plant)
         raise
     return _trims[key], True
 
 
-def _configured(scenario: Scenario) -> Plant:
-    """A borrowed aircraft with the scenario's errors. Raises BadInput."""
-    plant = borrowed(scenario.rate_hz, scenario.substeps, scenario.airframe)
+def _configured(truth: Truth) -> Plant:
+    """A borrowed aircraft with its errors. Raises BadInput."""
+    plant = borrowed(truth.rate_hz, truth.substeps, truth.aircraft)
     try:
-        configure(plant, scenario)
+        configure(plant, truth)
     except BadInput:
         give_back(plant)
         raise
@@ -223,9 +222,10 @@ def _configured(scenario: Scenario) -> Plant:
 
 def trimmed(scenario: Scenario) -> tuple[Plant, TrimPoint]:
     """An aircraft with the scenario's errors, left near the trim, and the trim. Raises BadInput."""
-    plant = Plant(scenario.rate_hz, scenario.substeps, scenario.airframe)
-    configure(plant, scenario)
-    return plant, trim_of(scenario, plant)
+    truth = Truth.of(scenario)
+    plant = Plant(truth.rate_hz, truth.substeps, truth.aircraft)
+    configure(plant, truth)
+    return plant, trim_of(truth, plant)
 
 
 def _condition(scenario: ScenarioLike | None, initial: dict[str, float]) -> Scenario:

@@ -26,6 +26,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG, FlightState, Plant
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.trim import configure
+from beaver_ftc.scenario.truth import Truth
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -145,7 +146,7 @@ def own(scenario: "Scenario", point: FlightState) -> LinearModel:
         raise SimulationFailed("JSBSim linearises rightly only with no sideslip")
     with _aircraft_with_an_engine(scenario.airframe) as model:
         plant = Plant(scenario.rate_hz, aircraft=scenario.airframe, model=model)
-        configure(plant, scenario)
+        configure(plant, Truth.of(scenario))
         plant.start(point)
         linear = jsbsim.FGLinearization(plant.fdm)
         per_norm = [plant.read(f"actuators/{surface}/position-max-rad") for surface in _INPUTS.values()]

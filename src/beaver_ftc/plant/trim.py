@@ -30,8 +30,9 @@ from beaver_ftc.design import EXCEEDENCE, WIND_AT_20_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, FlightState, Plant
 from beaver_ftc.scenario.airframe import Gust
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Uncertainty
 from beaver_ftc.scenario.signals import frame_of
+from beaver_ftc.scenario.truth import Truth
 
 ACCELERATIONS = (
     *((f"accelerations/{axis}dot-ft_sec2", 1.0 / FT_PER_M) for axis in "uvw"),
@@ -315,11 +316,11 @@ NEVER = 2**62
 _LOCAL_FRAME = 3  # of atmosphere/cosine-gust/frame: north, east, down
 
 
-def configure(plant: Plant, scenario: Scenario) -> None:
-    """Declare the scenario's truth; failures come later, in flight, and the air at take-off."""
-    _uncertainty(plant, scenario)
-    _mass(plant, scenario)
-    _actuators(plant, scenario)
+def configure(plant: Plant, truth: Truth) -> None:
+    """Write what is true; failures come later, in flight, and the air at take-off."""
+    _uncertainty(plant, truth.uncertainty)
+    _mass(plant, truth.uncertainty)
+    _actuators(plant, truth)
 
 
 def _set(plant: Plant, key: str, name: str, value: float, neutral: float = 0.0) -> None:
@@ -330,8 +331,7 @@ def _set(plant: Plant, key: str, name: str, value: float, neutral: float = 0.0) 
         raise BadInput(f"{key}: {plant.aircraft.name} has no property {name}, allowed: {neutral:g}")
 
 
-def _uncertainty(plant: Plant, scenario: Scenario) -> None:
-    uncertainty = scenario.uncertainty
+def _uncertainty(plant: Plant, uncertainty: Uncertainty) -> None:
     for axis in AXES:
         theta = getattr(uncertainty.inertia_coupling, axis)
         key, name = f"uncertainty.inertia_coupling.{axis}", f"uncertainty/inertia-coupling/{axis}"
@@ -345,9 +345,9 @@ def _uncertainty(plant: Plant, scenario: Scenario) -> None:
         _set(plant, f"uncertainty.coefficients.{name}", f"uncertainty/{name}-scale", ratio, 1.0)
 
 
-def _mass(plant: Plant, scenario: Scenario) -> None:
+def _mass(plant: Plant, uncertainty: Uncertainty) -> None:
     """Mass and inertia by small masses about the centre of gravity, which moves against the aerodynamics."""
-    uncertainty, mass = scenario.uncertainty, plant.aircraft.mass
+    mass = plant.aircraft.mass
     change = {axis: getattr(uncertainty.inertia, axis) - 1.0 for axis in ("Ix", "Iy", "Iz")}
     Ix, Iy, Iz = (change[axis] * getattr(mass, f"{axis}_kg_m2") for axis in change)
     pairs = [(Iy + Iz - Ix) / 2, (Iz + Ix - Iy) / 2, (Ix + Iy - Iz) / 2]  # kg m2 of the x, y and z pair
@@ -363,13 +363,13 @@ def _mass(plant: Plant, scenario: Scenario) -> None:
             plant.write(name, plant.read(name) + sign * toward * IN_PER_M)
 
 
-def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
-    """Start the trimmed flight in the scenario's air: JSBSim's own wind and turbulence [MIL-F-8785C]."""
-    environment = scenario.environment
+def take_off(plant: Plant, truth: Truth, trim_point: TrimPoint) -> None:
+    """Start the trimmed flight in the true air: JSBSim's own wind and turbulence [MIL-F-8785C]."""
+    environment = truth.environment
     plant.forget_conditions()  # of the trim: whether it was computed or known must not show
     plant.start(trim_point, environment.wind_mps)
     if environment.severity is not None:
-        plant.write("atmosphere/randomseed", 1 + scenario.seed % (2**31 - 2))
+        plant.write("atmosphere/randomseed", 1 + truth.seed % (2**31 - 2))
         plant.write("atmosphere/turb-type", TUSTIN)
         plant.write(
             "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", WIND_AT_20_FT[environment.severity]
@@ -377,12 +377,12 @@ def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
         plant.write("atmosphere/turbulence/milspec/severity", EXCEEDENCE[environment.severity])
 
 
-def _actuators(plant: Plant, scenario: Scenario) -> None:
+def _actuators(plant: Plant, truth: Truth) -> None:
     if plant.has(DELAY):
         plant.write(DELAY, 0.0)  # of servos as built: a scenario's have none
     for surface in plant.aircraft.surfaces:
-        dynamics = getattr(scenario.actuators, surface)
-        off = getattr(scenario.uncertainty.actuators, surface)
+        dynamics = getattr(truth.actuators, surface)
+        off = getattr(truth.uncertainty.actuators, surface)
         plant.write(f"actuators/{surface}/bandwidth-rad_sec", off.bandwidth * dynamics.bandwidth_rad_s)
         rate_rad_s = off.rate_limit * radians(dynamics.rate_limit_deg_s)
         plant.write(f"actuators/{surface}/rate-limit-rad_sec", rate_rad_s)
@@ -393,9 +393,9 @@ def _actuators(plant: Plant, scenario: Scenario) -> None:
             plant.write(f"actuators/{surface}/position-max-rad", radians(high))
 
 
-def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
-    """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
-    initial, aircraft = scenario.initial, plant.aircraft
+def trim_of(truth: Truth, plant: Plant) -> TrimPoint:
+    """The trim with the coefficient errors; BadInput when there is none."""
+    initial, aircraft = truth.initial, plant.aircraft
     given = {name: getattr(initial, name) for name in aircraft.engine.settings}
     free = aircraft.left_by_trim
     given |= {f"{surface}_rad": radians(getattr(initial, f"{surface}_deg")) for surface in free}

@@ -176,7 +176,7 @@ def to_yaml(scenario: BaseModel) -> str:
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
 
 
-def texts_of(scenario: BaseModel, sections: Iterable[str]) -> tuple[str, ...]:
+def texts_of(scenario: Any, sections: Iterable[str]) -> tuple[str, ...]:
     """What sections hold, nothing where a scenario has none. Flights of a sweep share those that do not vary,
     whose text is written once."""
     return tuple(_text_of(getattr(scenario, name)) for name in sections)

@@ -25,6 +25,7 @@ from beaver_ftc.design.model import (
     mass_of,
 )
 from beaver_ftc.plant.conditions import known_trim
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}
@@ -196,5 +197,5 @@ class DesignModelOfFlight:
 def design_model_of_flight(scenario: Scenario) -> DesignModelOfFlight:
     """The scenario's design model, linearised or frozen where the designer knows the trim."""
     design = design_of(scenario.design_model)[0]
-    anchor(design, *known_trim(scenario))
+    anchor(design, *known_trim(Declared.of(scenario)))
     return DesignModelOfFlight(designed_moments(scenario), anchored(design))

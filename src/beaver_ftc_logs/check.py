@@ -16,7 +16,9 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.known_commands import (
+    VTOL_MODE,
     command_names,
+    hovers_throughout,
     is_command_name,
     missing_commands_text,
     multicopter_reason,
@@ -163,6 +165,10 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
         quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
         for quantity, pattern in _NAME_PATTERNS.items()
     }
+    if hovers_throughout(log.parameters, log.columns):
+        reason = f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2)"
+        remarks.append(f"{path}: {reason}, allowed: a log with flight on its wing")
+        return None
     if not mixing.surfaces:
         rotors = multicopter_reason(log.parameters, in_log)
         if rotors is not None:
@@ -224,7 +230,7 @@ def _read_likely(
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        likely = [*_likely_columns(names, None), *mixing.entry_by_column]
+        likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
         return read_flight(path, reader, columns=likely), names, mixing
     wanted = _likely_columns(column_names(path)) if reader == "table" else None
     log = next(read_parts(path, reader, time, wanted))

@@ -16,7 +16,9 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.known_commands import (
+    VTOL_MODE,
     command_names,
+    hovers_throughout,
     is_command_name,
     missing_commands_text,
     multicopter_reason,
@@ -163,6 +165,10 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
         quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
         for quantity, pattern in _NAME_PATTERNS.items()
     }
+    if hovers_throughout(log.parameters, log.columns):
+        reason = f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2)"
+        remarks.append(f"{path}: {reason}, allowed: a log with flight on its wing")
+        return None
     if not mixing.surfaces:
         rotors = multicopter_reason(log.parameters, in_log)
         if rotors is not None:
@@ -224,7 +230,7 @@ def _read_likely(
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        likely = [*_likely_columns(names, None), *mixing.entry_by_column]
+        likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
         return read_flight(path, reader, columns=likely), names, mixing
     wanted = _likely_columns(column_names(path)) if reader == "table" else None
     log = next(read_parts(path, reader, time, wanted))
@@ -280,27 +286,25 @@ def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
-    if reader == "ardupilot" or "deg" in name.lower() or _largest_magnitude(roll.values) > 2.0 * np.pi:
+    stated = next((unit for unit in ("deg", "rad") if unit in name.lower()), None)
+    if reader == "ardupilot":
         return "deg"
-    return "rad"
+    return stated or ("deg" if _largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
 
 
 def _guess_rate_unit(
     log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
-    """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
-    roll angle's numbers are multiplied by."""
-    rates = [log.columns[name] for name in rate_names]
+    """The unit of the rates: by the roll angle, else by their name, else by their size. rad_per_roll_unit:
+    what the roll angle's numbers are multiplied by."""
+    rates, named = [log.columns[name] for name in rate_names], rate_names[0].lower()
+    found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
     if roll is not None:
-        roll_fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
-        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_CORRELATION:
-            return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
-    unit_in_name = next(
-        (unit for name_part, unit in _UNIT_OF_PART.items() if name_part in rate_names[0].lower()), None
-    )
-    if unit_in_name:
-        return unit_in_name
-    return "deg/s" if max(_largest_magnitude(rate.values) for rate in rates) > _LARGEST_RAD_S else "rad/s"
+        fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
+        if fit is not None and abs(fit.correlation) > _MIN_CORRELATION:
+            found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
+    largest = max(_largest_magnitude(rate.values) for rate in rates)
+    return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
 
 
 def _largest_magnitude(values: Floats) -> float:

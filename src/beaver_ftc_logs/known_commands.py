@@ -5,10 +5,10 @@ such names too. What is not in these tables is no command until a vehicle file n
 """
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from beaver_ftc_logs.recording import Parameters
+from beaver_ftc_logs.recording import Column, Parameters
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,15 @@ def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None
     if len(set(rotors)) >= _MIN_ROTORS and not commanded:
         return f"{rotors[0]} to {rotors[-1]}, and no output of a servo"
     return None
+
+
+VTOL_MODE, _ON_ITS_WING = "vehicle_status.vehicle_type", 2.0
+
+
+def hovers_throughout(params: Parameters, columns: Mapping[str, Column]) -> bool:
+    """Whether the log is of a VTOL that never flies on its wing [PX4, vehicle_status.msg: vehicle_type 2]."""
+    is_vtol = params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES
+    return is_vtol and VTOL_MODE in columns and not (columns[VTOL_MODE].values == _ON_ITS_WING).any()
 
 
 def command_names(names: Sequence[str], params: Parameters) -> list[str]:

@@ -18,12 +18,6 @@ def test_the_parameters_that_agree_solve_the_inequality(slope):
     assert sorted([abs(low), abs(high)]) == pytest.approx([0.2, 0.25])
 
 
-def test_without_an_effect_every_parameter_agrees_or_none():
-    assert isolation.consistent_theta(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
-    low, high = isolation.consistent_theta(-0.21, 0.2, 0.0, -1.0, 0.5)
-    assert low > high
-
-
 def agreeing(innovation, **fields):
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
@@ -116,22 +110,3 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     assert fie["u_far"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
     assert fie["effect"]["e"] == pytest.approx(0.01 + own)
-
-
-def test_where_no_position_agrees_the_whole_travel_stays_possible():
-    fdi = new_fdi()
-    fie = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.6, high=0.5)
-    (
-        fdi["config"]["n_substeps"],
-        fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["nu_max"],
-    ) = (
-        1,
-        (0.0, 9.0, 0.0),
-        0.05,
-    )
-    fdi["bound"]["eG"][:, 1] = 0.1
-    fie["effect"]["regressor"] = 0.1, 5.0, 1.0
-    on(isolation.widen_error, fdi, fie)
-    assert fie["u_far"] == 0.6
-    assert fie["effect"]["e"] == pytest.approx([0.06] * 3)

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds import poles_for_delays
-from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.schema import Scenario
-from telling import apart
+from beaver_ftc.diagnosis.detection import filters
 
 
 def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
@@ -50,34 +46,6 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
     assert on(filters.bank_axis, with_shares(*LEAVES)) == 1
     assert [filters.nearest_filter(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
     assert on(filters.bank_share, with_shares(*LEAVES)) == pytest.approx(1.5)
-
-
-def test_the_closest_approach_of_every_filter_is_kept():
-    fdi = with_shares(*LEAVES)
-    alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["output"]["peak"][:3], alarm["ratio"] = (
-        (0.6, 0.0, 0.0),
-        0.4,
-    )
-    filters.keep_bank_peak(fdi["bank"])
-    statistical.keep_score_peak(alarm)
-    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert alarm["peak"] == 0.4
-    silent = new_fdi()
-    filters.keep_bank_peak(silent["bank"])
-    assert not silent["bank"]["output"]["peak"].any()
-    assert on(filters.bank_share, silent) == 0.0
-
-
-def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
-    fdi = new_fdi()
-    fdi["isolation"]["config"]["n_estimators"] = 2
-    fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
-    G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(filters.set_directions, fdi, G)
-    assert fdi["isolation"]["estimator"]["parity_direction"][0] == pytest.approx([-0.8, 0.0, -0.6])
-    assert fdi["isolation"]["estimator"]["parity_direction"][0] @ G[:, 2] == pytest.approx(0.0)
-    assert not fdi["isolation"]["estimator"]["parity_direction"][1].any()
 
 
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
@@ -153,24 +121,6 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
         assert on(filters.is_reachable, fdi, fie, False)
 
 
-def test_a_filter_without_a_bound_has_no_share_of_it():
-    """Nothing is declared: it may alarm, but is nearer to its bound than no other."""
-    fdi = with_shares(*LEAVES)
-    fdi["bank"]["output"]["threshold"][0] = 0.0
-    with np.errstate(divide="ignore"):
-        assert on(filters.bank_share, fdi) == pytest.approx(1.5)
-        assert [filters.nearest_filter(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.keep_bank_peak(fdi["bank"])
-    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.0, 1.5, 1.2])
-    assert on(filters.bank_axis, fdi) == 0
-
-
-def test_of_filters_that_are_equally_near_the_published_one_is_named():
-    assert filters.nearest_filter(new_fdi()["bank"], 0) == 0
-    assert filters.nearest_filter(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
-    assert filters.nearest_filter(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
-
-
 @pytest.mark.parametrize("size", [9.0, 0.3])
 def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
@@ -180,24 +130,3 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
     on(filters.set_directions, fdi, np.zeros((3, 4)))
     assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
-
-
-@pytest.mark.parametrize("noisy", [False, True])
-@pytest.mark.parametrize("several", [False, True])
-def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several):
-    """The first by itself where no bank is wanted, whatever the gyros do; of noise one a delay."""
-    noise = {"sensors": {"p": {"noise_std_deg_s": 0.04}, "q": {"noise_std_deg_s": 0.09}}} if noisy else {}
-    asked = {"detection_pole_per_s": 2.5, "pole_bank_per_s": [11.0, 0.7], "bounds": noise}
-    asked |= {"sharpen": {"pole_bank": several}}
-    scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
-    config = scenario.fdi
-    fdi["bank"]["config"]["a"] = 0.0
-    filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
-    bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = poles_for_delays(SensorErrors(config.bounds.sensors), bound)
-    assert bool(for_noise) is noisy
-    poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
-    apart(poles=poles)
-    assert fdi["bank"]["config"]["n_filters"] == len(poles)
-    assert fdi["bank"]["config"]["a"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
-    assert not fdi["bank"]["config"]["a"][len(poles) :].any()

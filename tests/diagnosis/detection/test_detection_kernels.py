@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, fill, new_fdi, on
 
-from beaver_ftc.diagnosis import conclusion, model_prediction
+from beaver_ftc.diagnosis import model_prediction
 from beaver_ftc.diagnosis.detection import filters as detection_filters
 from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
@@ -13,8 +13,6 @@ from beaver_ftc.diagnosis.detection.filters import (
     N_BASIS,
 )
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
@@ -39,13 +37,6 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
     assert detection_filters.beyond_bound(residual, 0.3) == pytest.approx(left)
-
-
-def test_the_output_is_the_weights_on_the_basis():
-    rng = np.random.default_rng(1)
-    record = new_network(weights=rng.normal(size=(3, N_BASIS)))
-    detection_filters.evaluate_network(record, 0.1, -0.05)
-    assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["Phi"])
 
 
 @pytest.mark.parametrize("leaking", [False, True])
@@ -95,52 +86,6 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     detection_filters.fdae_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
     assert fdi["fdae"]["output"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
     assert on(detection_filters.alarm_axis, fdi, authority) == (-1 if axis is None else axis)
-
-
-def test_the_first_alarm_stays():
-    fdi = new_fdi()
-    on(conclusion.latch_alarm, fdi, 2, 7.0)
-    on(conclusion.latch_alarm, fdi, 0, 8.0)
-    found = fdi["verdict"]
-    assert (found["detected"], found["axis"], found["detected_at_s"]) == (1, 2, 7.0)
-
-
-@pytest.mark.parametrize("detected", [0, 1])
-def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
-    rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
-    decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
-    record = fdi["fdae"]
-    record["config"]["a"], fdi["verdict"]["detected"] = decay, detected
-    record["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
-    (
-        record["network"]["config"]["gain"],
-        record["network"]["memory"]["Phi"],
-        record["network"]["config"]["w_max"],
-    ) = 1.0, 1.0, 100.0
-    x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
-    eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
-    for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta[k], noise[k]
-        fdi["bound"]["n_gyro"], record["output"]["residual"] = noise[k + 1], 99.0
-        on(detection_filters.advance_fdae, fdi, x[k], believed[k], False)
-    w = decay ** np.arange(frames)[::-1, None]
-    shares = w * ((1.0 - decay) * x + DT * (believed + output))
-    assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
-    sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert record["memory"]["e"] == pytest.approx(sums[0] + sums[1])
-    assert record["memory"]["m"] == pytest.approx(sums[1])
-    assert record["output"]["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
-    assert record["network"]["memory"]["weights"].any() == detected
-
-
-def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
-    fdi, out = new_fdi(), np.zeros(3)
-    record = fdi["fdae"]
-    record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
-    record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["m"], fdi["bound"]["n_gyro"] = 0.1, 0.2
-    on(detection_filters.fdae_unmodelled, fdi, out)
-    assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 
 def new_prediction(share):
@@ -210,27 +155,3 @@ def test_means_over_a_frame_are_of_its_instants(count, has_eG):
     deflections = np.array([u for _, _, u, *_ in seen])
     assert mean["u_min"] == pytest.approx(deflections.min(axis=0))
     assert mean["u_max"] == pytest.approx(deflections.max(axis=0))
-
-
-def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
-    record = new_prediction(1.0)
-    record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
-    record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
-    model_prediction.move_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
-    assert record["u_old"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
-    assert record["u"] == pytest.approx(record["commanded"])
-    assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
-
-
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps):
-    """Of numbers asked for that all differ: pole, gain, leak and limit, at 40 Hz."""
-    control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
-    asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
-    record = new_fdi()["fdae"]
-    detection_filters.configure_fdae(record, Declared.of(Scenario.model_validate({"name": "x", **asked})))
-    assert np.unique(record["config"]["pole_per_s"]).tolist() == [2.2]
-    assert np.unique(record["config"]["a"]) == pytest.approx([np.exp(-2.2 / 40.0)])
-    network = record["network"]
-    names = "gain", "leak", "w_max"
-    assert [float(network["config"][name]) for name in names] == [91.0, 0.7, 3.3]

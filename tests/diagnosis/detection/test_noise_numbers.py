@@ -1,12 +1,11 @@
 """The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
 
 from dataclasses import replace
-from math import exp, pi, radians, sqrt
-from types import SimpleNamespace
+from math import pi, radians, sqrt
 
 import numpy as np
 import pytest
-from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
+from innovations import LEVEL_FLIGHT, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden, rotation_lengths
@@ -17,23 +16,14 @@ from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import inertia_bounds, map_dtype
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LOSS_END,
     N_SLOTS,
-    STEP_FAULT,
-)
-from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
-    N_TONES,
-    VANE_VIEW,
-    ParityDirection,
 )
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.diagnosis import Bounds, Statistical
+from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.schema import Scenario
 from flying import declared_in
 
@@ -46,7 +36,6 @@ GIVEN = {
     "rate_hz": 50,
     "fdi": {"statistical": {}, "bounds": {"sensors": "tactical-grade", "turbulence": "light"}},
 }
-AILERON, ELEVATOR, RUDDER = 0, 1, 2
 
 
 @pytest.mark.parametrize("turbulence", ["light", "severe"])
@@ -71,26 +60,6 @@ def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
     walk = sqrt(i**2 - ramp**2)
     w0 = (walk / (noise**2 * dt)) ** 0.25
     assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) / (walk * w0)) == pytest.approx(level / 2)
-
-
-def test_what_grows_beside_a_loss_takes_half_the_level():
-    """eta_bar sqrt(omega / i) times 1.204, where next to nothing is left of the swing."""
-    eta_bar, omega, level = 0.02, 3.0, 6.0
-    i = statistical.derive_intensity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
-    assert 1.204 * eta_bar * sqrt(omega / i) == pytest.approx(level / 2, rel=1e-4)
-
-
-def test_without_noise_the_frame_rate_is_the_bandwidth():
-    eta_bar, omega, level, dt = 0.02, 50.0, 6.0, 0.05
-    i = statistical.derive_intensity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
-    assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) * dt / i) == pytest.approx(level / 2)
-
-
-def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
-    none, least, more = (
-        statistical.derive_intensity(bound, 10.0, 1e-4, 6.0, 0.01) for bound in (0.0, 1e-3, 2e-3)
-    )
-    assert none == least != more
 
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
@@ -119,97 +88,6 @@ def alone():
     return Detector(50.0, forgetting_time_s=4.0, bounds={"sensors": "tactical-grade", "turbulence": "light"})
 
 
-def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_moment(alone):
-    pitch, *lateral = alone.blocks
-    column = {LOSS: {AILERON: 0, ELEVATOR: 1, RUDDER: 2}}
-
-    def hypotheses(block):
-        found = block["hypothesis"][: block["n_h"]]
-        return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["alarms"])) for h in found}
-
-    assert hypotheses(pitch) == {
-        (LOSS, ELEVATOR, 1, 1), (STEP_FAULT, -1, 1, 1), (ALPHA_CUBED_MOMENT, -1, 1, 0), (GROWING_LOSS,
-        ELEVATOR, 1, 0),
-        (LOSS_END, ELEVATOR, 1, 0),
-    }  # fmt: skip
-    for block in lateral:
-        assert hypotheses(block) == {
-            (LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP_FAULT, -1, 0, 1), (STEP_FAULT, -1, 2, 1),
-            (GROWING_LOSS, AILERON, 0, 0), (LOSS_END, AILERON, 0, 0), (GROWING_LOSS, RUDDER, 2, 0),
-            (LOSS_END, RUDDER, 2, 0),
-        }  # fmt: skip
-    assert [int(block["n"]) for block in alone.blocks] == [1, 2, 2]
-    assert [block["axes"][: block["n"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
-    for block in alone.blocks:
-        for h in block["hypothesis"][: block["n_h"]]:
-            if h["alarms"]:
-                place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
-                assert h["column"] == place
-    assert alone.detector["test"]["n_scores"] == 6
-    assert alone.detector["block"]["n_h"].all()
-
-
-def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
-    gyros = {"p": (0.1, 0.3), "q": (0.2, 0.5), "r": (0.05, 0.4)}
-    sensors = {k: {"noise_std_deg_s": n, "quantum_deg_s": q} for k, (n, q) in gyros.items()}
-    blocks = Detector(50.0, bounds={"sensors": sensors}).blocks
-    axes = [axis for block in blocks for axis in block["axes"][: block["n"]]]
-    assert axes == [1, 0, 2, 0, 2]
-    for block in blocks:
-        for i in range(block["n"]):
-            noise, quantum = gyros["pqr"[block["axes"][i]]]
-            variance = radians(1.0) ** 2 * (noise**2 + quantum**2 / 12.0)
-            assert block["R_y"][i] == pytest.approx(variance, rel=1e-9)
-            assert block["P_xx"][i, i] == block["R_y"][i]
-            assert block["P_dd"][i, i] == 1.0
-    start = configure_design(Scenario.model_validate(GIVEN), TRAVEL_RAD)[0]["fdi"]["statistical"]
-    assert not start["block"]["n_h"].any(), "before a trim nothing of it is set up"
-    ideal = Detector(50.0).blocks[1]
-    assert ideal["R_y"] == pytest.approx([1e-18, 1e-18])
-
-
-def test_the_times_and_levels_of_a_detector(alone):
-    record, blocks = alone.detector, alone.blocks
-    assert record["test"]["forget"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
-    assert record["alarm"]["detected_at_s"] == -1.0
-    assert record["test"]["enabled"] == 1
-    for block in blocks:
-        assert block["alarm_level"] == record["test"]["alarm_level"]
-        assert block["noise_share"] == 0.5
-        assert block["eta_rate"] == pytest.approx(15.0 / 50.0)
-        assert block["hypothesis"]["decay"] == pytest.approx(exp(-1.5 / 50.0))
-    for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
-        assert [block["noise_share"] for block in Detector(50.0, bounds=bounds).blocks] == [chance] * 3
-
-
-def test_a_loss_declared_constant_neither_grows_nor_ends():
-    blocks = Detector(50.0, fault_profile="abrupt").blocks
-    kinds = [set(block["hypothesis"]["kind"][: block["n_h"]]) for block in blocks]
-    assert all(not {GROWING_LOSS, LOSS_END} & found for found in kinds)
-    assert all(LOSS in found and STEP_FAULT in found for found in kinds)
-
-
-def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
-    air, last = alone.detector["gust"], alone.blocks[-1]
-    rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
-    assert air["config"]["L_roll"] == pytest.approx(rolling)
-    assert last["drift_correlation_length_m"] == pytest.approx(
-        statistical.derive_length(alone.detector, V, 50.0, rolling)
-    )
-    assert last["Q_scale"] == pytest.approx((rolling / last["drift_correlation_length_m"]) ** 2)
-    assert [float(block["Q_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
-    assert air["output"]["gusty"] == 1
-    assert air["config"]["S_m"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
-    assert air["memory"]["share"] == pytest.approx([1.0, 0.003, 0.03])
-    assert air["config"]["span"] == SPAN_M
-    assert air["config"]["gravity"] == pytest.approx(9.80665)
-    assert Detector(50.0).detector["gust"]["output"]["gusty"] == 0
-
-
-def test_where_nothing_diagnoses_nothing_is_enabled():
-    assert Detector(50.0, statistical=None).detector["test"]["enabled"] == 0
-
-
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
@@ -227,10 +105,6 @@ def _power(*signals):
     return np.array([sum(power for name, power in term.of if name in signals) for term in AIRCRAFT.moments])
 
 
-def test_pressure_scales_every_term():
-    assert _tolerance(sensors={"qdyn": {"scale_error": 0.02}}) == pytest.approx(0.02 * SIZE)
-
-
 def test_airspeed_scales_what_rates_multiply():
     rates = _power(*RATES.values())
     assert _tolerance(sensors={"V": {"scale_error": 0.02}}) == pytest.approx(0.02 * rates * SIZE)
@@ -239,11 +113,6 @@ def test_airspeed_scales_what_rates_multiply():
 @pytest.mark.parametrize("vane", ["alpha", "beta"])
 def test_a_vane_scales_its_terms(vane):
     assert _tolerance(sensors={vane: {"scale_error": 0.02}}) == pytest.approx(0.02 * _power(vane) * SIZE)
-
-
-def test_steady_errors_of_the_air_data_are_regressors_of_their_own():
-    air = {"alpha": {"bias_deg": 1}, "beta": {"bias_deg": 1}, "V": {"bias_mps": 1}, "qdyn": {"bias_pa": 9}}
-    assert not _tolerance(sensors=air).any()
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -261,27 +130,6 @@ def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
     nominal = np.abs([inertia_coefficients(MASS)])[0]
     share = (inertia_bounds(0.05, MASS) / nominal)[[2, 7, 11]].max()
     assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
-
-
-def test_blocks_get_the_tolerances_of_their_axes():
-    alone = Detector(50.0, bounds={"coefficients": 0.1})
-    assert alone.detector["test"]["regress"] == 1
-    for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
-        of_it = SIZE[np.isin(AXIS, axes)]
-        assert block["n_Z"] == of_it.size
-        assert block["tol"][: of_it.size] == pytest.approx(0.1 * of_it)
-    assert Detector(50.0).detector["test"]["regress"] == 0
-
-
-def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
-    """Airspeed through attitudes of up to 17 deg, 0.3 of it."""
-    design = design_record()[0]
-    sensors = Bounds.model_validate({"sensors": {"V": {"noise_std_mps": 0.5}}}).sensors
-    speed = 0.3 * 0.5 / V
-    turning = np.array([0.0, speed * pi * V / (4 * SPAN_M), speed * pi * V / (3 * SPAN_M)])
-    damping = jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
-    found = gust_jitter(sensors, design, SPAN_M)
-    assert found == pytest.approx(np.sqrt(damping**2 @ turning**2))
 
 
 NOISY = {
@@ -323,46 +171,6 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
     assert still["noise"]["eta_u"] == pytest.approx(radians(0.5) * np.abs(G).sum(axis=1))
 
 
-def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
-    record = Detector(50.0, bounds=UNEVEN).detector
-    expected = statistical.derive_intensity(
-        0.05, 15.0, radians(0.2), float(record["test"]["alarm_level"]), 0.02
-    )
-    assert record["noise"]["q"] == pytest.approx(expected)
-
-
-def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
-    design, sensors = design_record()[0], Bounds.model_validate(UNEVEN).sensors
-    speed = 0.3 * 0.3 / V
-    pitching = (radians(0.1) + speed) * pi * V / (4 * SPAN_M)
-    yawing = (radians(0.2) / sqrt(12.0) + speed) * pi * V / (3 * SPAN_M)
-    damping = jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
-    found = gust_jitter(sensors, design, SPAN_M)
-    assert found == pytest.approx(np.hypot(damping[:, 1] * pitching, damping[:, 2] * yawing))
-
-
-@pytest.mark.parametrize(("instants", "share"), [(0, 1.0), (1, 1.0), (4, 0.25)])
-def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
-    alone = Detector(50.0)
-    alone.fdi["config"]["n_substeps"] = instants
-    set_up(alone, GIVEN)
-    assert alone.detector["test"]["w"] == share
-
-
-def test_an_elevator_off_trim_is_in_what_constants_multiply():
-    """Tolerances of a gyro's offset, through the slopes with the surfaces where they are."""
-    u = np.array([0.0, -0.3, 0.2, 0.1])
-    config = Bounds.model_validate({"sensors": {"alpha": {"bias_deg": 0.3}, "beta": {"bias_deg": 0.2}}})
-    alone, design = Detector(50.0), design_record()[0]
-    scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
-    start = np.zeros(3), Y, u
-    statistical.configure_statistics(alone.fdi, Declared.of(scenario), design, MASS, start, 50.0)
-    total = bound_kernels.coefficient_bounds(declared_in(config, AIRCRAFT), design, MASS, Y, u)
-    for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
-        of_it = total[np.isin(AXIS, axes)]
-        assert block["tol"][: of_it.size] == pytest.approx(of_it)
-
-
 def test_a_sense_is_kept_for_every_onset(alone):
     """A loss is a loss from whichever onset: what takes away counts against it."""
     for block in alone.blocks:
@@ -372,12 +180,6 @@ def test_a_sense_is_kept_for_every_onset(alone):
         sense = by_onset(block, "supporting_correlation_sign")
         assert (sense[:, :n] == signs).all()
         assert not sense[:, n:].any()
-
-
-def test_forces_are_those_the_file_has_a_sensor_for(alone):
-    table = alone.detector["gust"]["memory"]["table"]
-    values = table["value"][: len(AIRCRAFT.measurable_forces)]
-    assert sorted(values) == sorted(term.value for term in AIRCRAFT.measurable_forces)
 
 
 @pytest.mark.parametrize("known", [0, 1])
@@ -399,13 +201,6 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
     expected = bound_kernels.gust_noise(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["gust_noise"] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])
-def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, pace):
-    """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
-    aircraft = SimpleNamespace(model_error_rad_s2=error)
-    assert statistical.eta_rate(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(pace)
 
 
 def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():
@@ -440,40 +235,3 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     assert record.block[0].eta_rate == pytest.approx(0.02)
     statistical.update_eta_rate(record.noise, record.block, error_map, error_map.stop_lo.copy())
     assert record.block[0].eta_rate == 2.0
-
-
-def test_a_surface_that_stands_still_again_moves_no_error():
-    """Each frame is held against the one before it, not against where the surfaces were at first."""
-    record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
-    error_map = np.zeros(1, map_dtype(3)).view(np.recarray)[0]
-    error_map.stop_lo, error_map.stop_hi = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
-    record.noise.rate0, paces = 0.02, []
-    for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
-        statistical.update_eta_rate(record.noise, record.block, error_map, np.array(u))
-        paces.append(float(record.block[1].eta_rate))
-    shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
-    assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])
-
-
-def test_which_views_make_tests_of_their_own():
-    """By hand: two losses a surface of roll and yaw, one of pitch, and a step either way on each axis of each
-    block; of views across a surface what they see of a force, and tones, also of an axis by itself."""
-    rates, force = (0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, 0.5)
-    plane, elsewhere = (1, 4), (1, 2)
-    across = {
-        ("axis", rates, False): N_TONES,
-        ("axis", force, False): N_TONES,
-        ("axis", force, True): 0,
-        ("vane", force, False): 0,
-        (0, rates, False): 0,
-        (0, force, False): N_SLOTS * (2 + 3) + N_TONES,
-        (3, (0.0, 0.0, 0.0, 0.2, 0.0), True): N_SLOTS * (2 + 3) + N_TONES,
-    }
-    alone = N_SLOTS * ((1 + 2) + 2 * (2 + 4))
-    assert statistical.count_tests(AIRCRAFT) == alone
-    names, views = {"axis": AXIS_VIEW, "vane": VANE_VIEW}, []
-    for (to, direction, inertial), tests in across.items():
-        view = ParityDirection(names.get(to, to), direction, plane, [1, 2, 3], inertial)
-        assert statistical.count_tests(AIRCRAFT, view) == alone + tests, (to, direction, inertial)
-        views.append(view._replace(plane_pair=elsewhere))
-    assert statistical.count_tests(AIRCRAFT, *views) == alone + sum(across.values())

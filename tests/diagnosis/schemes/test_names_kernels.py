@@ -16,12 +16,9 @@ from beaver_ftc.diagnosis.conclusion import (
     update_interval,
 )
 from beaver_ftc.diagnosis.schemes import (
-    fdi_dtype,
-    prepare_takeover,
     record_isolated_surfaces,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from telling import bits, fill
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 
@@ -113,20 +110,3 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
     since = np.full(4, -1.0)
     since[named] = 2.5
     assert fdi["verdict"]["from_s"].tolist() == since.tolist()
-
-
-@pytest.mark.parametrize(("filters", "in_flight"), [(2, True), (3, False)])
-def test_of_a_diagnosis_before_only_how_close_it_came_goes_on_and_by_the_same_filters(filters, in_flight):
-    fdi, before = (fill(np.zeros(1, fdi_dtype(3))[0], seed=seed) for seed in (0, 1))
-    fdi["bank"]["config"]["n_filters"], before["bank"]["config"]["n_filters"] = filters, 2
-    expected = fdi.copy()
-    expected["statistical"]["alarm"]["peak"] = before["statistical"]["alarm"]["peak"]
-    if filters == 2:
-        expected["bank"]["output"]["peak"] = before["bank"]["output"]["peak"]
-    for gust in ("gust", "vaneless"):
-        expected["statistical"][gust]["config"]["starts_in_flight"] = in_flight
-    expected["sensor_monitor"]["memory"]["substep"] = 0
-    given = bits(before)
-    prepare_takeover(fdi, before, in_flight)
-    assert bits(fdi) == bits(expected)
-    assert bits(before) == given

@@ -33,17 +33,6 @@ def test_the_attainable_interval_is_spanned_by_the_corners_of_the_travel(row):
     assert greatest == pytest.approx(max(corners), abs=1e-12)
 
 
-def test_without_a_loss_the_law_follows_the_reference_model_to_the_bit():
-    control = control_record()
-    for k in range(50):
-        wanted = np.array([0.05 * np.sin(k / 9), 0.02, -0.01])
-        laws.follow(control["reference"]["config"], control["reference"]["output"], wanted)
-        laws.govern(control["reference"], wanted, control["axes"]["shortfall"], False)
-        assert np.array_equal(
-            control["reference"]["output"]["governed_rate"], control["reference"]["output"]["model_rate"]
-        )
-
-
 def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_comes_back():
     control = control_record()
     control["reference"]["memory"]["active"] = 1
@@ -57,17 +46,6 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
     for _ in range(round(5 * laws.RECOVERY_S / DT)):
         laws.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
     assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
-
-
-def test_a_demand_beyond_the_stops_is_noted():
-    control = control_record()
-    out, by_engines = control["allocation"]["output"], np.zeros((2, 3))
-    control["axes"]["G"][1, 3], out["command"] = 2.2, (0.0, 0.0, 0.0, -0.1)  # nothing but the flap is left
-    control["axes"]["demand"] = [0.0, -1.0, 0.0]
-    control["axes"]["hold"] = [0.0, -0.5, 0.0]
-    allocation.note_shortfall(control["axes"], out["command"], control["layout"], np.zeros(4), by_engines)
-    assert control["axes"]["shortfall"][1] == pytest.approx(-1.0 + 0.22)
-    assert list(control["axes"]["beyond"]) == [0, 1, 0]
 
 
 def test_what_a_lagging_surface_still_gives_is_no_shortfall():

@@ -5,9 +5,8 @@ import pytest
 
 from beaver_ftc.control import row_of
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.control.laws import compiled_rivals, published
-from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE_DETECTOR
+from beaver_ftc.control.laws import compiled_rivals
+from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
@@ -66,16 +65,6 @@ def test_the_published_law_inverts_the_model_and_integrates(name):
     assert out["command"][FLAP] == pytest.approx(control["layout"]["trim"][FLAP])
     assert feedback["integral"] == pytest.approx(before + control["reference"]["config"]["dt"] * error)
     assert control["axes"]["hold"] == pytest.approx(-f)
-
-
-def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
-    frame = new_frame("fault-tolerant")
-    commanded(frame)
-    control = frame["control"]
-    assert control["rejecting"]["observer"]["begun"] == 1
-    assert control["rejecting"]["observer"]["rate"] == pytest.approx(X)
-    assert not control["published"]["memory"]["integral"].any()
-    assert control["axes"]["hold"] == pytest.approx(-frame["prediction"]["f"])
 
 
 def believed(frame, surface, theta=-0.6, detected=1):
@@ -162,33 +151,6 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt
 
 
-def alarmed(known=0, speaks=0, score=2.0):
-    frame = new_frame()
-    fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
-    fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
-    fdi["bank"]["output"]["threshold"] = 0.1
-    fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
-    fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
-    fdi["isolation"]["estimator"]["xhat"] = 9.0
-    adaptive_estimators.update_verdict(fdi, frame["prediction"], frame["measured"], 5.0)
-    return fdi
-
-
-def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
-    fdi = alarmed()
-    first = int(fdi["isolation"]["config"]["n_estimators"])
-    assert fdi["verdict"]["detected"] == 1
-    assert fdi["isolation"]["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
-    assert fdi["fdae"]["network"]["output"].all()
-    assert (alarmed(known=1)["isolation"]["estimator"]["xhat"][:first] == 9.0).all()
-    quiet = alarmed(score=0.5)
-    assert quiet["verdict"]["detected"] == 0
-    assert not quiet["fdae"]["network"]["output"].any()
-    silenced = alarmed(speaks=1)  # an instrument is broken: no surface is named
-    assert silenced["verdict"]["detected"] == 0
-
-
 def test_known_laws_are_those_of_the_page():
     given = {
         "nominal": (0, 0, 0), "adaptive": (1, 0, 0), "fault-tolerant": (1, 1, 0),
@@ -199,26 +161,6 @@ def test_known_laws_are_those_of_the_page():
     files = {name: row_of(name).file for name in ("fault-tolerant", "fault-tolerant-published")}
     assert files == {"fault-tolerant": "rejecting", "fault-tolerant-published": "published"}
     assert LOSS == 0
-
-
-@pytest.mark.parametrize(("name", "share"), [("nominal", 1.0), ("adaptive", 0.5)])
-def test_all_but_the_nominal_law_reckon_with_what_is_believed_of_a_surface(name, share):
-    frame = new_frame(name)
-    surfaces = fields(frame["control"]["surfaces"])
-    surfaces["effectiveness"][RUDDER], surfaces["effectiveness_step"] = 0.5, 0.0
-    believed = commanded(frame)["axes"]["G"]
-    assert believed[:, RUDDER] == pytest.approx(share * G[:, RUDDER])
-    assert believed[:, AILERON] == pytest.approx(G[:, AILERON])
-
-
-def test_what_the_unknown_is_taken_for_is_taken_off_the_demand():
-    control, f, fhat = new_frame()["control"], np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.07, -0.09])
-    put(control, governed_rate=0.01, governed_acceleration=0.02)
-    law, feedback = control["published"], fields(control["published"])
-    feedback["integral"] = 0.003
-    published.demand(law, control["reference"]["output"], X, f, fhat)
-    wanted = 0.02 + feedback["Kp"] * (0.01 - X) + feedback["Ki"] * 0.003 - f - fhat
-    assert feedback["demand"] == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("incremental", [1, 0])

@@ -8,9 +8,6 @@ from hypothesis import strategies as st
 from beaver_ftc.control import accommodation, allocation, laws
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED
 from beaver_ftc.control.laws import rejecting
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
-from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
 from law_records import fields, new_control, put
@@ -69,19 +66,6 @@ def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, lef
     assert handed_over(allocated, 1, left) == pytest.approx(part * lost, abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("surface", "believed", "kept"),
-    [
-        (AILERON, 0.3, 0.3), (RUDDER, 0.06, 0.1), (AILERON, 0.04, 0.04), (RUDDER, 0.8, 0.8),
-        (AILERON, 0.05, 0.1), (ELEVATOR, 0.03, 0.03), (ELEVATOR, 0.06, 0.06), (FLAP, 0.06, 0.06),
-    ],
-)  # fmt: skip
-def test_what_nothing_replaces_is_divided_by_no_less_than_the_law_may_or_given_up(surface, believed, kept):
-    control, _ = record()
-    sums = control["rejecting"]["memory"]["sums"]
-    assert rejecting.clamp_to_observer_estimate(sums, control["layout"], surface, believed, 0.1) == kept
-
-
 def withdraw(control, s, suspected):
     memory, saturated = control["rejecting"]["memory"], control["allocation"]["output"]["saturated"]
     rejecting.withdraw(memory, control["layout"], s, saturated[s], suspected, DT)
@@ -117,36 +101,6 @@ class TestWithdraw:
         none, control = self.held(RUDDER, 300, saturated=False)
         assert none is None
         assert control["surfaces"]["output"]["target"][RUDDER] == 1.0
-
-    def test_time_within_the_travel_counts_back_by_half_of_what_it_lasts(self):
-        control, _ = record()
-        control["allocation"]["output"]["saturated"][RUDDER] = 1
-        for _ in range(60):
-            withdraw(control, RUDDER, True)
-        control["allocation"]["output"]["saturated"][RUDDER] = 0
-        for _ in range(40):
-            withdraw(control, RUDDER, True)
-        assert control["rejecting"]["memory"]["at_stop_s"][RUDDER] == pytest.approx(0.6 - 0.5 * 0.4)
-
-    @pytest.mark.parametrize(("surface", "again"), [(ELEVATOR, True), (RUDDER, False)])
-    def test_only_what_is_replaced_is_tried_again(self, surface, again):
-        _, control = self.held(surface, 300)
-        control["allocation"]["output"]["saturated"][surface] = 0
-        tried = None
-        for k in range(2500):
-            withdraw(control, surface, True)
-            if not control["rejecting"]["memory"]["withdrawn"][surface]:
-                tried = k + 1
-                break
-        assert tried == (pytest.approx(20.0 / DT, abs=2) if again else None)
-        if again:
-            assert control["rejecting"]["memory"]["at_stop_s"][surface] == 0.0
-
-    def test_a_suspicion_that_is_taken_back_frees_it(self):
-        _, control = self.held(RUDDER, 300)
-        withdraw(control, RUDDER, False)
-        assert control["rejecting"]["memory"]["withdrawn"][RUDDER] == 0
-        assert control["rejecting"]["memory"]["at_stop_s"][RUDDER] == 0.0
 
 
 @given(st.integers(0, 50))
@@ -249,136 +203,3 @@ def test_pitch_is_handed_over_by_steps_and_back(mode, diagnoses_all_types, hedgi
     assert control["allocation"]["output"]["transfer_share"] == pytest.approx(
         (3 * after**2 - 2 * after**3) * lost
     )
-
-
-def test_a_plug_ins_command_is_kept_within_the_travel_and_that_is_noted():
-    control, _ = record()
-    out = control["allocation"]["output"]
-    allocation.take_command(out, control["layout"], np.array([0.6, 0.1, -0.5, -0.1]))
-    assert list(out["command"]) == [0.52, 0.1, -0.44, -0.1]
-    assert list(out["saturated"]) == [1, 0, 1, 0]
-
-
-class TestVerdict:
-    """What the law takes each surface for."""
-
-    @pytest.fixture
-    def frame(self):
-        given = scenario(control={"law": "fault-tolerant-published"})
-        frame = configure_design(given, TRAVEL).view(np.recarray)[0]
-        frame["control"]["layout"]["trim"] = [0.01, -0.04, 0.02, 0.0]
-        return frame
-
-    def taken(self, frame):
-        """What the law takes the surfaces for."""
-        whole.assess_faults(frame)
-        whole.accommodate(frame)
-        return frame["control"]["surfaces"]["output"]
-
-    def test_of_a_plug_ins_estimates_once_it_has_detected(self, frame):
-        verdict = frame["fdi"]["verdict"]
-        verdict["has_effectiveness"], verdict["effectiveness"] = 1, [0.9, 0.4, 1.0, 0.7]
-        verdict["isolated_estimator"] = NOT_ISOLATED
-        assert list(self.taken(frame)["target"]) == [1.0] * 4
-        verdict["detected"] = 1
-        assert list(self.taken(frame)["target"]) == [0.9, 0.4, 1.0, 0.7]
-
-    @pytest.mark.parametrize("effectiveness", [0.0, 0.6])
-    def test_of_the_truth_for_the_oracle(self, frame, effectiveness):
-        faults = frame["faults"]
-        put(frame["control"], law="oracle-published")
-        faults["present"] = 1
-        faults["effectiveness"], faults["effective"] = [1.0, effectiveness, 1.0, 1.0], [0.1, 0.2, 0.3, 0.4]
-        faults["immovable"][FLAP] = 1
-        frame["prediction"]["u"] = [0.1, 0.25, 0.3, 0.05]
-        surfaces = self.taken(frame)
-        assert surfaces["target"] == pytest.approx([1.0, effectiveness, 1.0, 0.0])
-        assert surfaces["offset"] == pytest.approx([0.0, 0.2 - effectiveness * 0.25, 0.0, 0.4])
-
-    def test_a_slow_surface_is_left_to_its_pace(self, frame):
-        surface, frame["fdi"]["config"]["diagnoses_all_types"] = frame["fdi"]["types"]["surface"][RUDDER], 1
-        surface["accommodation"]["mode"], elapsed = WAIT_FOR_SURFACE, surface["last"]
-        elapsed["u"], elapsed["lo"], elapsed["hi"] = 0.1, 0.02, 0.06
-        assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
-        assert frame["control"]["surfaces"]["output"]["authority_lost"] == 1
-
-    @pytest.mark.parametrize(
-        ("diagnoses_all_types", "measure", "target", "surface", "doubtful"),
-        [
-            (1, -1, 1.0, RUDDER, True), (1, SCALE_COMMAND, 1.0, RUDDER, False), (0, -1, 1.0, RUDDER, False),
-            (0, -1, 0.05, RUDDER, True), (0, -1, 0.1, RUDDER, False), (0, -1, 1.0, ELEVATOR, True),
-            (1, SUBTRACT_OFFSET, 0.5, AILERON, False),
-        ],
-    )  # fmt: skip
-    def test_what_may_be_of_no_use(self, frame, diagnoses_all_types, measure, target, surface, doubtful):
-        control, assessment = frame["control"], frame["assessment"]
-        assessment["diagnoses_all_types"], assessment["accommodation_mode"][surface] = (
-            diagnoses_all_types,
-            measure,
-        )
-        parts = assessment, control["rejecting"]["memory"]["sums"], control["layout"]
-        assert bool(rejecting.is_doubtful(*parts, surface, target, 0.1)) is doubtful
-
-    @pytest.mark.parametrize("why", ["truth", "withdrawn", "fixed", None])
-    def test_what_does_not_follow_is_commanded_to_its_trim(self, frame, why):
-        control, assessment = frame["control"], frame["assessment"]
-        out, surfaces = control["allocation"]["output"], control["surfaces"]["output"]
-        out["command"], out["saturated"], surfaces["effectiveness"] = 0.3, 1, 1.0
-        frame["faults"]["immovable"][RUDDER] = 1  # which only the oracle may know
-        surfaces["given_up"][RUDDER] = why == "withdrawn"
-        assessment["accommodation_mode"], assessment["accommodation_mode"][RUDDER] = -1, GIVE_UP
-        surfaces["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
-        accommodation.park_failed_surfaces(surfaces, assessment, frame["faults"], why == "truth")
-        allocation.park(out, control["layout"], surfaces["parked"])
-        given_up = why is not None
-        assert list(out["command"]) == [0.3, 0.3, 0.02 if given_up else 0.3, 0.3]
-        assert list(out["saturated"]) == [1, 1, 0 if given_up else 1, 1]
-        assert surfaces["authority_lost"] == given_up
-
-    @pytest.mark.parametrize("law", ["fault-tolerant", "oracle"])
-    def test_the_unknown_is_for_the_observer_where_there_is_one(self, frame, law):
-        """What the diagnosis or the truth has of it is not taken off the demand a second time."""
-        config = frame["control"]["rejecting"]["config"]
-        config["qdyn"], config["dt"] = np.linspace(500.0, 900.0, 5), DT
-        put(frame["control"], law=law)
-        demands = []
-        for unknown in (0.0, 1.0):
-            frame["assessment"]["unknown_acceleration"] = frame["faults"]["Cm_alpha3"] = unknown
-            frame["control"]["rejecting"]["observer"]["begun"] = 0
-            whole.command(frame)
-            demands.append(frame["control"]["axes"]["demand"].tolist())
-        assert demands[0] == demands[1]
-
-
-def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
-    assert led(1.0, -0.1, [-0.3, 0.7, 0.11, 0.33]).tolist() == [-0.1] * 4
-
-
-def test_a_surface_that_is_whole_is_not_asked_about():
-    """What the observer has seen of it stays, for the day on which it is named."""
-    control, _ = record()
-    sums = control["rejecting"]["memory"]["sums"]
-    sums["product"] = 3.0
-    for s in (AILERON, RUDDER):
-        assert rejecting.clamp_to_observer_estimate(sums, control["layout"], s, 1.0, 0.1) == 1.0
-    assert sums["product"].tolist() == [3.0] * 3
-    assert not sums["named"].any()
-
-
-def test_only_the_main_surface_of_an_axis_is_seen_to_act():
-    sums = record()[0]["rejecting"]["memory"]["sums"]
-
-    def acting():
-        return [bool(rejecting.is_effective(sums, (0, 1, 2), s, 0.1)) for s in range(4)]
-
-    sums["square"], sums["product"] = 1.0, (-0.5, -1.0, -0.95)
-    assert acting() == [True, False, False, False]
-    sums["product"] = -0.95, -1.0, -0.5
-    assert acting() == [False, False, True, False]
-
-
-def test_of_nothing_seen_the_verdict_is_believed():
-    """An observer that has missed nothing yet says nothing about a surface."""
-    sums = record()[0]["rejecting"]["memory"]["sums"]
-    sums["frames"] = 5.0
-    assert rejecting.effectiveness_seen(sums, 0, 0.4) == 0.4

@@ -2,7 +2,6 @@
 
 import sys
 from importlib import import_module
-from pathlib import Path
 from pkgutil import walk_packages
 from types import BuiltinFunctionType, FunctionType, ModuleType, NoneType
 
@@ -172,27 +171,6 @@ def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
 
 # What makes records' types, which are no part of code: it has the name of a kernel, `record`.
 OF_RECORDS = (records.Room, records.Part, records.Shape, records._shapes)
-
-
-def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
-    files = sorted(Path(compiled.__file__).parent.glob("*.py"))
-    for file in files:
-        (tmp_path / file.name).write_bytes(file.read_bytes())
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(compiled, "_FOLDER", tmp_path)
-
-    def name():
-        compiled.cache_folder.cache_clear()
-        return compiled.cache_folder().name
-
-    names = [name(), name()]
-    for file in files:
-        (tmp_path / file.name).write_bytes(file.read_bytes() + b"\n")
-        names.append(name())
-    monkeypatch.undo()
-    compiled.cache_folder.cache_clear()
-    assert names[0] == names[1]
-    assert len(set(names)) == 1 + len(files)
 
 
 PROGRAM = """

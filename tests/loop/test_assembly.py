@@ -1,18 +1,12 @@
 """From a scenario to the record a flight is flown by: numbers in their units, per frame or JSBSim frame."""
 
-import dataclasses
 from math import exp, pi, radians
 
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.diagnosis.detection.parity import required_size
-from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.isolation import estimator_names
-from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
-from beaver_ftc.loop import plugin_frame
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 
@@ -47,24 +41,6 @@ GIVEN = {
 
 def assembled(**keys):
     return assemble(Scenario.model_validate(GIVEN | keys), Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)[0]
-
-
-def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it_needs():
-    """A record has the room that its aircraft and its delays need."""
-    usual = assembled()
-    assert usual.nbytes <= 1_000_000  # the order of a second-level cache
-    assert usual["fdi"]["statistical"].dtype == statistical_dtype(required_size(load()))
-    file = load().file
-    twice = {axis: 2 * terms for axis, terms in file.moments}
-    many = file.model_copy(update={"moments": file.moments.model_copy(update=twice)})
-    size = required_size(dataclasses.replace(load(), file=many))
-    in_roll_and_yaw = 2 * sum(term.coefficient != "Cm" for term in load().moments)
-    assert usual["fdi"]["statistical"]["block"]["tol"].shape[1] < in_roll_and_yaw + 5
-    assert in_roll_and_yaw + 5 <= size.rate_size.max_regressors < size.view_size.max_regressors
-    slow = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}
-    says = {}, {"sensors": slow}, {"changes": [{"at_s": 3.0, "sensors": slow}]}
-    lines = [assembled(**keys)["instruments"]["line"].size for keys in says]
-    assert lines[0] < 6 * (50 * SUBSTEPS + 2) <= lines[1] == lines[2]
 
 
 @pytest.fixture(scope="module")
@@ -153,10 +129,6 @@ def test_a_number_of_the_record(path, frame):
     assert found == pytest.approx(np.broadcast_to(EXPECTED[path], found.shape), rel=rel)
 
 
-def test_poles_are_that_of_detection_and_the_bank(frame):
-    assert frame["fdi"]["bank"]["config"]["a"][:3] == pytest.approx(np.exp(-DT * np.array([1.5, 0.5, 4.0])))
-
-
 def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
     """dpt = 0.08696 + 191.18 P / (rho V^3 / 2), P = 0.7355 (0.00412 (pz + 7.4) (n + 2010) + ...) [FDC]."""
     per_inhg_kw = 0.7355 * 0.00412 * (2000 + 2010)
@@ -188,63 +160,3 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
     assert fies["theta_max"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
     assert frame["fdi"]["layout"]["loss"].tolist() == [0, 1, 2, 3]
     assert frame["fdi"]["layout"]["position"].tolist() == [4, 5, 6, 7]
-
-
-def test_in_pairs_each_plane_is_asked_for_itself():
-    fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
-    assert fdi["types"]["surface"]["status"]["may_be_sole"].tolist() == [0, 1, 0, 1]
-    pitch, others = [1, 0, 1], [0, 1, 0]
-    assert fdi["isolation"]["estimator"]["skip"][:4].tolist() == [others, pitch, others, pitch]
-
-
-def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
-    power = assembled(initial={"manifold_pressure_inhg": 10.5})["control"]["power"]["config"]
-    assert (power["low"], power["high"]) == (10.5, 30.0)
-    power = assembled(initial={"manifold_pressure_inhg": 33.0})["control"]["power"]["config"]
-    assert (power["low"], power["high"]) == (11.0, 33.0)
-
-
-def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
-    """An estimator a surface for its verdicts; nothing built in diagnoses, watches, weighs chance or acts."""
-    given = {**GIVEN, "fdi": {"fault_class": "all", "statistical": {}, "sensor_monitor": "always"}}
-    scenario = Scenario.model_validate(given)
-    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
-    before = frames["fdi"][0]
-    switches = (
-        before["config"]["enabled"],
-        before["sensor_monitor"]["config"]["enabled"],
-        before["config"]["diagnoses_all_types"],
-    )
-    assert switches == (1, 1, 1)
-    plugin_frame.plugged(frames, scenario, Trim(np.zeros(3), Y, TRIM, TRIM), RlsMonitor(), None)
-    fdi = frames["fdi"][0]
-    off = (
-        fdi["config"]["enabled"],
-        fdi["isolation"]["config"]["n_estimators"],
-        fdi["config"]["diagnoses_all_types"],
-        fdi["sensor_monitor"]["config"]["enabled"],
-    )
-    power = frames["control"]["power"]["config"]
-    assert (*off, fdi["statistical"]["test"]["enabled"], power["enabled"][0]) == (0,) * 6
-    assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
-    assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None
-    pairs = {**given, "fdi": given["fdi"] | {"pairs": True, "authority": "worst-case"}, "substeps": 1}
-    scenario = Scenario.model_validate(pairs)
-    frames = assemble(scenario, Trim(np.zeros(3), Y, TRIM, TRIM), TRAVEL)
-    assert frames["fdi"]["types"]["pair"]["enabled"][0] == 1
-    plugin_frame.plugged(frames, scenario, Trim(np.zeros(3), Y, TRIM, TRIM), RlsMonitor(), None)
-    assert frames["fdi"]["types"]["pair"]["enabled"][0] == 0
-
-
-@pytest.mark.parametrize(
-    ("scheme", "law", "diagnoses"),
-    [
-        ("adaptive-estimators", "nominal", 1),
-        ("zhang2005", "nominal", 1),
-        ("none", "nominal", 0),
-        ("rls-monitor", "lqr", 0),
-    ],
-)
-def test_only_a_scheme_that_is_compiled_in_diagnoses_within_the_record(scheme, law, diagnoses):
-    frame = assembled(fdi={"scheme": scheme}, control={"law": law})
-    assert frame["fdi"]["config"]["enabled"] == diagnoses

@@ -12,7 +12,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.design import altitude_of
 from beaver_ftc.diagnosis.bounds import UNMAPPED_ERROR_RAD_S2
-from beaver_ftc.loop.outcome import inconclusive_now, inconclusive_of
+from beaver_ftc.loop.outcome import inconclusive_of
 
 FULL = {
     "p_rad_s": [-9, 9], "q_rad_s": [-9, 9], "r_rad_s": [-9, 9], "alpha_rad": [-1, 1], "beta_rad": [-1, 1],
@@ -49,12 +49,6 @@ def share_by_log(flight):
     return float(np.mean(np.asarray(flight.log["q_eta_bar_rad_s2"]) > 0.4 * UNMAPPED_ERROR_RAD_S2))
 
 
-def test_inside_of_the_map_all_is_as_before(folder):
-    flight = flown(folder, initial={"altitude_m": 1800})
-    assert flight.metrics["detection"]["inconclusive"] is None
-    assert flight.metrics["detection"]["detected"]
-
-
 def test_outside_of_the_altitudes_nothing_is_concluded_and_it_is_said(folder):
     flight = flown(folder, initial={"altitude_m": 3000})
     found = flight.metrics["detection"]["inconclusive"]
@@ -74,36 +68,6 @@ def test_outside_of_the_altitudes_nothing_is_concluded_and_it_is_said(folder):
     assert warned[0].startswith(
         "initial.altitude_m: 3000: nothing can be detected or named outside the altitudes"
     )
-
-
-def test_a_flight_longer_than_was_measured(folder):
-    flight = flown(folder, initial={"altitude_m": 1800}, duration_s=20, faults=[], expect={})
-    found = flight.metrics["detection"]["inconclusive"]
-    frames = flight.metrics["frames"]
-    assert found["reasons"][0]["quantity"] == "flown_s"
-    assert (
-        found["share"]
-        == pytest.approx(share_by_log(flight), abs=1.5 / frames)
-        == pytest.approx(0.25, abs=0.01)
-    )
-    assert found["from_s"] == pytest.approx(15.01)
-
-
-def test_without_a_diagnosis_that_is_the_reason():
-    flight = bf.fly({"name": "x", "duration_s": 2, "fdi": {"scheme": "none"}})
-    found = flight.metrics["detection"]["inconclusive"]
-    assert (found["share"], found["reasons"][0]["quantity"]) == (1.0, "scheme")
-    with pytest.raises(bf.BadInput, match=r"fdi.scheme: none: no diagnosis would run, allowed: "):
-        bf.Diagnosis(bf.aircraft("beaver"), fdi={"scheme": "none"})
-
-
-def test_the_live_page_gets_the_reason_of_now(folder):
-    path = folder / "x.yaml"
-    path.write_text(yaml.safe_dump({"name": "x", "aircraft": "./mapped", "initial": {"altitude_m": 3000}}))
-    simulation = bf.Simulation(bf.load(path))
-    simulation.step()
-    assert simulation.inconclusive.startswith("outside the altitudes at which this model was measured")
-    simulation.release()
 
 
 def mapped():
@@ -147,22 +111,3 @@ def test_of_several_reasons_the_one_of_most_frames_comes_first_and_each_has_its_
         assert reason["says"] == SPANS_SAID[name]
     none = {**counted, "frames": 0}
     assert inconclusive_of({"accounts": {"inconclusive": none}, "t": 21.25}, mapped()) is None
-
-
-INSIDE = [0.0, 0.0, 0.0, 0.1, 0.0, 45.0, 1.0, 0.5, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("changes", "at_s", "error_map", "enabled", "says"),
-    [
-        ({1: 0.4}, 3.0, {}, 1, ["q_rad_s"]), ({1: 0.4, 7: 0.05}, 13.0, {}, 1, ["q_rad_s", "dpt", "flown_s"]),
-        ({6: 0.8}, 12.0, {}, 1, ["altitude_m"]), ({}, 3.0, {}, 1, ["between"]),
-        ({1: 0.4}, 3.0, {"n_boxes": 0}, 1, []), ({1: 0.4}, 3.0, {"outside": 0}, 1, []),
-        ({1: 0.4}, 3.0, {}, 0, ["scheme"]), ({}, 3.0, {"n_boxes": 0}, 0, ["scheme"]),
-    ],
-)  # fmt: skip
-def test_why_nothing_can_be_concluded_now(changes, at_s, error_map, enabled, says):
-    place = np.array([changes.get(i, value) for i, value in enumerate(INSIDE)])
-    here = {"n_boxes": 2, "outside": 1, "coordinates": place, "time_s": at_s} | error_map
-    frame = {"fdi": {"bound": {"error_map": here}, "config": {"enabled": enabled}}}
-    assert inconclusive_now(frame, mapped()) == "; ".join(SPANS_SAID[name] for name in says)

@@ -1,15 +1,13 @@
 """What is read off a flight's record: of each part set by hand what the landing says, in kept documents."""
 
-from dataclasses import MISSING, fields
 from math import inf, radians
 
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED
 from beaver_ftc.loop.assembly import Trim, assemble
-from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
+from beaver_ftc.loop.outcome import guaranteed_delay_s, landing_of, verdict_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 
@@ -157,33 +155,6 @@ def test_what_a_record_says(case, changed):
     )
 
 
-def test_what_is_not_said_of_a_flight_is_nothing(changed):
-    said = {one.name: one.default for one in fields(Landing) if one.default is not MISSING}
-    assert not changed(said)
-
-
-PLUGGED = Verdict(True, "p", "rudder", "stuck", 0.125, ("rudder", "flap"))
-
-
-@pytest.mark.parametrize(
-    ("values", "verdict", "said"),
-    [
-        (ALARM | {"fdi.verdict.isolated_at_s": 2.5}, PLUGGED, (2.25, "q", "rudder", "stuck", 0.125, 2.5)),
-        ({}, PLUGGED, (None, None, None, None, None, None)),  # it has said so, and was not believed
-        (ALARM, Verdict(True, "p", None, "stuck", 0.5, ("flap",)), (2.25, "q", None, None, None, None)),
-    ],
-)
-def test_of_a_plug_in_the_alarm_is_latched_and_the_rest_its_own(values, verdict, said):
-    counts = {"frames": 3, "watched": 10, "undiagnosed": 3}
-    scenario, frame = _record({}, values | {f"accounts.inconclusive.{name}": n for name, n in counts.items()})
-    landing = landing_of(scenario, frame, ("t_s",), verdict, ({"time_s": 1.0},))
-    assert (landing.inconclusive, landing_of(scenario, frame, ()).inconclusive["share"]) == (None, 0.3)
-    found = (landing.detection_time_s, landing.detection_axis, landing.isolated, landing.isolation_type)
-    assert (*found, landing.estimate, landing.isolation_time_s) == said
-    assert landing.candidates == (tuple(verdict.candidates) if values else ())
-    assert (landing.columns, landing.changes) == (("t_s",), ({"time_s": 1.0},))
-
-
 FAULTED = {"truth.faulted": 1, "truth.fault_at_s": 2.0, "accounts.guarantee.certain_after_s": 2.5}
 FAULT = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 2.0}
 BROKEN = {"sensor": "q", "type": "bias", "magnitude": 3.0}
@@ -214,23 +185,3 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
 def test_when_detection_was_certain(keys, values, plugged, certain):
     scenario, frame = _record({"faults": [FAULT], **keys}, FAULTED | values)
     assert guaranteed_delay_s(frame, scenario, plugged) == (pytest.approx(0.5) if certain else None)
-
-
-def test_from_the_very_start_detection_may_be_certain():
-    at_once = {**FAULTED, "truth.fault_at_s": 0.0, "accounts.guarantee.certain_after_s": 0.0}
-    scenario, frame = _record({"faults": [{**FAULT, "at_s": 0.0}]}, at_once)
-    assert guaranteed_delay_s(frame, scenario, False) == 0.0
-
-
-SHARES = {
-    "accounts.tracking.frames_since": 50, "accounts.authority.demanded": [4.0, 5.0, 0.0], "dt": 0.02,
-    "accounts.authority.lacking": [1.0, 2.0, 0.0], "accounts.authority.beyond_frames": [3, 7, 1],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("verdict", [None, PLUGGED])
-def test_the_authority_that_was_used_does_not_depend_on_who_diagnosed(verdict):
-    scenario, frame = _record({}, SHARES)
-    found = landing_of(scenario, frame, (), verdict).authority
-    shares = {axis: (of["given_share"], of["beyond_s"]) for axis, of in found.items()}
-    assert shares == {"p": (0.75, 0.06), "q": (0.6, 0.14), "r": (1.0, 0.02)}

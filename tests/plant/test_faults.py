@@ -1,13 +1,12 @@
 """The fault schedule: the right property, from the right frame to the right frame, at the right value."""
 
 from math import exp, radians
-from typing import get_args
 
 import pytest
 from pydantic import TypeAdapter
 
 from beaver_ftc.plant.faults import NEVER, FaultSchedule, frame_of
-from beaver_ftc.scenario.faults import HEALTHY, TYPES, Fault, FaultType, SurfaceFault
+from beaver_ftc.scenario.faults import HEALTHY, Fault
 
 RATE_HZ = 100
 
@@ -72,11 +71,6 @@ def test_each_type_sets_its_properties_alone_and_repairs_them(beaver, surface, g
         assert values == pytest.approx(list(expected.values())), f"frame {k}"
 
 
-def test_every_type_of_the_scenario_has_an_effect():
-    assert set(TYPES) == set(get_args(FaultType))
-    assert all(row.strike is not SurfaceFault.strike for row in TYPES.values())
-
-
 def test_the_unanticipated_fault(beaver):
     history = fly(
         beaver, [fault(type="unanticipated", Cm_alpha3=10)], names=["failures/unanticipated/Cm-alpha3"]
@@ -95,17 +89,6 @@ def test_an_incipient_fault_grows_every_frame_and_then_rests(beaver):
     assert schedule.next_change(200) == NEVER
 
 
-def test_nothing_to_do_between_changes(beaver):
-    schedule = FaultSchedule(
-        [elevator("float", end_s=0.2), fault(type="bias", actuator="rudder", bias_deg=1, at_s=0.1)],
-        beaver,
-        RATE_HZ,
-    )
-    assert [schedule.next_change(k) for k in (0, 5, 10, 20)] == [5, 10, 20, NEVER]
-    assert [schedule.begun(k) for k in (4, 5, 100)] == [False, True, True]
-    assert FaultSchedule([], beaver, RATE_HZ).next_change(0) == NEVER
-
-
 def test_losses_on_one_surface_multiply_and_biases_add(beaver):
     faults = [
         elevator("loss_of_effectiveness", magnitude=0.4),
@@ -117,21 +100,6 @@ def test_losses_on_one_surface_multiply_and_biases_add(beaver):
     effectiveness, bias = zip(*history, strict=True)
     assert effectiveness == pytest.approx([1] * 5 + [0.6] * 2 + [0.3] * 3 + [0.6] * 2)
     assert bias == pytest.approx([0] * 5 + [radians(1)] * 3 + [radians(3)] * 4)
-
-
-def test_two_slow_actuators_on_one_surface_are_slower_than_either(beaver):
-    faults = [elevator("rate_limit", scale=0.5), elevator("rate_limit", scale=0.2, at_s=0.07, end_s=0.1)]
-    scale = fly(beaver, faults, names=["failures/elevator/rate-scale"])
-    assert scale == pytest.approx([1] * 5 + [0.5] * 2 + [0.1] * 3 + [0.5] * 2)
-
-
-def test_faults_on_different_surfaces_do_not_touch_each_other(beaver):
-    faults = [
-        elevator("stuck", position_deg=1),
-        fault(type="loss_of_effectiveness", actuator="rudder", magnitude=1),
-    ]
-    names = ["failures/rudder/stuck", "failures/elevator/effectiveness", "failures/aileron/stuck"]
-    assert fly(beaver, faults, names=names)[-1] == [0, 1, 0]
 
 
 def test_a_jam_without_a_position_holds_the_surface_where_it_is(beaver):
@@ -158,10 +126,3 @@ def test_a_fault_at_time_zero_shows_in_the_accelerations_of_frame_zero(beaver):
     assert beaver.read("fcs/elevator-effective-rad") == 0
     assert abs(beaver.read("accelerations/qdot-rad_sec2") - before) > 0.05
     assert beaver.read("simulation/sim-time-sec") == 0
-
-
-def test_a_runaway_at_time_zero_starts_from_the_trimmed_position(beaver, trim_point):
-    FaultSchedule([elevator("hardover", at_s=0)], beaver, RATE_HZ).apply(0)
-    assert beaver.read("fcs/elevator-pos-rad") == trim_point.elevator_rad
-    beaver.run()
-    assert beaver.read("fcs/elevator-pos-rad") == pytest.approx(trim_point.elevator_rad + 0.010472)

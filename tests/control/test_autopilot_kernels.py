@@ -8,7 +8,7 @@ from beaver_ftc.control import autopilot as loops
 from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
 from beaver_ftc.control.engines import follow_autopilot
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.diagnosis.state import PITCH, YAW
 from law_records import put
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
@@ -54,11 +54,6 @@ def new_control(**fields):
     return put(control, **fields)
 
 
-def follow(pilot, control, y):
-    saturated = control["allocation"]["output"]["saturated"]
-    loops.smooth_signals_and_losses(pilot, control["layout"], control["surfaces"], saturated, False, y)
-
-
 def limit(pilot, control):
     axes, by_engines = control["axes"], np.zeros((2, 3))
     loops.limit_rates_and_bank(pilot, control["layout"], axes["G"], axes["hold"], by_engines)
@@ -84,19 +79,6 @@ def seen(attitude=(0.0, 0.0, 0.0), altitude=1000.0, **air):
     return measured
 
 
-@pytest.mark.parametrize(("surface", "share"), [(AILERON, "roll_loss_share"), (RUDDER, "yaw_loss_share")])
-@pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
-def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
-    pilot, control = new_autopilot(roll_loss_share=0.5, yaw_loss_share=0.5), new_control()
-    control["surfaces"]["output"]["effectiveness"][surface] = left
-    follow(pilot, control, new_y())
-    assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
-    assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
-    for name in ("roll_loss_share", "yaw_loss_share"):
-        goal = 1.0 if name == share and left < 0.1 else 0.0
-        assert pilot[name] == pytest.approx(0.5 + DT / 1.5 * (goal - 0.5))
-
-
 def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
     pilot, control = new_autopilot(roll_loss_share=jammed, yaw_loss_share=loose), new_control(hold=hold)
     control["axes"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
@@ -110,14 +92,6 @@ def test_rates_are_what_the_smaller_spare_acceleration_gives():
     # -0.05..0.1, -0.1..0.1, -0.025..0.1 rad/s2, less what holding takes; roll: 1.2 s of 0.06 is below 0.2
     assert pilot["rate_limit"] == pytest.approx([1.2 * 0.06, 1.2 * 0.04, 0.0])
     assert pilot["bank_limit"] == pytest.approx(6.0 * 1.2 * 0.06)
-
-
-def test_without_ailerons_roll_is_what_sideslip_gives_and_banks_are_halved():
-    pilot = limited(jammed=0.9, hold=(0.2, 0.0, 0.0))
-    assert pilot["rate_limit"][ROLL] == pytest.approx(0.9 * 0.02 * V * 0.14)
-    assert limited(jammed=0.9, loose=0.2)["bank_limit"] <= 0.5 * (1.0 - 0.45)
-    loose = limited(loose=1.0)  # ailerons can leave a bank; a fifth less, for the sideslip
-    assert loose["bank_limit"] == pytest.approx(min(0.4, 6.0 * loose["rate_limit"][ROLL]))
 
 
 def test_thrust_per_inhg_is_the_slope_of_the_thrust():
@@ -208,15 +182,6 @@ def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated(jamm
     assert loops.bank_angle_rate(new_autopilot(), np.array([0.1, 0.0, 0.0])) == 0.0
 
 
-@pytest.mark.parametrize("jammed", [0.0, 0.6])
-@pytest.mark.parametrize("rolling", [0.02, 1.0])
-def test_the_rudder_keeps_the_sideslip_that_rolls_where_the_ailerons_do_not(jammed, rolling):
-    pilot, attitude = new_autopilot(BANK, roll_loss_share=jammed), np.zeros(3)
-    loops.set_body_rates(pilot, new_y(), attitude, rolling, 0.0)
-    wanted = -jammed * min(rolling / (0.02 * V), 0.14)
-    assert pilot["rates"] == pytest.approx([rolling, 0.0, 0.5 * (0.03 - wanted)])
-
-
 def test_upside_down_the_turn_stays_finite():
     pilot = new_autopilot(BANK)
     loops.set_body_rates(pilot, new_y(beta=0.0), np.array([1.55, 0.0, 0.0]), 0.0, 0.0)
@@ -271,17 +236,3 @@ def test_power_leaves_the_rudder_enough(rudder):
 @pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
 def test_a_direction_is_given_within_half_a_turn(angle):
     assert loops.wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
-
-
-@pytest.mark.parametrize("left", [0.9, 0.4, 0.0, -0.2])
-def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
-    """dpt^3 at the ceiling: what is left of the rudder's share, and the sideslip's for what is not."""
-    pilot, control, y = (
-        new_autopilot(dpt_cubed_held_by_sideslip=0.2, high_power=1e9),
-        new_control(),
-        new_y(dpt=0.4),
-    )
-    pilot["allowed_power"], control["surfaces"]["output"]["effectiveness"][RUDDER] = 1e9, left
-    control["power"]["output"]["command"][0] = 21.0
-    dpt = y[DPT] + (full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
-    assert dpt**3 == pytest.approx(max(left, 0.0) * 0.9**3 + (1.0 - left) * 0.2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import law_records
-from beaver_ftc.control import accommodation, allocation
+from beaver_ftc.control import accommodation
 from beaver_ftc.control.accommodation import (
     MODE_ADAPTIVE,
     MODE_NOMINAL,
@@ -13,7 +13,6 @@ from beaver_ftc.control.accommodation import (
 )
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.control.laws.rejecting import OBSERVER_ERROR, observer_response
-from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
@@ -40,23 +39,6 @@ def new_frame(faults=None, **fields):
     frame["control"], frame["faults"] = new_control(**fields), new_faults(**(faults or {}))
     frame["fdi"]["types"]["surface"]["accommodation"]["mode"] = -1
     return frame
-
-
-def given_up(frame):
-    """The command, once what does not follow is given up."""
-    whole.assess_faults(frame)
-    control = frame["control"]
-    output, informed = control["surfaces"]["output"], control["config"]["informed"]
-    accommodation.park_failed_surfaces(output, frame["assessment"], frame["faults"], informed)
-    allocation.park(control["allocation"]["output"], control["layout"], output["parked"])
-    return control["allocation"]["output"]
-
-
-def accommodated(frame):
-    """The surfaces as the law takes them, from what the diagnosis says."""
-    whole.assess_faults(frame)
-    whole.accommodate(frame)
-    return frame["control"]["surfaces"]["output"]
 
 
 def new_faults(**fields):
@@ -114,24 +96,6 @@ def asked_for(frame):
     return accommodation.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
-@pytest.mark.parametrize("which", ["healthy", "immovable", "jammed", "moving jam", "abandoned"])
-def test_a_surface_given_up_goes_to_its_trim(which):
-    frame = new_frame({"immovable": (0, 0, 1, 0)}, law="oracle" if which == "immovable" else "adaptive")
-    control, fdi = frame["control"], frame["fdi"]
-    control["layout"]["trim"], out = 0.3, control["allocation"]["output"]
-    surfaces = control["surfaces"]["output"]
-    out["command"], out["saturated"], fdi["config"]["diagnoses_all_types"] = 0.1, 1, 1
-    if "jam" in which:
-        fdi["types"]["surface"]["accommodation"]["mode"][RUDDER] = GIVE_UP
-        surfaces["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
-    surfaces["given_up"][RUDDER] = which == "abandoned"
-    given_up(frame)
-    up = which not in ("healthy", "moving jam")
-    assert out["command"].tolist() == [0.1, 0.1, 0.3 if up else 0.1, 0.1]
-    assert out["saturated"].tolist() == [1, 1, 0 if up else 1, 1]
-    assert surfaces["authority_lost"] == up
-
-
 def test_the_answer_of_the_observer_is_its_own_error_dynamics():
     """e' = a - dd; e is corrected by L_rate, dd by L_disturbance of the innovation."""
     memory, rng = record(OBSERVER_ERROR), np.random.default_rng(1)
@@ -174,48 +138,3 @@ def test_what_is_left_is_found_by_least_squares(theta, believed):
     assert rejecting.effectiveness_seen(found, 2, 0.5) == pytest.approx(expected, rel=1e-6)
     assert bool(rejecting.is_effective(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
     assert rejecting.effectiveness_seen(found, 1, 0.5) == 0.5  # of pitch nothing has been seen
-
-
-@pytest.mark.parametrize(
-    ("named", "seen", "kept"),
-    [
-        (0.3, 0.6, 0.6),
-        (0.3, 0.2, 0.3),
-        (0.3, 1.5, 1.0),
-        (0.01, 0.02, 0.02),
-        (0.01, 0.06, 0.1),
-        (0.04, 0.05, 0.1),
-    ],
-)
-def test_the_larger_of_both_estimates_is_believed(named, seen, kept):
-    found = new_control()["rejecting"]["memory"]["sums"]
-    found["frames"], found["square"], found["named"], found["innovation"] = 10.0, 4.0, 1, 0.0
-    found["product"] = 4.0 * (seen - 1.0)
-    assert rejecting.larger_estimate(found, named, 2, 0.1) == pytest.approx(kept)
-
-
-@pytest.mark.parametrize(
-    ("law", "fixed", "kept"),
-    [
-        ("fault-tolerant", False, 0.5), ("fault-tolerant", True, 0.0), ("oracle", False, 0.2),
-        ("fault-tolerant-published", False, 0.1), ("fault-tolerant-published", True, 0.0),
-    ],
-)  # fmt: skip
-def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(law, fixed, kept):
-    """The verdict leaves an aileron a tenth, the observer sees a half; a fixed one gives nothing."""
-    true = {"present": 1, "effectiveness": (0.2, 1.0, 1.0, 1.0)}
-    frame = new_frame(true, law=law, effectiveness_step=1.0)
-    fdi, control = frame["fdi"], frame["control"]
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = 1, 0
-    fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
-    fdi["types"]["surface"]["accommodation"]["mode"][AILERON], fdi["config"]["diagnoses_all_types"] = (
-        GIVE_UP if fixed else -1,
-        fixed,
-    )
-    found = control["rejecting"]["memory"]["sums"]
-    found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
-    frame["prediction"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)
-    surfaces = accommodated(frame)
-    assert surfaces["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
-    assert surfaces["effectiveness"] == pytest.approx(surfaces["target"])
-    assert not control["rejecting"]["memory"]["withdrawn"].any()

@@ -5,7 +5,6 @@ import pytest
 
 from beaver_ftc.control import row_of
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.control.laws import compiled_rivals
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
@@ -161,22 +160,3 @@ def test_known_laws_are_those_of_the_page():
     files = {name: row_of(name).file for name in ("fault-tolerant", "fault-tolerant-published")}
     assert files == {"fault-tolerant": "rejecting", "fault-tolerant-published": "published"}
     assert LOSS == 0
-
-
-@pytest.mark.parametrize("incremental", [1, 0])
-def test_a_compiled_rival_commands_by_itself(incremental):
-    """From what is measured and G, and nothing that the law of ours keeps is moved."""
-    frame, alone = new_frame(), new_frame()
-    for each in (frame, alone):
-        control, rival = each["control"], fields(each["control"]["compiled_rivals"])
-        put(control, law="lqr", model_rate=0.01, model_acceleration=0.02)
-        rival["incremental"] = incremental
-        rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
-        rival["Kp"], rival["Ki"], rival["keep"], rival["surface_filter"] = 2.0, 1.0, 0.5, 0.01
-    given, told = commanded(frame), alone["control"]
-    parts = alone["assessment"], alone["faults"], alone["prediction"], alone["measured"]
-    compiled_rivals.command(told, *parts, MODE_ADAPTIVE, 1.0)
-    command = given["allocation"]["output"]["command"]
-    assert command.tolist() == told["allocation"]["output"]["command"].tolist()
-    assert (command != 0.01).any()
-    assert given["axes"]["hold"].tolist() == told["axes"]["hold"].tolist()

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control import Reference
 from beaver_ftc.control.rivals.indi import IncrementalInversion, LowPass
-from beaver_ftc.control.rivals.l1 import L1Adaptive, Predictor
+from beaver_ftc.control.rivals.l1 import Predictor
 from beaver_ftc.control.rivals.lqr import FixedGainLqr, gains
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
@@ -131,45 +131,6 @@ def test_incremental_inversion_sets_what_was_measured_against_the_positions_that
             disturbed.step(d)
         assert G @ command == pytest.approx(nu - disturbed.value, abs=1e-9)
         position = position + reach * (command - position)
-
-
-class Curved:
-    """A design model whose slopes are others elsewhere: xdot = A x + x^2 + b + G u."""
-
-    def f(self, x, y):
-        return A @ x + x**2 + y[0]
-
-    def G(self, y):
-        return (1.0 + y[1]) * G
-
-
-TRIM_X, TRIM_Y = np.array([0.1, -0.2, 0.3]), np.array([0.4, 0.5, 0.0, 0.0, 0.0])
-TRIM = np.array([0.02, -0.05, 0.01, 0.1])
-
-
-def curved(**options):
-    """A flight of that model from a trim that turns, with its surfaces off neutral."""
-    travel = np.array([[-9.0] * 4, [9.0] * 4])
-    return Context(DT, 1, Curved(), TRIM_X, TRIM_Y, TRIM, travel, np.zeros(3), np.zeros(3), options=options)
-
-
-def test_l1_demands_what_the_model_and_what_was_learnt_do_not_give():
-    """G u = nu - f - C sigma of all surfaces, the flap in trim among them; sigma by the predictor."""
-    law = L1Adaptive()
-    law.reset(curved(proportional_per_s=1.7, integral_per_s2=0.6, predictor_per_s=3.0, bandwidth_per_s=15.0))
-    predictor, learnt, keep = Predictor(3.0, DT), np.zeros(3), np.exp(-15.0 * DT)
-    rng, integral, before = np.random.default_rng(6), np.zeros(3), None
-    y = np.array([0.3, 0.2, 0.0, 0.0, 0.0])
-    for k in range(5):
-        x, rate, acceleration, given = 0.01 * rng.normal(size=(4, 3))
-        seen = Measured(k * DT, x, y, given, np.zeros((3, 4)), np.zeros(3))
-        command = law.step(seen, Reference(np.full(3, 9.0), rate, acceleration), Verdict())
-        if before is not None:
-            learnt = keep * learnt + (1.0 - keep) * predictor.step(x - before, given)
-        before, integral = x, integral + DT * (rate - x)
-        nu = acceleration + 1.7 * (rate - x) + 0.6 * integral
-        assert 1.2 * G @ command == pytest.approx(nu - (A @ x + x**2 + 0.3) - learnt)
-        assert command[3] == TRIM[3]
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, estimator, new_fdi, on
+from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import conclusion, isolation
 from beaver_ftc.diagnosis.detection.likelihood import STEP_FAULT
@@ -16,71 +16,6 @@ from beaver_ftc.diagnosis.state import (
     UNANTICIPATED,
 )
 from beaver_ftc.plant.instruments import MEASURED
-
-
-def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
-    """An estimator beside a plant with this fault: (fdi, fie, what was fed in)."""
-    rng, fdi = np.random.default_rng(seed), new_fdi()
-    fie = estimator(fdi, kind, low=-1.0, high=0.6)
-    fdi["isolation"]["config"]["shared"], x = shared, rng.normal(size=3)
-    fdi["bound"]["n_gyro"] = 0.004, 0.005, 0.006
-    on(isolation.start_estimators, fdi, x)
-    fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_before", "spread")}
-    for _ in range(frames):
-        Z, eta_bar, noise_before = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
-        eta, believed, spread = eta_bar * rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(0, 0.1, 3)
-        eta *= eta_share
-        offset = rng.normal(size=3)
-        fie["effect"]["regressor"] = Z
-        fie["effect"]["base"] = offset
-        fie["effect"]["e"] = spread
-        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta_bar, noise_before
-        isolation.update_residual(fie, fdi["isolation"]["config"]["mu_kind"], x)
-        on(isolation.advance_estimators, fdi, x, believed)
-        x = x + DT * (believed + offset + theta * Z + eta)
-        for name, value in zip(fed, (Z, eta, eta_bar, noise_before, spread), strict=True):
-            fed[name].append(value)
-    within = isolation.update_residual(fie, fdi["isolation"]["config"]["mu_kind"], x)
-    return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
-
-
-@pytest.mark.parametrize("shared", [False, True])
-def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shared):
-    """Whatever the estimate does [Zhang2005, sec. IV]; and every filter is the convolution it stands for."""
-    theta, frames = -0.45, 25
-    fdi, fie, fed, within = run_estimator(shared, theta, frames=frames)
-    w = fdi["isolation"]["config"]["a"] ** np.arange(frames)[::-1, None]
-    omega = DT * (w * fed["Z"]).sum(axis=0)
-    uncertainty = DT * (w * fed["eta"]).sum(axis=0)
-    assert fie["Om"] == pytest.approx(omega)
-    assert fie["residual"] == pytest.approx(omega * (theta - fie["theta"]) + uncertainty, abs=1e-12)
-    assert fie["Om_pos"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
-    assert fie["Om_neg"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
-    eta = DT * (w * (fed["eta_bar"] + fed["spread"])).sum(axis=0)
-    left = fdi["isolation"]["config"]["a"] ** frames * np.array([0.004, 0.005, 0.006])
-    noise = left + ((1.0 - fdi["isolation"]["config"]["a"]) * w * fed["noise_before"]).sum(axis=0)
-    assert fie["e_lag"] == pytest.approx(eta + noise)
-    assert fie["e"] == pytest.approx(eta + noise + [0.004, 0.005, 0.006])
-    assert within
-
-
-def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
-    """As one weighted least-squares problem of three equations, forgetting once."""
-    fie = estimator(new_fdi())
-    omega, noise = np.array([0.5, -0.8, 0.3]), np.array([0.2, 0.3, 0.4])
-    residual = np.array([0.02, 0.03, -0.01])
-    fie["Om"] = omega
-    fie["e"] = noise
-    fie["residual"] = residual
-    fie["effect"]["regressor"] = 1.0
-    fie["theta"], fie["P"] = -0.5, 0.06
-    total = isolation.joint_least_squares(fie, 1.0)
-    information = 1.0 / 0.06 + np.sum(omega**2 / noise**2)
-    assert total == pytest.approx(np.sum(omega * residual / noise**2) / information)
-    assert fie["theta"] == pytest.approx([-0.5 + total] * 3)
-    assert fie["P"] == pytest.approx([1.0 / information] * 3)
-    fie["effect"]["regressor"] = 0.0
-    assert isolation.joint_least_squares(fie, 0.5) == 0.0
 
 
 @pytest.mark.parametrize("thresholds", [INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD])

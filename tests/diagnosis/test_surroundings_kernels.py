@@ -4,122 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import DT, fill, new_fdi
-from scipy.spatial.transform import Rotation
-from statistics_of import Statistical, put
+from kernels import fill, new_fdi
 
-from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.aircraft import FORCES
-from beaver_ftc.design.model import design_record, fill_table, regressors, response
-from beaver_ftc.diagnosis import bounds, gusts, model_prediction
+from beaver_ftc.design.model import design_record
+from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.bounds import map_dtype
 from beaver_ftc.diagnosis.detection import filters
-from beaver_ftc.diagnosis.gusts import GUST_RECORD
-from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 
-AIRCRAFT = load()
 SPAN, V = 14.63, 45.0
-X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
 Y = np.array([0.1, 0.03, V, 1036.0, 0.3, 0.0, 0.0, 0.0])
-
-
-def new_air(**fields):
-    record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    fill(record, span=SPAN, gravity=9.8, gusty=1, measured=1)
-    return fill(record, **fields)
-
-
-def through_air(y, attitude, heading=None):
-    """Velocity through the air in level axes that turn with the heading: by rotations."""
-    body = y[2] * np.array([np.cos(y[0]) * np.cos(y[1]), np.sin(y[1]), np.sin(y[0]) * np.cos(y[1])])
-    return Rotation.from_euler("ZYX", [heading or 0.0, attitude[1], attitude[0]]).apply(body)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
-    """Level axes of now; the vertical and lateral change of the gust through its lags."""
-    rng = np.random.default_rng(seed)
-    record, dt = new_air(), 0.02
-    then, now = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.3, 0.3, 3)
-    y_then, y_now = Y.copy(), Y.copy()
-    y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
-    y_now[2] = 47.0
-    gusts.start_gust(record, y_then, then)
-    assert record["memory"]["v"] == pytest.approx(through_air(y_then, then))
-    assert record["memory"]["heading"] == then[2]
-    assert not record["memory"]["w"].any()
-    record["memory"]["w"], record["memory"]["f"] = (
-        (0.0, 0.02, -0.03),
-        rng.normal(size=3),
-    )
-    level = Rotation.from_euler("ZYX", [0.0, then[1], then[0]])
-    expected = through_air(y_then, then) + dt * (
-        level.apply(record["memory"]["f"]) + np.array([0.0, 0.0, 9.8])
-    )
-    expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    gusts.advance_gust(record, y_now, now, dt)
-    change = expected - through_air(y_now, now)
-    tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
-    pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
-    yawing = -0.03 * np.exp(-dt / tau_r) + change[1] / (47.0 * tau_r)
-    assert record["memory"]["w"] == pytest.approx([0.0, pitching, yawing])
-    assert record["memory"]["v"] == pytest.approx(through_air(y_now, now))
-
-
-def test_the_specific_force_is_that_of_the_terms():
-    record, out = new_air(S_m=0.01), np.zeros(3)
-    fill_table(record["memory"]["table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    gusts.fill_force(record, X, Y, U, out)
-    of = {
-        "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
-        "qh": X[1] * AIRCRAFT.geometry.chord_m / V, **dict(zip(AIRCRAFT.surfaces, U, strict=True)),
-    }  # fmt: skip
-    expected = dict.fromkeys(FORCES, 0.0)
-    for term in AIRCRAFT.measurable_forces:
-        size = term.value * np.prod([of[name] ** power for name, power in term.of])
-        expected[term.coefficient] += size * (of[term.surface] if term.surface else 1.0)
-    assert out == pytest.approx(1036.0 * 0.01 * np.array(list(expected.values())), rel=1e-3)
-
-
-@pytest.mark.parametrize("swings", [0, 1])
-def test_axes_that_turn_move_what_is_not_seen_besides(swings):
-    """A gust that keeps its size changes in the body as its axis turns: over its lag, half that squared.
-
-    It is reckoned with in the frame in which they turn and in the next, whatever the instants of either.
-    """
-    rng = np.random.default_rng(7)
-    record = new_air(
-        turns_fast=swings,
-        turn_past=0.4,
-        L_roll=30.0,
-    )
-    (
-        record["output"]["rate_damping"],
-        record["output"]["C"],
-        record["memory"]["C_dot"],
-    ) = rng.normal(size=(3, 3, 3))
-    (
-        record["memory"]["share"],
-        record["memory"]["Q"],
-    ) = (
-        (1.0, 0.2, 0.7),
-        (1e-3, 2e-3, 3e-3),
-    )
-    axes, swing = (
-        record["output"]["rate_damping"] @ record["output"]["C"],
-        record["output"]["rate_damping"] @ record["memory"]["C_dot"],
-    )
-    expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
-    lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
-    turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
-    found = [[gusts.unmeasured_drift(record, V, i, j) for j in range(3)] for i in range(3)]
-    assert np.array(found) == pytest.approx(V * expected, rel=1e-12)
-    once = swings * DT * V * swing @ np.diag(turned) @ swing.T
-    for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
-        for _ in range(instants):
-            gusts.add_turn_variance(record, V, DT)
-        gusts.finish_gust(record, 1.0)
-        assert record["output"]["var_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
@@ -229,70 +122,3 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     assert record["coordinates"][:7] == pytest.approx(
         [roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2]
     )
-
-
-def new_detector(**fields):
-    fdi = new_fdi()
-    record = fdi["statistical"]
-    (
-        record["test"]["w"],
-        record["noise"]["q"],
-    ) = 0.25, 2.0
-    (
-        record["noise"]["Q"],
-        record["noise"]["eta_u"],
-    ) = (
-        (0.1, 0.2, 0.3),
-        (0.01, 0.02, 0.03),
-    )
-    for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n"], block["axes"][: len(axes)], block["Q_scale"] = (
-            len(axes),
-            axes,
-            1.0,
-        )
-    record["block"][2]["Q_scale"], record["block"][2]["drift_correlation_length_m"] = (
-        4.0,
-        90.0,
-    )
-    put(record, **fields)
-    return fdi, record, design_record().view(np.recarray)[0]
-
-
-def test_regressors_are_what_each_coefficient_multiplies():
-    """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
-    fdi, record, design = new_detector(w=1.0, regress=1)
-    record["block"]["regressor"] = 9.0
-    x = np.zeros(3)
-    Statistical.prepare(record, fdi, design, x, Y, U)
-    value = design["moments"]["value"][: len(AIRCRAFT.moments)]
-    axis = np.array([("Cl", "Cm", "Cn").index(term.coefficient) for term in AIRCRAFT.moments])
-    f, G = np.zeros(3), np.zeros((3, 4))
-    response(design, x, Y, f, G)
-    total = f + G @ U
-    for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        of_it = value[np.isin(axis, axes)]
-        assert of_it @ block["regressor"][: of_it.size, : len(axes)] == pytest.approx(total[list(axes)])
-    terms = np.zeros_like(record["noise"]["zC"])
-    regressors(design["moments"], design["moments"]["power"], U, terms)
-    assert record["noise"]["zC"] == pytest.approx(terms)
-
-
-@pytest.mark.parametrize("offsets_count", [0, 1])
-def test_what_is_known_of_a_fault_is_expected(offsets_count):
-    rng = np.random.default_rng(2)
-    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
-    mean = prediction["means"]
-    mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
-    mean["F"] = rng.normal(size=3)
-    effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    model_prediction.predict_known(prediction, 0, effectiveness, offset, offsets_count)
-    assert (prediction["F_known"] == mean["F"]).all()
-    model_prediction.predict_known(prediction, 1, effectiveness, offset, offsets_count)
-    off = mean["G"] @ offset if offsets_count else 0.0
-    expected = mean["F"] + mean["Gu"] @ (effectiveness - 1.0) + off
-    assert prediction["F_known"] == pytest.approx(expected)
-    prediction["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
-    model_prediction.innovation_known(prediction, x, 0.5)
-    innovation = np.array([0.4, -0.2, 0.0]) - expected
-    assert prediction["nu_known"] == pytest.approx(innovation)

@@ -128,14 +128,6 @@ def test_the_margins_asked_for_are_left(loop):
         assert phase >= asked[1]
 
 
-@LOOPS
-def test_the_noise_speed_is_that_of_the_loop_in_time(loop):
-    s, noise = 5.0, 1e-3
-    omega, z = grid(loop)
-    moved = np.diff(simulated(loop, s, 1.0, 20_000, noise)[1000:]) / loop.dt_s
-    assert noise_speed(loop, s, z, omega) * noise == pytest.approx(moved.std(), rel=0.05)
-
-
 @pytest.mark.parametrize(("observer", "dt"), [(6.5, 0.01), (40.0, 0.05)])
 def test_both_poles_of_the_observer_are_where_they_were_asked_for(observer, dt):
     """Of its errors in rate and disturbance from frame to frame, corrected by what it missed."""

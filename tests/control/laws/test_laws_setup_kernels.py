@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import laws, row_of, state
+from beaver_ftc.control import laws, state
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
@@ -76,52 +76,3 @@ def test_a_laws_record_is_what_its_scenario_says_frame_by_frame():
     A, B = laws.discretise(9.0, 0.6, 0.02)
     assert model["A"] == pytest.approx(np.array(A))
     assert model["B"] == pytest.approx(np.array(B))
-
-
-INTEGRAL, UNKNOWN, LEARNT, FOUND = (
-    np.array(of) for of in ((0.1, -0.2, 0.3), (1.0, 2.0, -3.0), (5.0, 6.0, 7.0), (0.4, -0.5, 0.8))
-)
-
-
-def flown_by(law):
-    """What a law has in memory, no two numbers alike; Ki 2 and 4 1/s2."""
-    control = new_control()
-    row = row_of(law)
-    control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
-    for feedback, Ki in ((control["published"], 2.0), (control["zhang2005"]["feedback"], 4.0)):
-        feedback["config"]["Ki"], feedback["memory"]["integral"] = Ki, INTEGRAL
-    control["surfaces"]["output"]["unknown"], control["zhang2005"]["network"]["output"] = UNKNOWN, LEARNT
-    observer = control["rejecting"]["observer"]
-    observer["disturbance"], observer["rate"], observer["begun"] = FOUND, (0.01, 0.02, 0.03), 1
-    control["compiled_rivals"]["memory"]["inherited"] = 3.0 * FOUND
-    return control
-
-
-@pytest.mark.parametrize(
-    ("law", "expected"),
-    [
-        ("nominal", UNKNOWN - 2.0 * INTEGRAL), ("fault-tolerant-published", UNKNOWN - 2.0 * INTEGRAL),
-        ("zhang2005", LEARNT - 4.0 * INTEGRAL), ("fault-tolerant", FOUND), ("oracle", FOUND),
-        ("lqr", 3.0 * FOUND), ("indi", 3.0 * FOUND),
-    ],
-)  # fmt: skip
-def test_what_a_law_leaves_to_no_model_is_what_the_next_one_begins_with(law, expected):
-    """Each after each: the integrators, the observer and what is only handed on."""
-    before = flown_by(law)
-    for then, begun in {
-        "nominal": ("published", lambda of: -2.0 * of["memory"]["integral"]),  # no network explains it
-        "adaptive": ("published", lambda of: 9.0 * LEARNT - 2.0 * of["memory"]["integral"]),
-        "oracle-published": ("published", lambda of: -2.0 * of["memory"]["integral"]),
-        "zhang2005": ("zhang2005", lambda of: -4.0 * of["feedback"]["memory"]["integral"]),
-        "fault-tolerant": ("rejecting", lambda of: of["observer"]["disturbance"]),
-        "lqr": ("compiled_rivals", lambda of: of["memory"]["inherited"]),
-    }.items():
-        new, (file, holds) = flown_by(then), begun
-        new["rejecting"]["observer"]["rate"] = 9.0
-        state.take_over(new, before, 9.0 * LEARNT)
-        assert holds(new[file]) == pytest.approx(expected), then
-        assert new["config"] == flown_by(then)["config"]
-        own_rate = (0.01, 0.02, 0.03) if file == "rejecting" else (9.0, 9.0, 9.0)
-        assert new["rejecting"]["observer"]["rate"].tolist() == [*own_rate]
-        assert new["surfaces"]["output"]["unknown"].tolist() == UNKNOWN.tolist()
-    assert before.tobytes() == flown_by(law).tobytes(), "the law before is left as it was"

@@ -8,9 +8,8 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import parity
 from beaver_ftc.diagnosis.detection.likelihood import MIN_ETA_RAD_S2, STEP_FAULT
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, configure_parity_views
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
-from beaver_ftc.diagnosis.state import LOSS, POSITION_HYPOTHESIS
+from beaver_ftc.diagnosis.detection.parity import configure_parity_views
+from beaver_ftc.diagnosis.state import LOSS
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
@@ -141,27 +140,6 @@ def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, change
     assert block["P_dd"][0, 0] == pytest.approx(0.7 + leap)
 
 
-def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
-    pitch, lateral = fdi["statistical"]["block"][:2]
-    (pitch["n"], lateral["n"]), (pitch["axes"][0], lateral["axes"]) = (1, 2), (1, (0, 2))
-    views = fdi["statistical"]["views"]
-    before = views[PAST_AILERON]["block"]["regressor"][5:].copy()
-    for v, expected in (
-        (PITCH_AXIS, pitch["regressor"][:3, 0]),
-        (ROLL_AXIS, lateral["regressor"][:4, 0]),
-        (YAW_AXIS, lateral["regressor"][:4, 1]),
-        (PAST_AILERON, lateral["regressor"][:4] @ [-0.6, 0.8]),
-    ):
-        views[v]["block"]["regressor"][:], views[v]["block"]["n_Z"] = 9.0, 0
-        if v == PAST_AILERON:
-            views[v]["direction"][:3], views[v]["nulled"] = (-0.6, 0.0, 0.8), AXIS_VIEW
-        Across.regress(fdi, views[v], np.ones(3), 0.0)
-        found = views[v]["block"]["regressor"][:, 0]
-        assert found[: len(expected)] == pytest.approx(expected)
-        assert (found[len(expected) :] == 9.0).all(), "of no column nothing more"
-    assert not before.any()
-
-
 @pytest.mark.parametrize(("size", "has_eG"), [(2.0, 1), (2.0, 0), (0.3, 1)])
 def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi, size, has_eG):
     """The column g + e, |e| up to the tolerance of either axis: the most, by its corners, of e across over
@@ -213,25 +191,3 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi
         felt = Across.changes_view(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (np.abs(view["block"]["tests"]["correlation"]).max() > 1e-6) == felt
-
-
-def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
-    statistical = fdi["statistical"]
-    statistical["test"]["alarm_level"], fdi["layout"]["position"] = 5.0, range(4)
-    statistical["test"]["enabled"] = fdi["config"]["diagnoses_all_types"] = 1
-    for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
-        fie["hypothesis_kind"], fie["surface"], fie["effect"]["regressor"] = (
-            POSITION_HYPOTHESIS,
-            s,
-            np.eye(3, 4)[:, s],
-        )
-    view = statistical["views"][ROLL_AXIS]
-    tried = int(view["block"]["n_h"])
-    room = len(view["block"]["hypothesis"])
-    for h in range(room):
-        view["block"]["hypothesis"]["score"] = np.where(np.arange(room) == h, 5.1, 4.9)
-        assert Across.excludes(fdi, ELEVATOR) == (h < tried)
-        assert not Across.excludes(fdi, AILERON)
-        assert parity_excludes(fdi, fdi["isolation"]["estimator"][ELEVATOR]) == (h < tried)
-    view["block"]["hypothesis"]["score"] = 5.0
-    assert not Across.excludes(fdi, ELEVATOR), "the level is what chance may reach"

@@ -7,27 +7,6 @@ from kernels import DT, POLES, estimator, new_fdi, on, weights
 from beaver_ftc.diagnosis.detection import filters
 
 
-def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
-    rng, frames, fdi = np.random.default_rng(1), 20, new_fdi()
-    x = rng.normal(size=(frames + 1, 3))
-    believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
-    noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
-    for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta[k], noise[k]
-        fdi["bound"]["n_gyro"] = noise[k + 1]
-        on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
-    innovation = np.diff(x, axis=0) / DT - believed
-    assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
-    assert fdi["bound"]["nu_max"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
-    for m, decay in enumerate(np.exp(-POLES * DT)):
-        w = weights(decay, frames)
-        assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        expected = DT * w @ eta + (1.0 - decay) * w @ noise[:-1]
-        assert fdi["bank"]["memory"]["e"][m] == pytest.approx(expected)
-        whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
-        assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
-
-
 def with_shares(*shares):
     """A bank whose filters (m, 3) reach these shares of their bounds."""
     fdi = new_fdi()

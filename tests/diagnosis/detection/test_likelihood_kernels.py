@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from innovations import block_of, by_onset, onset_tests_of, with_hypotheses
+from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
 from statistics_of import Statistical, put
 
@@ -11,142 +11,12 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LOSS_END,
-    N_GROUP_TESTS,
     N_SLOTS,
     STEP_FAULT,
-    USUAL_HYPOTHESES,
 )
 from beaver_ftc.diagnosis.state import LOSS
 
-DT = 0.02
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
-
-
-def steady_block(axes=2, keep=0.97):
-    """A block whose filter has settled."""
-    drift, noise = (TOGETHER, [3e-4, 8e-4]) if axes == 2 else (TOGETHER[:1, :1], [3e-4])
-    block = block_of(drift, noise, jitter=0.05, keep=keep)
-    for _ in range(60):
-        likelihood.advance_covariance(block, DT)
-    return block
-
-
-def through(block, accelerations):
-    """What the filter, from rest, leaves of accelerations (k, n)."""
-    out, state, shown = np.zeros(2), np.zeros(4), []
-    for acceleration in accelerations:
-        likelihood.whiten_step(block, state, np.append(acceleration, 0.0)[:2], DT, out)
-        shown.append(out[: block["n"]].copy())
-    return np.array(shown)
-
-
-def test_of_a_constant_the_filter_leaves_what_stay_says():
-    """One axis, a drift that returns: after its transient a constant of eta_bar shows as g_0."""
-    block = steady_block(1)
-    likelihood.bound_responses(block, np.array([0.3, 9.0, 9.0]), DT)
-    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(block["eta_0"][:1])
-    still = steady_block(1, keep=1.0)
-    likelihood.bound_responses(still, np.array([0.3, 0.0, 0.0]), DT)
-    assert not still["eta_0"].any()  # a walk takes in all that is constant
-
-
-@pytest.mark.parametrize("axes", [1, 2])
-def test_a_steps_transient_sums_to_the_inverse_gain(axes):
-    """Sum of what the filter leaves of a step: K_d^-1, by axes; RINGING is kept for its swings."""
-    block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
-    likelihood.bound_responses(block, bounded, DT)
-    sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
-    expected = likelihood.RINGING_FACTOR * np.abs(sums) @ bounded[:axes]
-    assert block["eta_r"][:axes] == pytest.approx(expected, rel=1e-6)
-    assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
-
-
-@pytest.mark.parametrize("tolerance", [(), (0.1,), (0.1, 0.2), (0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.4, 0.5)])
-def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
-    """Every onset test by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its
-    share. Of even and odd numbers of regressors."""
-    rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
-    kinds = USUAL_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=tolerance)
-    K_x, K_d, S = rng.normal(size=(3, 2, 2))
-    block["K_x"], block["K_d"], block["S_inv"], block["a"] = K_x, K_d, S, kept
-    seen, regressors = rng.normal(size=2), rng.normal(size=(len(tolerance), 2))
-    block["g"], block["g_Z"][: len(tolerance)] = seen, regressors
-    for name in (
-        "s",
-        "x_s",
-        "correlation",
-        "information",
-        "e_R",
-    ):
-        block["tests"][name] = rng.normal(size=block["tests"][name].shape)
-    block["R"] = rng.normal(size=block["R"].shape)
-    kept_by_name = (
-        "s",
-        "x_s",
-        "correlation",
-        "information",
-        "R",
-    )
-    before = {name: onset_tests_of(block, name) for name in kept_by_name}
-    for onset_tests, overlap in zip(block["tests"], block["R"], strict=True):
-        likelihood.accumulate_tests(block, onset_tests, N_GROUP_TESTS, dt, keep)
-        likelihood.accumulate_regressors(block, onset_tests, overlap, N_GROUP_TESTS, keep)
-    lane = {name: onset_tests_of(block, name) for name in (*kept_by_name, "w", "e_R")}
-    x, d = before["x_s"][:2], before["x_s"][2:]
-    r = x + dt * (before["s"] - d)
-    w = S @ r
-    assert lane["x_s"] == pytest.approx(np.vstack([r - K_x @ r, kept * d + K_d @ r]))
-    assert lane["w"] == pytest.approx(w)
-    assert lane["correlation"] == pytest.approx(keep * before["correlation"] + seen @ w)
-    assert lane["information"] == pytest.approx(keep * before["information"] + (w * r).sum(axis=0))
-    overlaps = keep * before["R"][: len(tolerance)] + regressors @ w
-    assert lane["R"][: len(tolerance)] == pytest.approx(overlaps)
-    assert lane["R"][len(tolerance) :] == pytest.approx(before["R"][len(tolerance) :])
-    assert lane["e_R"] == pytest.approx(np.array(tolerance) @ np.abs(overlaps))
-
-
-@pytest.mark.parametrize(
-    ("pg", "size", "share"),
-    [
-        (
-            0.0,
-            500.0,
-            lambda pg, size: (pg + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0),
-        ),
-        (-900.0, 500.0, lambda pg, size: 0.0),
-        (900.0, 500.0, lambda pg, size: 1.0),
-    ],
-)
-def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_lately_has(pg, size, share):
-    block = steady_block()
-    for name in (
-        "n",
-        "a",
-        "R_y",
-        "Q_x",
-        "P_xx",
-        "P_dd",
-    ):
-        block["calm"][name] = block[name]
-    block["calm"]["Q_d"][:] = 0.1 * TOGETHER
-    alone = block["calm"].copy()
-    block["g"], block["nu"] = (0.003, -0.001), (0.4, -0.2)
-    block["pg"], block["pp"] = pg, size
-    inverse, g = block["S_inv"].copy(), block["g"].copy()
-    likelihood.whiten_calm(block, DT)
-    likelihood.update_calm_part(block, DT)
-    likelihood.advance_covariance(alone, DT)
-    likelihood.whiten_step(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["g"])
-    foretold = g - alone["g"]
-    kept = np.exp(-DT / 2.0)
-    pg, size = (
-        kept * pg + foretold @ inverse @ g,
-        kept * size + foretold @ inverse @ foretold,
-    )
-    assert (block["pg"], block["pp"]) == pytest.approx((pg, size), rel=1e-12)
-    assert block["p"] == pytest.approx(share(pg, size) * foretold, rel=1e-12)
-    assert block["calm"]["state"] == pytest.approx(alone["state"], rel=1e-12)
 
 
 def shapes(kind, frames=5):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from innovations import LEVEL_FLIGHT, Detector, misread, surfaces_at_work
-from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_TERMS
@@ -11,8 +10,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, KW_TO_DPT, design_record, evaluate, regressors, response
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import statistical
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.detection.likelihood import PITCH_BLOCK
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import SIGNALS
 from beaver_ftc.studies.engine.statistics import poisson
@@ -27,18 +25,6 @@ SETTINGS = {
     "light turbulence": {**TACTICAL, "turbulence": "light"},
     "severe turbulence, poor gyros": {"sensors": "consumer-grade", "turbulence": "severe"},
 }
-
-
-@pytest.mark.parametrize("turbulence", ["none", "light"])
-@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
-def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
-    alone = Detector(rate_hz, bounds={"turbulence": turbulence})
-    hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_h"]]]
-    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
-    tail = norm.sf(alone.detector["test"]["alarm_level"])
-    assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
-    margin = np.sqrt(2 * alone.detector["test"]["margin"])
-    assert norm.sf(margin) * tests * rate_hz == pytest.approx(1e-4, rel=1e-6)
 
 
 @pytest.mark.parametrize("per_h", [3600.0, 36000.0])
@@ -84,26 +70,6 @@ def _share(rate_hz, omega, eta_bar, declared=None, seconds=20, **bounds):
 )
 def test_bounded_uncertainty_takes_about_half_the_level_at_most(sensors, eta_bar, rate_hz, omega):
     assert 0.1 < _share(rate_hz, omega, eta_bar, sensors=sensors) < 0.6
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
-@pytest.mark.parametrize("coupling", [0.0, 0.25])
-def test_with_no_uncertainty_declared_the_detector_still_has_numbers(sensors, coupling):
-    """Nothing may drift then, and gyros may be exact: no division by nothing."""
-    bounds = {
-        "constant_rad_s2": NO_COUPLING,
-        "inertia_coupling": dict.fromkeys(AXES, coupling),
-        "sensors": sensors,
-    }
-    alone = Detector(100.0, bounds=bounds)
-    frames = 3000
-    Gu, cubic = surfaces_at_work(frames, 100.0, np.random.default_rng(1))
-    faulty = np.zeros((frames, 3))
-    faulty[2000:] = -0.3 * Gu[2000:, :, 1]
-    scores = alone.watch(faulty, Gu, cubic)
-    assert scores[:2000].max() == 0.0
-    assert scores[2000:].max() > 1.0
-    assert np.isfinite(scores).all()
 
 
 def _moment_scale(design):

@@ -67,18 +67,6 @@ def resonance(samples):
     return np.exp(np.multiply.outer(1j * TONES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
 
 
-def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_test_config, rng):
-    samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_test_config, samples, regressors, uses_regressors=True)
-    found = view["tones"]
-    assert found["N"] == pytest.approx(resonance(2.0 * samples))
-    for j in range(3):
-        assert found["R"][j] == pytest.approx(resonance(2.0 * regressors[:, j]))
-    faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
-    assert found["D"] == pytest.approx(EVERY * faded)
-    assert not found["R"][3:].any()
-
-
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
 def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
@@ -98,20 +86,6 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     angle = frequency_rad_s * DT
     found = parity.tone_gain(K_x, K_d, keep, np.exp(1j * angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
-
-
-def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_test_config):
-    bounds = [0.05, 0.02, 0.0, 0.09] * 8
-    for bound in bounds:
-        view["eta"] = bound
-        listen(view, tone_test_config, np.zeros(EVERY))
-    angle = TONES_RAD_S * DT
-    passed = parity.tone_gain(0.3, 0.8, 1.0, np.exp(1j * angle), DT)
-    age_s = EVERY * DT * np.arange(len(bounds))[::-1]
-    faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
-    beat = np.abs(np.exp(np.multiply.outer(2j * TONES_RAD_S, age_s)) @ faded)
-    mean = parity.max_tone_mean(TONES_RAD_S, PACE)
-    assert view["tones"]["eta"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))

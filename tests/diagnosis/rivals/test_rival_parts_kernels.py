@@ -11,11 +11,6 @@ from beaver_ftc.diagnosis.rivals.effectiveness import (
     AugmentedEkf,
     EffectivenessFilter,
 )
-from beaver_ftc.diagnosis.rivals.imm import (
-    N_MODES,
-    InteractingMultipleModels,
-    transition_matrix,
-)
 from beaver_ftc.diagnosis.rivals.observer import healthy_residual_std
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
@@ -117,50 +112,6 @@ def test_the_extended_filters_transition_is_its_models_slopes():
     expected[:3, 6:] = DT * GUSTY.gust_effect
     expected[6:, 6:] = np.diag(np.exp(-DT / GUSTY.gust_time_s))
     assert detector.jacobian(measured) == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_step_of_the_multiple_models_is_each_filter_by_itself_between_mixing_and_bayes_rule():
-    """Moments of the mixture, one prediction and one update a mode, in loops; two steps in gusts."""
-    models = InteractingMultipleModels()
-    models.reset(context(GUSTY, noise=2.0, unknown_noise=40.0, stay=0.97, measurement_rad_s=0.004))
-    rates, n = GUSTY.rate_variance(0.004), N_MODES
-    first = models.step(seen((0.1, -0.2, 0.3)), np.zeros(4))
-    assert (first.statistic, first.detected) == (0.0, False)
-    x, probability = np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (n, 1)), np.full(n, 1e-12)
-    P, probability[0] = np.tile(np.diag([*rates, *GUSTY.gust_rad_s**2]), (n, 1, 1)), 1.0 - (n - 1) * 1e-12
-    chain, keep = transition_matrix(0.97, n), np.exp(-DT / GUSTY.gust_time_s)
-    F = np.block([[np.eye(3), DT * GUSTY.gust_effect], [np.zeros((3, 3)), np.diag(keep)]])
-    bound = np.hypot(BOUND, GUSTY.model_rad_s2)
-    rng = np.random.default_rng(8)
-    for _ in range(2):
-        contribution, acceleration = rng.normal(size=(3, 4)), rng.normal(size=3)
-        now = probability @ x[:, :3] + DT * (acceleration - 0.3 * contribution[:, LEADING[0]])
-        predicted, likely = probability @ chain, np.empty(n)
-        after_x, after_P = np.empty_like(x), np.empty_like(P)
-        for m in range(n):
-            weight = chain[:, m] * probability / predicted[m]
-            mean = weight @ x
-            off = x - mean
-            spread = sum(weight[i] * (P[i] + np.outer(off[i], off[i])) for i in range(n))
-            ahead, Q = F @ mean, np.zeros(6)
-            ahead[:3] += DT * acceleration
-            if 0 < m < n - 1:
-                axis, theta = divmod(m - 1, 3)
-                loss = (-0.25, -0.5, -0.9)[theta]
-                ahead[:3] += DT * loss * contribution[:, LEADING[axis]]
-            Q[:3] = (DT * (40.0 if m == n - 1 else 2.0) * bound) ** 2
-            Q[3:] = (1.0 - keep**2) * GUSTY.gust_rad_s**2
-            wide = F @ spread @ F.T + np.diag(Q)
-            S = wide[:3, :3] + np.diag(rates)
-            nu, K = now - ahead[:3], wide[:, :3] @ np.linalg.inv(S)
-            after_x[m], after_P[m] = ahead + K @ nu, wide - K @ wide[:3]
-            likely[m] = np.exp(-0.5 * nu @ np.linalg.inv(S) @ nu) / np.sqrt(np.linalg.det(2.0 * np.pi * S))
-        x, P, probability = after_x, after_P, predicted * likely / (predicted @ likely)
-        models.step(Measured(1.0, now, np.zeros(5), acceleration, contribution, 9.0 * BOUND), np.zeros(4))
-        assert models.x == pytest.approx(x, rel=1e-6)
-        assert pytest.approx(P, rel=1e-6, abs=1e-15) == models.P
-        assert models.mode_probabilities == pytest.approx(probability, rel=1e-6, abs=2e-12)
-    assert np.sort(probability)[-3] > 1e-3, "several modes count"
 
 
 def test_the_deviation_of_a_residual_has_that_of_the_model_the_gyro_and_the_air():

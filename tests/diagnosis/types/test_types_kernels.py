@@ -317,35 +317,6 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, 
     assert surface["last"]["hides"].tolist() == hides
 
 
-def test_where_types_have_a_surface():
-    fdi, surface = new_surface(
-        k_first=3,
-        first_lo=0.1,
-        first_hi=0.2,
-        runaway=1.0,
-        command=0.2,
-    )
-    surface["last"]["u"], surface["sets"]["low"][CONSTANT_LOSS] = (
-        -0.2,
-        0.25,
-    )
-    fdi["types"]["frame_index"] = 5
-    assert on(commanded_surface.loss_range, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
-    assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.0, 0.0)
-    surface["actuator"]["stop_lo"] = 0.1  # the lower stop is as near to neutral as it comes
-    assert on(held_surface.float_range, fdi, surface, FLOAT) == (0.1, 0.1)
-    assert held_surface.float_deflection(fdi, 0, FLOAT) == 0.1
-    surface["actuator"]["stop_lo"] = LOW
-    assert on(held_surface.range_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert on(held_surface.range_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
-    assert [TYPES[kind].estimate_parameter(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
-        0.0,
-        HIGH,
-        LOW,
-    ]
-    assert commanded_surface.theta_of_set(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
-
-
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
     fdi["types"]["config"]["returns_lagged"], fdi["types"]["config"]["n_substeps"] = (
@@ -358,17 +329,6 @@ def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fie
     surface["release"]["back_lo"][held_surface.LATER_SLOT, STUCK] = low
     surface["release"]["back_hi"][held_surface.LATER_SLOT, STUCK] = high
     return fdi, surface
-
-
-@pytest.mark.parametrize("instants", [1, 3])
-def test_a_return_goes_by_the_actuator(instants):
-    """Half the way to the order an instant, 0.1 rad at most."""
-    fdi, surface = released(instants=instants)
-    place, path = 0.3, []
-    for _ in range(instants):
-        path.append(place)
-        place -= min(0.5 * place, 0.1)
-    assert on(held_surface.simulate_return, fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
@@ -395,75 +355,9 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     assert on(held_surface.keep_returns, fdi, surface, STUCK)
 
 
-@pytest.mark.parametrize("returns_lagged", [0, 1])
-def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
-    returns_lagged,
-):
-    fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns_lagged"] = returns_lagged
-    elsewhere = held_surface.IS_RETURNING if returns_lagged else held_surface.IS_REFUTED
-    judged(held_surface.held_interval, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["sets"]["excluded"][STUCK] == (not returns_lagged)
-    assert surface["release"]["released"][STUCK] == returns_lagged
-    fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns_lagged"] = returns_lagged
-    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.3, 0.4) == held_surface.IS_HELD
-    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.1, 0.2) == held_surface.IS_HELD
-    surface["release"]["released"][STUCK] = 1
-    assert on(held_surface.judge_held, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
-
-
-def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
-    """A block of frames in which the surface may be let go at any instant."""
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, anomalous_then=1)
-    fdi["types"]["config"]["frames_per_block"] = len(commands)
-    surface["commands"]["history"][1, : len(commands)] = commands
-    surface["release"]["held_lo"][STUCK], surface["release"]["held_hi"][STUCK] = held
-    surface["judged"]["kappa"] = UNEVEN
-    return fdi, surface
-
-
 def way(start, commands):
     """Where the actuator brings a surface, from `start` on: half of what is left, 0.1 rad at most."""
     places = [start]
     for order in commands:
         places.append(places[-1] + np.clip(0.5 * (order - places[-1]), -0.1, 0.1))
     return np.array(places)
-
-
-ORDERS, UNEVEN = (0.4, 0.05, 0.26, 0.5), 0.05
-
-
-def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_side():
-    """The least and the greatest mean by all releases that hold at first, or come back to where they were."""
-    fdi, surface = within_block(ORDERS)
-    for start, side, extreme in ((0.2, -1, np.minimum), (0.3, 1, np.maximum)):
-        place, path = start, []
-        for order in ORDERS:
-            path.append(place)
-            place = extreme(way(place, [order])[1], start)
-        room = UNEVEN * np.ptp(path)
-        assert on(held_surface.simulate_return, fdi, surface, start, side) == pytest.approx(
-            (np.mean(path), place, room)
-        )
-        for wait in range(len(ORDERS)):  # held so long, then let go
-            mean = np.mean([*[start] * wait, *way(start, ORDERS[wait:-1])])
-            assert -side * (mean - np.mean(path)) >= -1e-12
-
-
-@pytest.mark.parametrize("end", ["low", "high"])
-@pytest.mark.parametrize("inside", [True, False])
-def test_a_release_within_the_block_explains_what_lies_between_with_some_room(end, inside):
-    fdi, surface = within_block(ORDERS)
-    start, side = (0.2, -1) if end == "low" else (0.3, 1)
-    mean, _, room = on(held_surface.simulate_return, fdi, surface, start, side)
-    assert room > 1e-3
-    edge = mean + side * room
-    beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
-    surface["judged"]["lo"], surface["judged"]["hi"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    assert on(held_surface.release_explains, fdi, surface, STUCK) == inside
-    assert on(held_surface.keep_returns, fdi, surface, STUCK) == inside
-    held = surface["release"]["held_lo"][STUCK] <= surface["release"]["held_hi"][STUCK]
-    assert held == inside, "what explains nothing is forgotten"
-    fdi["types"]["config"]["frames_per_block"] = 1
-    assert not on(held_surface.release_explains, fdi, surface, STUCK)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis import types
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -90,16 +89,6 @@ def new_case(**left):
         else:
             leave(fdi["types"]["surface"][s], *kinds)
     return fdi
-
-
-def locate(fdi, s, innovation, bound, effect):
-    """`observe_surface` for surface s, with its estimator and its axis."""
-    fie = fdi["isolation"]["estimator"][fdi["layout"]["position"][s]]
-    axis = fdi["layout"]["dominant_axis"][s]
-    config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
-    types.copy_observation(surface["earlier"], surface["judged"])
-    types.copy_observation(surface["judged"], surface["last"])
-    types.observe_surface(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
@@ -340,50 +329,6 @@ def test_how_far_a_surface_is_off(kinds, at_fault, off):
 
 
 # Examining frames.
-
-
-def test_a_surface_is_where_the_innovation_puts_it():
-    fdi = new_case()
-    effect, surface = (
-        fdi["isolation"]["estimator"][4 + RUDDER]["effect"],
-        fdi["types"]["surface"][RUDDER],
-    )
-    effect["regressor"], effect["base"] = (
-        (0.5, 0.0, -2.0),
-        (-0.05, 0.0, 0.2),
-    )  # commanded to 0.1
-    (
-        surface["last"]["lo"],
-        surface["last"]["hi"],
-        surface["last"]["u"],
-    ) = 0.2, 0.3, 0.15
-    surface["judged"]["lo"], surface["judged"]["hi"] = 0.4, 0.45
-    # off by 0.2: 0.1 on roll, -0.4 on yaw, give or take
-    locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert surface["last"]["u"] == pytest.approx(0.1)
-    assert (
-        surface["last"]["lo"],
-        surface["last"]["hi"],
-    ) == pytest.approx((0.29, 0.31))  # roll says it to 0.005 / 0.5
-    assert (
-        surface["judged"]["lo"],
-        surface["judged"]["hi"],
-        surface["judged"]["u"],
-    ) == (
-        0.2,
-        0.3,
-        0.15,
-    )
-    assert (
-        surface["earlier"]["lo"],
-        surface["earlier"]["hi"],
-    ) == (0.4, 0.45)
-    fdi["types"]["config"]["frames_per_block"] = 4
-    locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert (
-        surface["last"]["lo"],
-        surface["last"]["hi"],
-    ) == pytest.approx((0.25, 0.35))  # its own axis alone
 
 
 @pytest.mark.parametrize(

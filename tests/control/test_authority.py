@@ -1,17 +1,14 @@
 """Lost authority: the attainable moments, the reference bent to them, and the probe that nobody feels."""
 
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.aircraft.aircraft import Travel
 from beaver_ftc.control import allocation, laws
 from law_records import fields, new_control
-from telling import apart
 
 DT = 0.01
 LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1.03])
@@ -90,23 +87,3 @@ class TestProbing:
         axes["demand"] = 0.0, needed, 0.0
         allocation.allocate(axes, out, control["layout"], np.ones(4), 0.0, probe)
         assert (G @ out["command"])[1] == pytest.approx(needed, abs=1e-12)
-
-
-SIX = {"left": (-0.4, 0.1), "right": (-0.2, 0.25), "elevator": (-0.5, 0.3), "stabiliser": (-0.05, 0.15),
-       "rudder": (-0.35, 0.48), "flap": (-0.1, 1.0)}  # fmt: skip
-EFFECT = {"left": (-7.0, 0.5, 0.3), "right": (-6.0, 0.4, 0.2), "elevator": (0.1, -9.0, 0.6),
-          "stabiliser": (0.7, -11.0, 0.8), "rudder": (0.9, 1.1, -3.0), "flap": (1.2, 2.0, 1.3)}  # fmt: skip
-
-
-@pytest.mark.parametrize("aside", [(), ("flap",)])
-def test_whose_the_authority_is_goes_by_effect_times_the_whole_travel(aside):
-    apart(travel=[high - low for low, high in SIX.values()], effect=list(EFFECT.values()))
-    of = SimpleNamespace(
-        n=6, surfaces=tuple(SIX), primary=("left", "elevator", "rudder"), stand_ins=aside, effect=EFFECT,
-        travel={name: Travel(*stops) for name, stops in SIX.items()}, dominant_axis=(0, 0, 1, 1, 2, 1),
-    )  # fmt: skip
-    shares = allocation._authority(of, {"main": [0, 2, 4], "is_backup": [name in aside for name in SIX]})
-    pitch = np.array([0.0, 0.0, 9.0 * 0.8, 11.0 * 0.2, 0.0, 0.0 if aside else 2.0 * 1.1])
-    assert shares[1] == pytest.approx(pitch / pitch.sum())
-    assert shares[0] == pytest.approx(np.array([7.0 * 0.5, 6.0 * 0.45, 0, 0, 0, 0]) / 6.2)
-    assert shares[2].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]

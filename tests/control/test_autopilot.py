@@ -160,22 +160,3 @@ class TestScenario:
     )
     def test_mistakes_are_refused(self, autopilot, says):
         assert says in mistakes({"autopilot": autopilot})
-
-    def test_where_it_arrives_is_the_mean_of_its_last_seconds(self):
-        expect = {"arrives": {"altitude_m": 3, "airspeed_mps": 1, "heading_deg": 0.001, "in_envelope": True}}
-        flight, log = flown(40.0, expect=expect)
-        document = metrics(flight)
-        age_s = log["t_s"][-1] - log["t_s"]
-        weights = np.exp(-age_s / 10.0) / np.exp(-age_s / 10.0).sum()
-        off = {
-            "altitude_m": (log["altitude_m"] - log["altitude_command_m"]) @ weights,
-            "airspeed_mps": (log["airspeed_mps"] - log["airspeed_command_mps"]) @ weights,
-        }
-        for channel, mean in off.items():
-            assert document["arrival"][channel] == pytest.approx(mean, abs=0.05)
-        assert document["arrival"]["in_envelope"]
-        passed = {one["name"]: one["passed"] for one in document["expectations"]}
-        assert passed == {
-            "arrives.altitude_m": True, "arrives.airspeed_mps": True, "arrives.heading_deg": False,
-            "arrives.in_envelope": True,
-        }  # fmt: skip

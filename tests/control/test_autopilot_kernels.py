@@ -167,21 +167,6 @@ def test_a_heading_is_flown_by_a_bank(jammed, alone, gain):
     assert pilot["missing_turn_rate"] == 0.0
 
 
-@BY_ENGINES
-def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated(jammed, alone, gain):
-    pilot = new_autopilot(BANK, roll_loss_share=jammed, missing_roll_rate=0.02, engines_alone_yaw_share=alone)
-    pilot["command"][BANK] = 0.3
-    rate = loops.bank_angle_rate(pilot, np.array([0.1, 0.0, 0.0]))
-    assert rate == pytest.approx(gain * 1.1 * 0.2 + jammed * 0.02)
-    assert pilot["missing_roll_rate"] == pytest.approx(0.02 + jammed * DT * gain * 0.2 * 0.2)
-    pilot["bank_limit"], pilot["missing_roll_rate"] = 0.05, 0.0
-    assert loops.bank_angle_rate(pilot, np.array([0.1, 0.0, 0.0])) == pytest.approx(gain * 1.1 * -0.05)
-    pilot["rate_limit"], kept = 0.01, float(pilot["missing_roll_rate"])
-    assert loops.bank_angle_rate(pilot, np.array([0.4, 0.0, 0.0])) == -0.01
-    assert pilot["missing_roll_rate"] == kept
-    assert loops.bank_angle_rate(new_autopilot(), np.array([0.1, 0.0, 0.0])) == 0.0
-
-
 def test_upside_down_the_turn_stays_finite():
     pilot = new_autopilot(BANK)
     loops.set_body_rates(pilot, new_y(beta=0.0), np.array([1.55, 0.0, 0.0]), 0.0, 0.0)
@@ -236,3 +221,21 @@ def test_power_leaves_the_rudder_enough(rudder):
 @pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
 def test_a_direction_is_given_within_half_a_turn(angle):
     assert loops.wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def follow(pilot, control, y):
+    saturated = control["allocation"]["output"]["saturated"]
+    loops.smooth_signals_and_losses(pilot, control["layout"], control["surfaces"], saturated, False, y)
+
+
+@pytest.mark.parametrize(("surface", "share"), [(AILERON, "roll_loss_share"), (RUDDER, "yaw_loss_share")])
+@pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
+def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
+    pilot, control = new_autopilot(roll_loss_share=0.5, yaw_loss_share=0.5), new_control()
+    control["surfaces"]["output"]["effectiveness"][surface] = left
+    follow(pilot, control, new_y())
+    assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
+    assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
+    for name in ("roll_loss_share", "yaw_loss_share"):
+        goal = 1.0 if name == share and left < 0.1 else 0.0
+        assert pilot[name] == pytest.approx(0.5 + DT / 1.5 * (goal - 0.5))

@@ -6,12 +6,12 @@ import pytest
 from beaver_ftc.control import Reference
 from beaver_ftc.control.rivals.indi import IncrementalInversion, LowPass
 from beaver_ftc.control.rivals.l1 import Predictor
-from beaver_ftc.control.rivals.lqr import FixedGainLqr, gains
+from beaver_ftc.control.rivals.lqr import gains
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import LAWS, plugin_class
-from flying import Memory, loss, scenario
+from flying import Memory, scenario
 
 DT = 0.01
 A = np.array([[-4.0, 0.0, 1.0], [0.0, -3.0, 0.0], [-0.2, 0.0, -0.8]])
@@ -142,17 +142,3 @@ def test_the_beaver_follows_and_survives_half_an_elevator(name):
     assert max(log.rms_deg_s(axis, 2, 6) for axis in "pqr") < 0.8
     assert log.rms_deg_s("q", 8) < 1.2
     assert [mode for _, mode in flight.supervisor] == ["nominal"]  # these laws do not use the verdict
-
-
-@pytest.mark.parametrize("rival", [FixedGainLqr, IncrementalInversion])
-@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
-def test_a_compiled_rival_commands_what_its_class_commands(rival, sensors):
-    """The class is a plug-in when it is given as one; by its name it flies compiled."""
-    given = {"duration_s": 12, "sensors": sensors, "faults": [loss("aileron", 0.95, at_s=5.0)]}
-    by_name, by_class = Memory(), Memory()
-    fly(scenario(control={"law": rival.name}, **given), by_name)
-    fly(scenario(**given), by_class, law=rival())
-    for surface in ("aileron", "elevator", "rudder", "flap"):
-        column = f"{surface}_cmd_rad"
-        np.testing.assert_allclose(by_name[column], by_class[column], atol=1e-9)
-    assert np.ptp(by_name["aileron_cmd_rad"]) > 0.1

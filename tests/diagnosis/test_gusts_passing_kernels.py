@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
 from beaver_ftc.diagnosis.bounds import errors_dtype
-from beaver_ftc.scenario.diagnosis import Bounds
-from flying import declared_in
 
 SPAN_M, FT = 14.63, 0.3048
 # sigma_w below 1000 ft: a tenth of 25.3, 50.6 and 76.0 ft/s; above 2000 ft: 7.4, 10.6 and 23.6 ft/s
@@ -87,35 +84,3 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     bounds.set_air_rotation(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
     assert declared_errors["wg"] == pytest.approx(6.0 * sigma)
-
-
-SENSORS = {
-    "phi": {"bias_deg": 0.3}, "theta": {"bias_deg": -0.2}, "ax": {"bias_mps2": 0.04, "scale_error": -0.02},
-    "V": {"noise_std_mps": 0.4, "quantum_mps": 0.3, "bias_mps": -0.5, "scale_error": 0.01},
-    "altitude": {"noise_std_m": 2.0, "bias_m": 5.0, "scale_error": 0.03},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("turbulence", ["light", "severe"])
-@pytest.mark.parametrize(("accelerometers", "sensors"), [(1, {}), (1, SENSORS), (0, SENSORS)])
-def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts(turbulence, accelerometers, sensors):
-    """a^3 = 2 b^2 V / (L sigma^2); b: Coriolis, gravity along the path and by the attitude's error, and what
-    accelerometers are off, or what the model's forces are: at most 0.3 of the weight, by 8 % and 5 % mass."""
-    given = Bounds.model_validate({"turbulence": turbulence, "sensors": sensors, "coefficients": 0.08})
-    record = record_of(gusts.GUST_RECORD)
-    record["output"]["gusty"] = record["output"]["measured"] = 1
-    record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust_speed(record, declared_in(given, load()), 6.6, 45.0)
-    sigma, V_L, g = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT), 9.80665
-    b = 2.0 * 7.292115e-5 * 45.0 + 0.3 * 0.03 + (g * np.radians(0.5) if sensors else 0.0)
-    of_the_sensor = 0.04 + 0.3 * g * 0.02 if sensors else 0.0
-    b += of_the_sensor if accelerometers else 0.3 * g * (0.08 + 0.05)
-    a = (2.0 * b**2 * V_L / sigma**2) ** (1.0 / 3.0)
-    speed = np.hypot(0.4, 0.3 / np.sqrt(12.0)) ** 2 + (0.5 + 0.01 * 45.0) ** 2 if sensors else 0.0
-    expected = {
-        "a_v": a, "var_v": sigma**2, "v_max": 4.0 * sigma,
-        "var_V": sigma**2 * a / (a + V_L) + (b / a) ** 2 + speed,
-        "speed_error_share": 6.6**2 / 16.0,
-    }  # fmt: skip
-    for name in record["config"].dtype.names:
-        assert record["config"][name] == pytest.approx(expected.get(name, 0.0), rel=1e-6), name

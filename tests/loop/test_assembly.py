@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 
@@ -144,19 +143,3 @@ def test_the_model_of_the_reference_is_a_critically_damped_second_order():
     for _ in range(50):
         x = A @ x + B.ravel()
     assert x[0] == pytest.approx(1 - 11 * np.exp(-10.0))
-
-
-def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_position(frame):
-    aircraft = Scenario.model_validate(GIVEN).airframe
-    assert estimator_names("published", aircraft) == ("aileron", "elevator", "rudder")
-    names = estimator_names("all", aircraft)
-    assert names == (
-        "aileron", "elevator", "rudder", "flap",
-        "aileron_position", "elevator_position", "rudder_position", "flap_position",
-    )  # fmt: skip
-    fies = frame["fdi"]["isolation"]["estimator"][:8]
-    assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
-    assert fies["theta_min"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
-    assert fies["theta_max"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
-    assert frame["fdi"]["layout"]["loss"].tolist() == [0, 1, 2, 3]
-    assert frame["fdi"]["layout"]["position"].tolist() == [4, 5, 6, 7]

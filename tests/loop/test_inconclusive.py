@@ -10,9 +10,7 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.design import altitude_of
 from beaver_ftc.diagnosis.bounds import UNMAPPED_ERROR_RAD_S2
-from beaver_ftc.loop.outcome import inconclusive_of
 
 FULL = {
     "p_rad_s": [-9, 9], "q_rad_s": [-9, 9], "r_rad_s": [-9, 9], "alpha_rad": [-1, 1], "beta_rad": [-1, 1],
@@ -77,37 +75,3 @@ def mapped():
     boxes = [SimpleNamespace(ends=lambda signals, of=of: [*of, (0.1, 0.9)]) for of in (first, second)]
     file = SimpleNamespace(model_error_map=SimpleNamespace(boxes=boxes, until_s=[5.0, 12.0]))
     return SimpleNamespace(file=file, signals=("dpt",))
-
-
-SPANS_SAID = {
-    "q_rad_s": "outside the pitch rates at which this model was measured: -11.5 to 17.2 deg/s",
-    "altitude_m": "outside the altitudes at which this model was measured: 1,110 to 3,100 m",
-    "dpt": "outside the values of dpt at which this model was measured: 0.1 to 0.9",
-    "flown_s": "later than this model was measured: after 12 s of flight",
-    "between": "in a combination of speeds, angles and rates at which this model was not measured",
-    "scheme": "no diagnosis ran: fdi.scheme is none",
-}
-
-
-def test_of_several_reasons_the_one_of_most_frames_comes_first_and_each_has_its_own_numbers():
-    """Shares of all frames that were watched; they may add up to more than all in which nothing was said."""
-    counted = {
-        "watched": 200, "frames": 120, "from_s": 3.5, "undiagnosed": 10, "late": 40, "between": 15,
-        "beyond": [0, 25, 0, 0, 0, 0, 60, 5, 0], "least": [9.0, -0.3, 9.0, 9.0, 9.0, 9.0, 0.8, 0.95, 9.0],
-        "greatest": [9.0, 0.5, 9.0, 9.0, 9.0, 9.0, 0.85, 1.2, 9.0],
-    }  # fmt: skip
-    found = inconclusive_of({"accounts": {"inconclusive": counted}, "t": 21.25}, mapped())
-    assert (found["share"], found["from_s"]) == (0.6, 3.5)
-    wanted = [
-        ("altitude_m", 0.3, [altitude_of(1.1), altitude_of(0.9)], [altitude_of(0.85), altitude_of(0.8)]),
-        ("flown_s", 0.2, [0.0, 12.0], [12.0, 21.25]), ("q_rad_s", 0.125, [-0.2, 0.3], [-0.3, 0.5]),
-        ("between", 0.075, None, None), ("scheme", 0.05, None, None), ("dpt", 0.025, [0.1, 0.9], [0.95, 1.2]),
-    ]  # fmt: skip
-    assert [reason["quantity"] for reason in found["reasons"]] == [name for name, *_ in wanted]
-    for reason, (name, share, measured, flown) in zip(found["reasons"], wanted, strict=True):
-        assert reason["share"] == pytest.approx(share)
-        assert reason["measured"] == (None if measured is None else pytest.approx(measured))
-        assert reason["flown"] == (None if flown is None else pytest.approx(flown))
-        assert reason["says"] == SPANS_SAID[name]
-    none = {**counted, "frames": 0}
-    assert inconclusive_of({"accounts": {"inconclusive": none}, "t": 21.25}, mapped()) is None

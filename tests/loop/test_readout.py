@@ -4,7 +4,6 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop import Stepping
-from beaver_ftc.plant.instruments import SENSORS
 
 FLIGHT = {
     "name": "read", "duration_s": 3.0, "sensors": "consumer-grade",
@@ -64,27 +63,6 @@ def test_the_diagnosis_is_read_as_the_log_has_it(flown):
         assert names[diagnosis.layout.position_estimator_index_by_surface[s]] == f"{name}_position"
         assert names[diagnosis.layout.loss_estimator_index_by_surface[s]] == name
         assert diagnosis.layout.dominant_axis_by_surface[s] == aircraft.dominant_axis[s]
-
-
-def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has_them(flown):
-    _, _, now, row, _ = flown
-    diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
-    shares = [
-        one.score_in_std / diagnosis.statistical_alarm_level
-        for block in diagnosis.statistical_filters
-        for one in block.hypotheses
-    ]
-    logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
-    assert max(shares) == pytest.approx(max(logged), rel=1e-12)
-    for block in diagnosis.statistical_filters:
-        assert block.hypothesis_tests_by_onset.score.shape[0] == len(block.hypotheses)
-        assert len(block.axis_indices) in (1, 2)
-    assert monitor.enabled
-    assert (monitor.top_ratio, monitor.worst_test_index) == (
-        row["watch_share"],
-        row["watch_test"],
-    )
-    assert len(monitor.predicted_reading) == len(SENSORS)
 
 
 def test_a_readout_stays_when_the_flight_goes_on(flown):

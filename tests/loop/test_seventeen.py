@@ -7,8 +7,6 @@ from tests import seventeen
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import verdict_text
 from beaver_ftc.scenario.schema import load_text
 
 AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
@@ -61,22 +59,6 @@ def test_a_runaway_on_one_side_leaves_the_ailerons_of_that_side(folder):
     flight = bf.fly(scenario(folder, fdi={"fault_class": "all"}, faults=[fault]))
     left = {candidate.partition(":")[0] for candidate in flight.metrics["isolation"]["candidates"]}
     assert left == AILERONS
-
-
-def test_what_is_left_of_an_axis_is_computed_and_said():
-    """Of the Beaver with halves the left aileron is lost: ailerons, flaps and rudder roll, by their terms."""
-    sine = {"amplitude_deg_s": 3, "frequency_hz": 0.25}
-    lost = {"actuator": "aileron_left", "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 2}
-    document = {"aircraft": "beaver-split", "duration_s": 8, "reference": {"p": [{"sine": sine}]}}
-    flight = bf.fly(bf.load(document | {"faults": [lost]}))
-    halves, of = load("beaver-split"), flight.metrics["authority"]["p"]
-    spans = {s: (t.max_rad - t.min_rad) * abs(halves.effect[s][0]) for s, t in halves.travel.items()}
-    expected = 1.0 - spans["aileron_left"] / sum(spans.values())
-    whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
-    share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
-    assert share == pytest.approx(expected, abs=0.03)
-    assert f"roll authority {100 * share:.0f} %" in verdict_text(Metrics.of(flight.metrics), "here")
-    assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2
 
 
 def test_two_surfaces_lost_at_once_are_found_by_the_law_itself():

@@ -76,30 +76,3 @@ def test_so_many_frames_are_no_step(frames):
 def test_what_is_no_stick(stick):
     with pytest.raises(bf.BadInput, match=r"^stick: .* is not usable, allowed: 3 finite numbers, rad/s$"):
         bf.Simulation(scenario(duration_s=0.2)).step(stick=stick)
-
-
-def test_of_what_scenario_a_verdict_is():
-    """Flown to its end and left alone: as given. Else as it happened, or as much as a scenario can say."""
-    given = scenario(duration_s=0.5, faults=[loss(at_s=0.2), loss("rudder", at_s=0.45)])
-    left_alone = bf.Simulation(given)
-    left_alone.step(frames=20)
-    assert left_alone.land().scenario.duration_s == pytest.approx(0.21)
-    assert [fault.actuator for fault in left_alone.land().scenario.faults] == ["elevator"]
-    left_alone.step(frames=100)
-    assert left_alone.land().scenario is left_alone._given
-    steered = bf.Simulation(given)
-    steered.step(frames=10, stick=(0.01, 0.0, 0.0))
-    steered.step(frames=100)
-    assert steered.done
-    assert steered.land().scenario.reference != given.reference
-    broken = bf.Simulation(given)
-    broken.step(frames=10)
-    broken.inject({"type": "float", "actuator": "flap"})
-    broken.step(frames=100)
-    assert [fault.actuator for fault in broken.land().scenario.faults] == ["elevator", "rudder", "flap"]
-    by_hand = bf.Simulation(given)
-    by_hand.step(by_hand.trim_rad, frames=10)
-    landed = by_hand.land().scenario
-    assert (landed.duration_s, landed.faults) == (0.5, ())
-    by_hand.step(frames=15)
-    assert [fault.actuator for fault in by_hand.land().scenario.faults] == ["elevator"]

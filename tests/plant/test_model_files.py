@@ -7,7 +7,6 @@ from beaver_ftc.plant import instrumented, model_file
 from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import instrument
 from beaver_ftc.plant.model_file import check_model_has_no_side_effects
-from kept import page
 
 FILES = {
     "jet.xml": """<?xml version="1.0"?>
@@ -83,28 +82,6 @@ def test_what_is_wrong_with_a_file(tmp_path, changed):
         except BadInput as error:
             found[case] = [line.partition("m.xml:")[2].partition(" (")[0] for line in str(error).splitlines()]
     assert not changed(found)
-
-
-def test_an_instrumented_copy(jet, tmp_path, changed):
-    assert instrumented.surfaces_of(jet) == {
-        "aileron": ("fcs/left-aileron-pos-deg",),
-        "elevator": ("fcs/elevator-pos-norm", "fcs/elevator-pos-rad", "fcs/mag-elevator-pos-rad"),
-    }
-    ours = [name for names in instrumented.surfaces_of(jet).values() for name in names]
-    assert instrumented.others_of(jet, ours) == ("fcs/spoiler-pos-norm", "gear/gear-pos-norm")
-    assert instrumented.engines_of(jet) == 1
-    glider = tmp_path / "glider.xml"
-    glider.write_text("<fdm_config><propulsion/></fdm_config>")
-    assert instrumented.engines_of(glider) == 0
-    travel = {"aileron": (-0.3, 0.25), "elevator": (-0.4, 0.35)}
-    model = instrumented.instrument(
-        jet, tmp_path / "copy", travel, ["fcs/spoiler-pos-norm", "gear/gear-pos-norm"]
-    )
-    assert not changed(page(model.read_text()), part="model")
-    assert not changed(page((model.parent / "Systems" / "ftc-elevator.xml").read_text()), part="elevator")
-    assert not changed(page((model.parent / "Systems" / "ftc-common.xml").read_text()), part="common")
-    told = ("/engines/engine[3]/rpm", "/controls/engines/engine/throttle", "/engines/engine/n1")
-    assert not changed([instrumented.is_told(name) for name in told], part="told")
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import replace
-from math import cos, nan
+from math import cos
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import trim as steps
-from beaver_ftc.plant.adapter import FlightState, Plant
+from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
 from beaver_ftc.plant.trim import trim
@@ -21,22 +21,6 @@ def said(call, *arguments, error=BadInput):
     with pytest.raises(error) as caught:
         call(*arguments)
     return str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("left", "says"),
-    [
-        ([1, -5, 0, 2, 2, 2], " (-5 m/s2 to the right cannot be balanced)"),
-        ([1, 0, 2.54, 0, 0, 0], " (2.5 m/s2 downward cannot be balanced)"),
-        ([0, 0, 0, -0.5, 0, 0], " (-0.5 rad/s2 in roll cannot be balanced)"),
-        ([3, 0, 0, 0, 0, 0], " (3 m/s2 forward cannot be balanced)"),
-        ([0, 0, 0, 0, 1, 0], " (1 rad/s2 in pitch cannot be balanced)"),
-        ([0, 0, 0, 0, 0, 1], " (1 rad/s2 in yaw cannot be balanced)"),
-        ([0, 0, 0, nan, 0, 1], " (its accelerations are not finite)"),
-    ],
-)
-def test_what_keeps_it_from_flying_steadily_is_the_largest(left, says):
-    assert steps._left_over(np.array(left, float)) == says
 
 
 def test_a_quick_look_is_the_full_start_s_accelerations():
@@ -91,9 +75,3 @@ def test_a_linear_model_as_python_control_is_given_it(monkeypatch):
     assert names == {"states": states, "inputs": ["flap_rad"], "outputs": states}
     monkeypatch.setitem(sys.modules, "control", None)  # as where it is not installed
     assert said(model.state_space).startswith("python-control is not installed, allowed: pip install")
-
-
-@pytest.mark.parametrize("given", [{"flap": 0.1}, {"wing_rad": 0.1}, {"engine": 3}, {"_rad": 1}])
-def test_what_a_flight_condition_does_not_have(given):
-    with pytest.raises(TypeError, match=r"a flight condition has no"):
-        FlightState(45.0, 1000.0, **given)

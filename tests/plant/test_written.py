@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant import channels
 from beaver_ftc.plant.adapter import FlightState, Plant, body_axes
 from beaver_ftc.plant.trim import configure, take_off
 from beaver_ftc.scenario.schema import load
@@ -89,18 +88,3 @@ def test_turbulence_as_the_specification_has_it(severity, exceedence, wind_fps, 
     found = [plant.written[f"{folder}/severity"], plant.written[f"{folder}/windspeed_at_20ft_AGL-fps"]]
     assert found == [exceedence, wind_fps]
     assert (plant.written["atmosphere/randomseed"], plant.written["atmosphere/turb-type"]) == (1, 4)
-
-
-def test_names_and_units_of_what_is_read_and_logged(changed):
-    aircraft = trainer(signals={"dpt": {"property": "aero/dpt"}}, surfaces={"tab": {"travel_rad": [0, 1]}})
-    assert not changed({
-        "truth": channels.truth_channels(aircraft), "further": channels.further_channels(aircraft),
-        "further of the beaver": channels.further_channels(load({}).airframe),
-        "room": [channels.most_channels(n) for n in (3, 8)],
-        "commands": channels.command_properties(aircraft),
-        "log": channels.log_columns(aircraft, ("rudder",), 3, "manifold_pressure_inhg", ("h_m",), True),
-        "short log": channels.log_columns(aircraft, (), 0, "", (), False),
-        "places": [channels.AIRSPEED, channels.ALPHA, channels.BETA, channels.QDYN, channels.PHI,
-                   channels.LATITUDE, channels.LONGITUDE, channels.ALTITUDE, channels.PDOT,
-                   channels.ENVELOPE, channels.POS],
-    })  # fmt: skip

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.control import accommodation, allocation, laws
-from beaver_ftc.control.accommodation import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
@@ -174,32 +173,3 @@ def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(gi
     assert shares[-1] == 0.0 or len(shares) == 1
     assert np.all(np.diff(shares) <= 0.0)
     assert np.all(np.diff(shares) >= -1.5 * step)  # the steepest of 3 s^2 - 2 s^3
-
-
-@pytest.mark.parametrize(
-    ("mode", "diagnoses_all_types", "hedging", "left", "before", "after"),
-    [
-        (MODE_REALLOCATED, 0, 0, 0.6, 0.2, 0.3),
-        (MODE_REALLOCATED, 0, 0, 0.6, 0.95, 1.0),
-        (MODE_REALLOCATED, 0, 1, 0.2, 0.2, 0.8),
-        (MODE_REALLOCATED, 1, 0, 0.05, 0.2, 0.95),
-        (MODE_REALLOCATED, 0, 0, 0.05, 0.2, 0.3),
-        (MODE_ADAPTIVE, 1, 0, 1.0, 0.25, 0.15),
-        (MODE_NOMINAL, 1, 0, 1.0, 0.05, 0.0),
-        (MODE_NOMINAL, 0, 0, 1.0, 0.25, 0.15),
-        (MODE_UNANTICIPATED, 0, 1, 0.6, 1.0, 0.9),
-    ],
-)
-def test_pitch_is_handed_over_by_steps_and_back(mode, diagnoses_all_types, hedging, left, before, after):
-    frame = configure_design(scenario(), TRAVEL).view(np.recarray)[0]
-    control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
-    control["surfaces"]["output"]["effectiveness"][ELEVATOR] = left
-    control["allocation"]["output"]["lost_share"], assessment = 0.3, frame["assessment"]
-    assessment["diagnoses_all_types"] = diagnoses_all_types
-    laws.prepare(control, assessment, frame["prediction"], mode, 0.0)
-    assert control["allocation"]["output"]["hand_over"] == pytest.approx(after)
-    now = 1.0 - left if left >= 0.1 else 1.0
-    lost = now if mode == MODE_REALLOCATED else 0.3
-    assert control["allocation"]["output"]["transfer_share"] == pytest.approx(
-        (3 * after**2 - 2 * after**3) * lost
-    )

@@ -7,7 +7,7 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import parity
-from beaver_ftc.diagnosis.detection.likelihood import MIN_ETA_RAD_S2, STEP_FAULT
+from beaver_ftc.diagnosis.detection.likelihood import STEP_FAULT
 from beaver_ftc.diagnosis.detection.parity import configure_parity_views
 from beaver_ftc.diagnosis.state import LOSS
 
@@ -80,64 +80,6 @@ def test_across_a_column_is_square_to_it_of_length_one_and_to_the_left(fdi, rng)
     assert view["direction"][:3] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
     assert np.cross(of_it, view["direction"][:3])[1] < 0.0  # from roll over yaw, as (-g_r, g_p)
-
-
-def declared_along(statistical, m):
-    """Noise, jitter, bound, drift of the air and its leap along a direction, by quadratic forms."""
-    air, pitch, lateral = statistical["gust"], *statistical["block"][:2]
-    noise = np.array(
-        [
-            lateral["R_y"][0],
-            pitch["R_y"][0],
-            lateral["R_y"][1],
-        ]
-    )
-    bound = np.abs(m) @ statistical["noise"]["eta"]
-    gusts = air["output"]["rate_damping"] @ air["output"]["C"]
-    walk = gusts @ np.diag(air["memory"]["Q"]) @ gusts.T
-    if air["memory"]["turns_fast"]:
-        turned = air["output"]["rate_damping"] @ air["memory"]["C_dot"]
-        longest_s = air["config"]["L_roll"] / V
-        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["Q"]) @ turned.T
-    moves = float(air["output"]["gusty"])
-    size = max(bound, MIN_ETA_RAD_S2)
-    drift = statistical["noise"]["q"] * size**2 + moves * V * m @ walk @ m
-    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["Q"])) ** 2
-    return (
-        m**2 @ noise,
-        jitter,
-        bound,
-        drift,
-        moves * m @ air["output"]["var_turn"] @ m,
-    )
-
-
-@pytest.mark.parametrize(
-    ("changes", "swings"),
-    [({}, 0), ({}, 1), ({"gusty": 0}, 1)],
-)
-@pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
-def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
-    statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
-    (
-        view["direction"][:3],
-        statistical["gust"]["memory"]["turns_fast"],
-        view["block"]["P_dd"][0, 0],
-    ) = (
-        mix,
-        swings,
-        0.7,
-    )
-    for name, value in changes.items():
-        holder(statistical["gust"], name)[name] = value
-    Across.blur(view, statistical, V)
-    noise, jitter, bound, drift, leap = declared_along(statistical, np.array(mix))
-    block = view["block"]
-    assert block["R_y"][0] == pytest.approx(noise)
-    assert block["Q_x"][0] == pytest.approx(jitter)
-    assert view["eta"][0] == pytest.approx(bound)
-    assert block["Q_d"][0, 0] == pytest.approx(drift)
-    assert block["P_dd"][0, 0] == pytest.approx(0.7 + leap)
 
 
 @pytest.mark.parametrize(("size", "has_eG"), [(2.0, 1), (2.0, 0), (0.3, 1)])

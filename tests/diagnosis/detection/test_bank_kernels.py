@@ -83,29 +83,3 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     assert explained(-1e-9)
     assert not explained(1e-9)
     assert explained(1e-9, ignored_axes=True)
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_across_its_direction_a_shared_parameter_confines_it_too(side):
-    fdi, fie = reach_of(0.0, 0.0, 0.0)
-    fie["reach_lo"][:, :3], fie["reach_hi"][:, :3] = -9.0, 9.0
-    fie["reach_lo"][:, 3], fie["reach_hi"][:, 3] = -0.2, 0.3
-    fdi["bank"]["output"]["threshold"][:3] = 0.1
-    limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
-    for beyond, within in ((-1e-9, True), (1e-9, False)):
-        fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie[
-            "parity_direction"
-        ]  # a unit vector
-        assert bool(on(filters.is_reachable, fdi, fie, True)) == within
-        assert on(filters.is_reachable, fdi, fie, False)
-
-
-@pytest.mark.parametrize("size", [9.0, 0.3])
-def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
-    fdi, G = new_fdi(), np.zeros((3, 4))
-    fie = estimator(fdi)
-    G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(filters.set_directions, fdi, G)
-    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(filters.set_directions, fdi, np.zeros((3, 4)))
-    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import holder, new_fdi
+from kernels import new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.detection.parity import (
     configure_parity_views,
     configure_tones,
 )
-from beaver_ftc.diagnosis.state import NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.diagnosis.state import NORMAL_FORCE, SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -177,39 +177,6 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
-def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
-    """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
-    sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)
-    for q_ratio in (1.0, 2.0):
-        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, q_ratio, 1.0)
-        record, drawn = fdi["statistical"]["forces"], []
-        for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
-            update_both_forces(
-                record, fdi["statistical"]["gust"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT
-            )
-            drawn.append(record["component"]["innovation"].copy())
-        for inertial in range(2):
-            jitter = record["component"]["var"][:, inertial]
-            assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
-    more = record["component"]["Q_e"] - felt()["statistical"]["forces"]["component"]["Q_e"]
-    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_INDEX, NORMAL_INDEX)]
-    assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
-
-
-def test_constant_errors_are_tolerated_term_by_term():
-    given = Bounds(coefficients=0.05, sensors={"alpha": {"bias_deg": 0.5}, "qdyn": {"bias_pa": 23.0}})
-    force = felt(given)["statistical"]["forces"]["component"][NORMAL_INDEX]
-    terms = forces.terms_of_force(AIRCRAFT, NORMAL_INDEX)
-    shares = force["tol"][: len(terms)] / np.abs([t.value for t in terms])
-    assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
-    slope = abs(force["vane"][1]) / per_coefficient()
-    of_constant = 0.07 * abs(terms[0].value) + np.radians(0.5) * slope
-    assert terms[0].is_constant
-    assert force["tol"][0] == pytest.approx(of_constant)
-    assert force["tol"][len(terms)] == forces.MASS_TOLERANCE
-    assert force["n_Z"] == len(terms) + 1
-
-
 def test_in_turbulence_gusts_turn_the_flow():
     """By a walk of 3 sigma^2 / (L V) [MIL-F-8785C, 3.7], against a draw of Dryden's vertical gust."""
     still, moving = (
@@ -261,136 +228,6 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
         assert Across.changes_view(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (
             second == NORMAL_FORCE
         )
-
-
-def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
-    """Of roll, yaw and side force: neither the vane's error nor a rolling gust moves what is looked at, and
-    what errors of the vane's column let show is the most that its corners do."""
-    statistical, rng = viewed["statistical"], np.random.default_rng(3)
-    statistical["gust"]["output"]["gusty"] = 1
-    configure_parity_views(statistical, AIRCRAFT)
-    view, moving = statistical["views"][BETA_VIEW], statistical["gust"]
-    moving = moving["output"]
-    moving["rate_damping"], moving["C"] = (
-        rng.normal(size=(3, 3)),
-        np.linalg.qr(rng.normal(size=(3, 3)))[0],
-    )
-    force = statistical["forces"]["component"][SIDE_INDEX]
-    column = np.array([force["vane_roll"], *force["vane"]])
-    share = Across.turn(viewed, view, np.zeros((3, 4)))
-    mix = view["direction"][[ROLL, YAW, SIDE_FORCE]]
-    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
-    assert mix @ column == pytest.approx(0.0, abs=1e-12)
-    gust = (moving["rate_damping"] @ moving["C"])[:, 0]
-    assert view["direction"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
-    assert view["direction"][PITCH] == view["direction"][NORMAL_FORCE] == 0.0
-    assert view["col"][[ROLL, YAW, SIDE_FORCE]] == pytest.approx(column / np.linalg.norm(column))
-    corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
-    assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
-    n = int(view["block"]["n_Z"])
-    Across.regress(viewed, view, np.zeros(3), share)
-    view["confirmer"] = 0
-    Across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
-    seen = np.array([0.4, -0.3, force["innovation"]])
-    assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
-        share * seen @ column / np.linalg.norm(column)
-    )
-
-
-def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
-    views = viewed["statistical"]["views"]
-    viewed["statistical"]["test"]["margin"] = 18.0
-    for v, mix, alarms in (
-        (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), True), (FLAP_VIEW, (0.0, 0.95, 0.0, 0.0, 0.3), False),
-        (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
-        (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
-    ):  # fmt: skip
-        views["direction"][v], views["peak"][:] = mix, 9.0
-        assert (Across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
-
-
-def test_what_clears_a_vane_excludes_nobody(viewed):
-    statistical = viewed["statistical"]
-    views = statistical["views"]
-    for v in (ALPHA_VIEW, UP_VIEW):
-        views["peak"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
-    assert not any(Across.excludes(viewed, s) for s in range(4))
-
-
-def test_a_loss_signs_with_the_force_it_takes(viewed):
-    view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
-    view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
-    Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][NORMAL_INDEX]["Gu"][ELEVATOR]
-    assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
-        [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
-    )
-
-
-@pytest.mark.parametrize("v", [ELEVATOR_VIEW, UP_VIEW, RUDDER_VIEW])
-def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
-    statistical, rng = viewed["statistical"], np.random.default_rng(6)
-    (
-        statistical["noise"]["Q"],
-        statistical["noise"]["eta"],
-        statistical["noise"]["q"],
-    ) = (
-        (1e-6, 4e-6, 9e-6),
-        0.02,
-        2.0,
-    )
-    air, view, component = statistical["gust"], statistical["views"][v], statistical["forces"]["component"]
-    air["output"]["gusty"], air["output"]["rate_damping"], air["output"]["C"] = (
-        1,
-        rng.normal(size=(3, 3)),
-        np.eye(3),
-    )
-    air["memory"]["Q"] = 1e-5, 2e-5, 3e-5
-    component["var"], component["eta_u"] = (
-        ((2e-6, 1e-7), (3e-5, 2e-5)),
-        (0.001, 0.002),
-    )
-    component["Q_e"], statistical["forces"]["q_ratio"] = (
-        (1e-4, 2e-4),
-        1.2,
-    )
-    for name in (
-        "gusty",
-        "rate_damping",
-        "C",
-        "Q",
-    ):
-        holder(statistical["vaneless"], name)[name] = holder(air, name)[name]
-    (
-        air["memory"]["share"],
-        statistical["vaneless"]["memory"]["share"],
-    ) = (
-        (1.0, 0.25, 0.09),
-        (1.0, 0.36, 0.16),
-    )
-    seen = statistical["vaneless" if view["vane_free"] else "gust"]["memory"]["share"]
-    Across.turn(viewed, view, rng.normal(size=(3, 4)))
-    Across.blur(view, statistical, 45.0)
-    m, block = view["direction"], view["block"]
-    rate_gust_sensitivity, force_gust_sensitivity = (
-        np.abs(m[:3] @ air["output"]["rate_damping"]),
-        1.2 * np.abs(m[3:] @ component["L"]),
-    )
-    gusts = 45.0 * np.sum(
-        (np.sqrt(seen) * rate_gust_sensitivity + force_gust_sensitivity) ** 2 * air["memory"]["Q"]
-    )
-    sizes = np.sqrt(
-        [
-            *statistical["noise"]["Q"],
-            *component["var"][:, int(view["by_inertia"])],
-        ]
-    )
-    assert block["Q_x"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
-    bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
-    assert view["eta"][0] == pytest.approx(bound)
-    of_forces = m[3:] ** 2 @ component["Q_e"]
-    drift_intensity = 1.2**2 * view["by_inertia"] * of_forces
-    assert block["Q_d"][0, 0] == pytest.approx(gusts + drift_intensity + 2.0 * max(bound, 1e-3) ** 2)
 
 
 def test_without_vanes_the_flow_is_what_the_forces_say():

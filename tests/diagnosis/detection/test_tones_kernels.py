@@ -7,16 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import DT, new_fdi
-from statistics_of import Across
 
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
     TONE_MEMORY_S,
     TONES_RAD_S,
-    VANE_VIEW,
 )
-from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 EVERY = 2  # sums of 0.04 s at DT
@@ -136,50 +132,3 @@ def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequen
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation
     assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
-
-
-@pytest.mark.parametrize(
-    ("surface", "plane", "mix", "inertial", "expected"),
-    [
-        (AXIS_VIEW, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
-        (AXIS_VIEW, (YAW, SIDE_FORCE), {SIDE_FORCE: 1.0}, 1, 0.0),
-        (0, (0, SIDE_FORCE), {SIDE_FORCE: -0.95, 0: 0.3}, 0, 9.0),
-        (0, (0, SIDE_FORCE), {SIDE_FORCE: 0.85, 0: 0.5}, 0, 0.0),
-        (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (VANE_VIEW, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
-    ],
-)
-def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
-    statistical = new_fdi()["statistical"]
-    (
-        statistical["test"]["alarm_level"],
-        statistical["test"]["margin"],
-        statistical["n_views"],
-    ) = (
-        5.0,
-        12.5,
-        2,
-    )
-    statistical["gust"]["output"]["uses_accelerometers"] = statistical["forces"]["in_use"] = 1
-    view, clearing = statistical["views"][:2]
-    clearing["vane_free"], clearing["plane_pair"], clearing["peak"] = (
-        1,
-        (YAW, SIDE_FORCE),
-        50.0,
-    )
-    view["confirmer"], view["peak"] = SIDE_FORCE, 9.0
-    (
-        view["nulled"],
-        view["plane_pair"],
-        view["by_inertia"],
-        view["tones"]["score"],
-    ) = (
-        surface,
-        plane,
-        inertial,
-        4.0,
-    )
-    view["block"]["n_h"], view["block"]["hypothesis"]["score"] = 1, 9.0
-    for i, share in mix.items():
-        view["direction"][i] = share
-    assert Across.alarm(statistical, view) == expected

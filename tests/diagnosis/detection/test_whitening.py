@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from innovations import PlainKalman, block_of, drawn, filter_all
+from innovations import PlainKalman, block_of, filter_all
 from scipy.linalg import solve_discrete_are
 
 from samples import samples
@@ -66,20 +66,6 @@ def test_after_a_million_frames_it_is_where_the_riccati_equation_says(case, rate
     assert np.linalg.inv(parts["S_inv"]) == pytest.approx(P[:n, :n] + plain.R, rel=1e-6)
     K = P @ plain.H.T @ np.linalg.inv(P[:n, :n] + plain.R)
     assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(K, rel=1e-5, abs=1e-9)
-
-
-@pytest.mark.parametrize("jitter", [0.0, 0.5])
-@pytest.mark.parametrize("case", CASES)
-def test_innovations_of_the_model_come_out_white_and_of_the_covariance_said(case, jitter):
-    drift, noise, keep = CASES[case]
-    block, dt, frames = block_of(drift, noise, jitter, keep=keep), 0.01, 200_000
-    white = _whitened(block, drawn(block, frames, dt, np.random.default_rng(5), start=1.0), dt)[1000:]
-    n = len(drift)
-    unit = white @ np.linalg.cholesky(block["S_inv"][:n, :n])
-    assert unit.T @ unit / len(unit) == pytest.approx(np.eye(n), abs=5 * np.sqrt(2 / frames))
-    for lag in (1, 2, 5, 20, 100, 500):
-        across = unit[lag:].T @ unit[:-lag] / len(unit)
-        assert across == pytest.approx(np.zeros((n, n)), abs=5 / np.sqrt(frames))
 
 
 @pytest.mark.parametrize("case", WALKS)

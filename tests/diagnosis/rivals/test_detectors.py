@@ -176,18 +176,3 @@ def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():
     assert pair._model.weights[:2] == pytest.approx([1.6, -0.7], abs=0.02)
     assert max(scores[1500:2497]) < 8.0
     assert max(scores[2497:2510]) > 20.0
-
-
-def test_the_multiple_models_alarm_by_the_odds_of_any_fault():
-    """Beside evens the statistic is zero; odds of e^alarm are one, and no alarm yet."""
-    models = plugin_class(DETECTORS, "multiple-models")()
-    models.reset(context(alarm=2.0))
-    assert models.mode_probabilities.sum() == pytest.approx(1.0, abs=1e-14)
-    assert models.mode_probabilities[0] <= 1.0
-    for odds, statistic in ((1.0, 0.0), (np.exp(1.0), 0.5), (np.exp(-2.0), -1.0)):
-        models.mode_probabilities[:] = odds / (1.0 + odds) / (len(models.mode_probabilities) - 1)
-        models.mode_probabilities[0] = 1.0 / (1.0 + odds)
-        assert models.latch_alarm_and_decide_verdict().statistic == pytest.approx(statistic)
-        assert not models.latch_alarm_and_decide_verdict().detected
-    models.mode_probabilities[0] = 1.0 / (1.0 + np.exp(2.1))
-    assert models.latch_alarm_and_decide_verdict().detected

@@ -9,7 +9,6 @@ from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.rivals.effectiveness import (
     AugmentedEkf,
-    EffectivenessFilter,
 )
 from beaver_ftc.diagnosis.rivals.observer import healthy_residual_std
 
@@ -28,62 +27,6 @@ def context(declared=None, **options):
     return Context(DT, 1, None, np.zeros(3), np.zeros(5), np.zeros(4), travel, BOUND, np.zeros(3),
                    options=options, declared=declared or Declared(), surfaces=SURFACES,
                    leading=LEADING)  # fmt: skip
-
-
-def seen(x=(0.0, 0.0, 0.0), t_s=9.0, eta_bar=BOUND):
-    return Measured(t_s, np.array(x), np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.array(eta_bar))
-
-
-class Plain(EffectivenessFilter):
-    """A filter that predicts what it has."""
-
-    name = "plain"
-
-    def propagate(self, measured):
-        pass
-
-    def update_statistic(self, square):
-        return square / 10.0
-
-
-def started(declared=None, **options):
-    detector = Plain()
-    detector.reset(context(declared, **options))
-    return detector
-
-
-def named(theta, variance=(0.01, 0.01, 0.01), square=3.0, statistic=2.0, **options):
-    detector = started(**{"misfit": 3.0, **options})
-    detector.z[3:6], detector.mean_normalised_innovation_square = theta, square
-    detector.P[range(3, 6), range(3, 6)] = variance
-    return detector, detector.latch_alarm_and_decide_verdict(seen(), statistic)
-
-
-def test_the_surface_most_significantly_off_is_named():
-    detector, verdict = named((-0.2, -0.5, -0.3), (0.01, 0.25, 0.01))
-    assert detector.wald_statistics() == pytest.approx([4.0, 1.0, 9.0])
-    assert (verdict.axis, verdict.isolated, verdict.type) == ("r", "rudder", "loss_of_effectiveness")
-    assert verdict.estimate == pytest.approx(-0.3)
-    assert verdict.effectiveness == pytest.approx([1.0, 0.7, 0.8, 0.5])
-    assert verdict.statistic == 2.0
-    quiet = named((-0.2, -0.5, -0.3), statistic=1.0)[1]
-    assert (quiet.detected, quiet.isolated, quiet.statistic) == (False, None, 1.0)
-    again = detector.latch_alarm_and_decide_verdict(seen(), 0.5)
-    assert (again.detected, again.isolated) == (True, "rudder"), "an alarm is latched"
-
-
-@pytest.mark.parametrize(
-    ("theta", "square", "isolated"),
-    [
-        ((-0.5, 0.0, 0.0), 9.0, "aileron"), ((-0.5, 0.0, 0.0), 9.1, "unanticipated"),
-        ((0.5, -0.1, 0.0), 3.0, "unanticipated"), ((0.1, -0.5, 0.2), 3.0, "elevator"),
-    ],
-)  # fmt: skip
-def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, square, isolated):
-    verdict = named(theta, square=square)[1]
-    assert verdict.isolated == isolated
-    if isolated == "elevator":
-        assert verdict.effectiveness == pytest.approx([1.0, 1.0, 1.0, 0.5]), "nothing has gained"
 
 
 class Curved:

@@ -2,8 +2,6 @@
 
 from itertools import groupby
 
-import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi
@@ -14,9 +12,6 @@ from beaver_ftc.diagnosis.conclusion import (
     TYPES_REFUTED,
     reset_conclusion,
     update_interval,
-)
-from beaver_ftc.diagnosis.schemes import (
-    record_isolated_surfaces,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 
@@ -80,33 +75,3 @@ def test_every_spell_of_a_type_is_kept_unless_the_name_ends_with_it(frames):
     names = conclusion["gone"][: min(len(of_names), MAX_WITHDRAWN)][:-1]
     assert [(n["to_s"], n["fault_type"]) for n in names] == of_names[: len(names)]
     assert all(one["reason"] == TYPES_REFUTED + one["to_s"] % 2 for one in (*kept, *names))
-
-
-@pytest.mark.parametrize(
-    ("pair", "alarmed", "beside", "named"),
-    [(0, 0, 0, [ELEVATOR]), (1, 0, 0, [AILERON, RUDDER]), (1, 1, 0, []), (1, 1, 1, [AILERON, RUDDER])],
-)
-def test_which_surfaces_are_named(pair, alarmed, beside, named):
-    """The one isolated, those of a pair, and none where an instrument has been found instead."""
-    fdi = nameless()
-    (
-        fdi["verdict"]["isolated_estimator"],
-        fdi["types"]["surface"]["status"]["is_isolated"][[AILERON, RUDDER]],
-    ) = (
-        ELEVATOR,
-        1,
-    )
-    fdi["types"]["pair"]["enabled"] = pair
-    (
-        fdi["sensor_monitor"]["config"]["enabled"],
-        fdi["sensor_monitor"]["output"]["alarmed"],
-        fdi["sensor_monitor"]["output"]["keeps_surface"],
-    ) = (
-        1,
-        alarmed,
-        beside,
-    )
-    record_isolated_surfaces(fdi, 2.5)
-    since = np.full(4, -1.0)
-    since[named] = 2.5
-    assert fdi["verdict"]["from_s"].tolist() == since.tolist()

@@ -46,18 +46,6 @@ def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, defle
         assert np.linalg.norm(new.memory.basis[i]) == pytest.approx(1.0)
 
 
-@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0.1, 3.0))
-def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
-    new = at(network(gain=50.0, limit=limit), alpha=0.2)
-    weights = np.linspace(-limit, limit, new.memory.weights.size).reshape(new.memory.weights.shape)
-    new.memory.weights[:] = weights
-    published_scheme.train_state_network(new, np.array(signal), 0.02)
-    expected = weights + 0.02 * 50.0 * new.memory.basis * np.array(signal)[:, None]
-    np.testing.assert_allclose(new.memory.weights, np.clip(expected, -limit, limit))
-    at(new, alpha=0.2)
-    np.testing.assert_allclose(new.output, (new.memory.weights * new.memory.basis).sum(axis=1), atol=1e-12)
-
-
 @given(
     st.floats(-1.0, 0.0),
     st.floats(0.0, 5000.0),

@@ -94,20 +94,6 @@ def several(named=(), alarmed=(0, 0), left=None):
     return verdict.fault_finding_dict(fdi, SURFACES)
 
 
-def test_each_of_several_faults_has_instants_of_its_own():
-    """When it was named, and when its type; none of a type that is open."""
-    fdi = new(pairs=1)
-    surface = fdi["types"]["surface"]
-    for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
-        surface["status"]["is_isolated"][s], surface["status"]["isolated_at_s"][s] = 1, named_at_s
-        surface["status"]["fault_type"][s], surface["status"]["typed_at_s"][s] = kind, type_at_s
-    apart(instants=[9.0, 11.5, 7.0])
-    elevator, rudder = verdict.fault_finding_dict(fdi, SURFACES)["faults"]
-    keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
-    assert [elevator[key] for key in keys] == ["elevator", 7.0, None, None]
-    assert [rudder[key] for key in keys] == ["rudder", 9.0, "stuck", 11.5]
-
-
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])
 def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     """Of records in which every number is another: sets as they are, of a loss as theta, 1 of it less."""

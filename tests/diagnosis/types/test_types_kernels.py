@@ -91,18 +91,6 @@ def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, comm
         ) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
-def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
-    """A loss does, where neutral is out of reach."""
-    fdi, surface = new_surface(low=low, high=high, command=0.2, stop_lo=0.1)
-    for kind, judge in (
-        (BIAS, commanded_surface.bias_of_frame),
-        (GROWING_BIAS, commanded_surface.update_growing),
-    ):
-        judged(judge, fdi, surface, kind, 5)
-        assert surface["sets"]["excluded"][kind]
-
-
 @pytest.mark.parametrize(
     ("offsets", "excluded"),
     [
@@ -278,43 +266,6 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
         assert surface["sets"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate_parameter(fdi, 0, kind) == pytest.approx(0.175)
-
-
-@pytest.mark.parametrize(
-    ("whole", "hides", "excluded"),
-    [(1, (0, 0), 1), (0, (0, 0), 1), (1, (0, 1), 1), (0, (0, 1), 0), (0, (1, 0), 1)],
-)
-def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
-    fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    (
-        fdi["types"]["config"]["single_instant"],
-        surface["judged"]["hides"],
-    ) = (
-        whole,
-        hides,
-    )
-    for frame in range(30):
-        judged(
-            commanded_surface.update_swing,
-            fdi,
-            surface,
-            OSCILLATORY,
-            frame,
-        )
-    assert surface["sets"]["excluded"][OSCILLATORY] == excluded
-
-
-@pytest.mark.parametrize(("least", "greatest", "hides"), [
-    (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
-])  # fmt: skip
-def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
-    _, surface = new_surface()
-    surface["commands"]["u_min"][0], surface["commands"]["u_max"][0] = (
-        least,
-        greatest,
-    )
-    types.mark_stops(surface, 0.0999)
-    assert surface["last"]["hides"].tolist() == hides
 
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):

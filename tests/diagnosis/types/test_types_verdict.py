@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, YAW
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
@@ -224,83 +224,6 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
     assert verdict.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
-@pytest.mark.parametrize(
-    ("flap", "evidence", "has_eG", "not_at_position"),
-    [
-        ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
-        ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
-        ((VARYING_LOSS,), 2 * PATIENCE - 1, 0, False), ((VARYING_LOSS,), 2 * PATIENCE, 0, True),
-        ((GROWING_BIAS,), 99, 0, False), ((SLOW,), 99, 1, False), ((), PATIENCE, 1, True),
-        (None, PATIENCE, 0, True),
-    ],
-)  # fmt: skip
-def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, has_eG, not_at_position):
-    fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
-    (
-        fdi["types"]["surface"]["evidence"]["n_anomalous"][ELEVATOR],
-        fdi["types"]["config"]["has_eG"],
-    ) = (
-        evidence,
-        has_eG,
-    )
-    fdi["types"]["surface"]["evidence"]["n_unhidden"][FLAP] = evidence
-    assert bool(on(verdict.others_dismissed, fdi, ELEVATOR)) == not_at_position
-    if flap is not None:
-        assert on(verdict.find_surface, fdi) == (ELEVATOR if not_at_position else NOT_ISOLATED)
-    fdi["types"]["surface"]["status"]["may_be_sole"][FLAP] = 0
-    assert bool(on(verdict.others_dismissed, fdi, ELEVATOR)) == (evidence >= PATIENCE)
-
-
-def take_lead(fdi, kernel, *given):
-    """Keep a lead where the conclusion has it."""
-    fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"] = on(kernel, fdi, *given)
-
-
-def _open(fdi):
-    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
-    return fdi
-
-
-def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
-    fdi = _open(new_case(rudder=(STUCK,), **NOBODY_ELSE))
-    surface = fdi["types"]["surface"][RUDDER]
-    (
-        surface["sets"]["low"][STUCK],
-        surface["sets"]["high"][STUCK],
-        surface["last"]["u"],
-    ) = (
-        0.1,
-        0.2,
-        0.3,
-    )
-    surface["last"]["lo"], surface["last"]["hi"] = 0.1, 0.2
-    fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.decide_mode, fdi["verdict"]["isolated_estimator"])
-    assert (fdi["verdict"]["target"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
-    assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
-    surface["last"]["lo"], surface["last"]["hi"] = (
-        0.25,
-        0.35,
-    )  # it follows its command again
-    fdi["types"]["config"]["dt"] = 0.01
-    for _ in range(19):
-        take_lead(fdi, verdict.decide_mode, fdi["verdict"]["isolated_estimator"])
-    assert fdi["verdict"]["target"] == RUDDER
-    take_lead(fdi, verdict.decide_mode, fdi["verdict"]["isolated_estimator"])
-    assert fdi["verdict"]["target"] == NO_SURFACE
-    assert surface["accommodation"]["mode"] == -1
-    surface["last"]["lo"] = 0.1
-    take_lead(fdi, verdict.decide_mode, fdi["verdict"]["isolated_estimator"])
-    assert (
-        surface["accommodation"]["n_silent"],
-        fdi["verdict"]["target"],
-    ) == (
-        0,
-        RUDDER,
-    )
-    assert on(verdict.fault_shows, fdi, surface, SCALE_COMMAND, True)
-
-
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
     fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_silent=0)
@@ -329,38 +252,6 @@ def test_how_far_a_surface_is_off(kinds, at_fault, off):
 
 
 # Examining frames.
-
-
-@pytest.mark.parametrize(
-    ("whole", "anomalous", "judged"),
-    [
-        (0, (0, 1, 1), False), (0, (1, 1, 1), True), (0, (1, 1, 0), False), (0, (1, 0, 1), False),
-        (1, (0, 1, 1), True), (1, (1, 1, 1), True), (1, (1, 1, 0), True), (1, (1, 0, 1), False),
-    ],
-)  # fmt: skip
-def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(
-    whole, anomalous, judged
-):
-    fdi = new_case()
-    fdi["types"]["config"]["single_instant"], fdi["types"]["frame_index"] = whole, 7
-    surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface(surface)
-    surface["evidence"]["n_anomalous"], surface["accommodation"]["mode"] = 5, -1
-    (
-        surface["earlier"]["anomalous"],
-        surface["judged"]["anomalous"],
-        surface["last"]["anomalous"],
-    ) = anomalous
-    surface["judged"]["lo"], surface["judged"]["hi"] = 0.1, 0.2
-    on(registry.judge_frame, fdi)
-    assert surface["evidence"]["n_anomalous"] == (6 if judged else 5)
-    assert surface["evidence"]["k_first"] == (6 if judged else -1)
-    assert (
-        surface["evidence"]["first_lo"],
-        surface["evidence"]["first_hi"],
-    ) == ((0.1, 0.2) if judged else (0.0, 0.0))
-    assert fdi["types"]["frame_index"] == 8
-    assert surface["oscillatory"]["since"] == (6 if judged else 7)
 
 
 def n_rest(low=0.1, high=0.2, frames=1, **fields):

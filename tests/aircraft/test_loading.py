@@ -1,7 +1,6 @@
 """From what a scenario calls its aircraft to the aircraft, and what is said where there is none."""
 
 import shutil
-from types import SimpleNamespace
 
 import pytest
 
@@ -80,23 +79,3 @@ def test_a_file_of_nothing_or_too_much(beside, text):
         BadInput, match=r"is empty, allowed: a mapping with the keys of an aircraft|is too large"
     ):
         read(beside / "trainer")
-
-
-def test_what_a_surface_does_is_the_sum_of_its_terms_at_the_usual_signals():
-    """p: span / Ix, q: chord / Iy, r: span / Iz; each signal of a term to its power."""
-
-    def term(coefficient, surface, value, *of):
-        return SimpleNamespace(coefficient=coefficient, surface=surface, value=value, of=of)
-
-    its = SimpleNamespace(
-        mass=SimpleNamespace(Ix_kg_m2=2.0, Iy_kg_m2=5.0, Iz_kg_m2=7.0),
-        geometry=SimpleNamespace(span_m=3.0, chord_m=1.1), surfaces=("tab", "flap"),
-        usual_signals={"alpha": 0.2, "dpt": 3.0},
-        moments=[
-            term("Cl", "tab", 0.5, ("alpha", 2)), term("Cl", "tab", 0.3), term("Cn", "tab", 0.7, ("dpt", 1)),
-            term("Cm", "flap", -2.0, ("alpha", 1), ("dpt", 2)), term("Cm", None, 4.0, ("alpha", 1)),
-        ],
-    )  # fmt: skip
-    effect = aircraft.Aircraft.effect.func(its)
-    assert effect["tab"] == pytest.approx([(0.5 * 0.04 + 0.3) * 3.0 / 2.0, 0.0, 2.1 * 3.0 / 7.0])
-    assert effect["flap"] == pytest.approx([0.0, -2.0 * 0.2 * 9.0 * 1.1 / 5.0, 0.0])

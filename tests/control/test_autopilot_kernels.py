@@ -5,10 +5,9 @@ import pytest
 
 import law_records
 from beaver_ftc.control import autopilot as loops
-from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
+from beaver_ftc.control.autopilot import AUTOPILOT, SPEED
 from beaver_ftc.control.engines import follow_autopilot
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
-from beaver_ftc.diagnosis.state import PITCH, YAW
 from law_records import put
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
@@ -19,7 +18,6 @@ GAINS = {
     "jammed_s": 1.5, "authority_s": 1.2, "bank_s": 6.0, "spare_mps": 2.0, "path_per_mps": 0.02, "loose": 0.4,
     "protection": 2.0,
 }  # fmt: skip
-MEASURED = np.dtype([("y", "f8", (8,)), ("attitude", "f8", (3,)), ("altitude", "f8")], align=True)
 
 
 def record(dtype):
@@ -54,11 +52,6 @@ def new_control(**fields):
     return put(control, **fields)
 
 
-def limit(pilot, control):
-    axes, by_engines = control["axes"], np.zeros((2, 3))
-    loops.limit_rates_and_bank(pilot, control["layout"], axes["G"], axes["hold"], by_engines)
-
-
 def full_power(pilot, control, y):
     left, at_stop = (
         control["surfaces"]["output"]["effectiveness"],
@@ -71,27 +64,6 @@ def new_y(alpha=0.1, beta=0.03, airspeed=46.0, dpt=0.4):
     y = np.zeros(8)
     y[[ALPHA, BETA, AIRSPEED, QDYN, DPT]] = alpha, beta, airspeed, 0.55 * airspeed**2, dpt
     return y
-
-
-def seen(attitude=(0.0, 0.0, 0.0), altitude=1000.0, **air):
-    measured = record(MEASURED)
-    measured["y"], measured["attitude"], measured["altitude"] = new_y(**air), attitude, altitude
-    return measured
-
-
-def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
-    pilot, control = new_autopilot(roll_loss_share=jammed, yaw_loss_share=loose), new_control(hold=hold)
-    control["axes"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
-    control["layout"]["low"], control["layout"]["high"] = -0.5, (1.0, 0.5, 2.0, 0.0)
-    limit(pilot, control)
-    return pilot
-
-
-def test_rates_are_what_the_smaller_spare_acceleration_gives():
-    pilot = limited(hold=(0.01, 0.06, -0.03))
-    # -0.05..0.1, -0.1..0.1, -0.025..0.1 rad/s2, less what holding takes; roll: 1.2 s of 0.06 is below 0.2
-    assert pilot["rate_limit"] == pytest.approx([1.2 * 0.06, 1.2 * 0.04, 0.0])
-    assert pilot["bank_limit"] == pytest.approx(6.0 * 1.2 * 0.06)
 
 
 def test_thrust_per_inhg_is_the_slope_of_the_thrust():
@@ -130,51 +102,6 @@ def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
     assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
 
 
-@pytest.mark.parametrize("error", [-2.0, 0.5, 3.0])
-def test_a_path_closes_a_height_and_integrates_what_is_missing(error):
-    pilot = new_autopilot(ALTITUDE, missing_path_angle=0.004)
-    pilot["command"][ALTITUDE], pilot["command_rate"][ALTITUDE] = 1000.0 + error, 0.3
-    path = loops.path_angle_to_fly(pilot, seen(), PUSH)
-    assert path == pytest.approx((0.3 + 0.7 * error) / V + 0.004)
-    assert pilot["missing_path_angle"] == pytest.approx(0.004 + DT * 0.04 * error / V)
-
-
-def test_the_pitch_attitude_is_path_and_incidence_in_the_bank():
-    pilot, attitude = new_autopilot(ALTITUDE), np.array([0.4, 0.1, 0.0])
-    wanted = 3.0 * (0.02 + ALPHA_NOW * np.cos(0.4) - 0.1)
-    assert loops.pitch_attitude_rate(pilot, new_y(), attitude, 0.02) == pytest.approx(wanted)
-    pilot["rate_limit"] = 0.001
-    assert loops.pitch_attitude_rate(pilot, new_y(), attitude, 0.02) == pytest.approx(-0.001)
-    pilot["rate_limit"] = 10.0
-    assert loops.pitch_attitude_rate(pilot, new_y(alpha=0.25), attitude, 0.9) == pytest.approx(2.0 * 0.01)
-    assert loops.pitch_attitude_rate(new_autopilot(), new_y(), attitude, 0.02) == 0.0
-
-
-# Engines that alone yaw and roll get a quarter of the gain: 1 - 0.75 x 0.5 x 0.8 with half of the ailerons.
-BY_ENGINES = pytest.mark.parametrize(
-    ("jammed", "alone", "gain"), [(0.5, 0.0, 1.0), (0.0, 0.8, 1.0), (0.5, 0.8, 0.7)]
-)
-
-
-@BY_ENGINES
-def test_a_heading_is_flown_by_a_bank(jammed, alone, gain):
-    pilot = new_autopilot(HEADING, missing_turn_rate=0.5, max_healthy_bank=2.0, bank_limit=2.0)
-    pilot["roll_loss_share"], pilot["engines_alone_yaw_share"] = jammed, alone
-    pilot["command"][HEADING], pilot["command_rate"][HEADING] = 3.1, 0.01
-    rate = loops.bank_angle_rate(pilot, np.array([0.02, 0.0, -3.1]))
-    error = -(2 * np.pi - 6.2)
-    assert rate == pytest.approx(1.1 * gain * (V / G * (0.25 * gain * error + 0.01) - 0.02))
-    assert pilot["missing_turn_rate"] == 0.0
-
-
-def test_upside_down_the_turn_stays_finite():
-    pilot = new_autopilot(BANK)
-    loops.set_body_rates(pilot, new_y(beta=0.0), np.array([1.55, 0.0, 0.0]), 0.0, 0.0)
-    turning = G / V * np.sin(1.55) / 0.1
-    assert pilot["rates"][PITCH] == pytest.approx(turning * np.sin(1.55))
-    assert pilot["rates"][YAW] == pytest.approx(turning * np.cos(1.55))
-
-
 def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     pilot, control = (
         new_autopilot(SPEED, **{"recent_airspeed_mps": 43.0, "missing_acceleration": 0.05, **fields}),
@@ -195,16 +122,6 @@ def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     loops.set_power(pilot, engine, new_y(dpt=0.2) if y is None else y, path, PUSH)
     follow_autopilot(engine, pilot["power_setting"], pilot["power_airspeed"])
     return pilot, power
-
-
-def test_power_holds_the_airspeed_and_carries_the_climb():
-    pilot, power = throttled()
-    wanted = 20.0 + (0.04 + 0.05 + 0.3 * 1.0 + G * (0.03 - 0.01)) / PUSH
-    assert power["base"] == pytest.approx(wanted)
-    assert power["in_use"] == 1
-    assert pilot["missing_acceleration"] == pytest.approx(0.05 + DT * 0.015 * 1.0)
-    assert pilot["recent_airspeed_mps"] == pytest.approx(43.0 + DT / 20.0 * 1.0)
-    assert power["command"][0] == 21.5  # half an inHg a frame
 
 
 @pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])

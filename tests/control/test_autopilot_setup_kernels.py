@@ -1,7 +1,6 @@
 """What the autopilot takes from the aircraft's file: each number as the balance it stands for."""
 
 from math import inf, radians
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from scipy.optimize import root
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import autopilot as profile
-from beaver_ftc.control.autopilot import AUTOPILOT, GAIN, N_FLAP, N_QDYN
+from beaver_ftc.control.autopilot import AUTOPILOT, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -40,12 +39,6 @@ def filled():
     return set_up()
 
 
-def coefficient(name, **of):
-    """A coefficient of the aircraft's file where only these signals are not zero."""
-    neutral = {factor: 0.0 for term in AIRCRAFT.terms.values() for factor in term.factors}
-    return AIRCRAFT.coefficient(name, neutral | of)
-
-
 @pytest.mark.parametrize(
     ("loop", "rate", "damping"),
     [("altitude", 0.8, 2.0), ("speed", 0.3, 1.224745), ("bank", 1.0, 1.118034), ("heading", 0.25, 1.976424)],
@@ -55,56 +48,6 @@ def test_a_loop_that_integrates_what_is_missing_does_not_overshoot_by_it(filled,
     gain = filled[0]["gain"]
     assert gain[loop] == rate
     assert gain[loop] / (2.0 * np.sqrt(gain[f"{loop}_i"])) == pytest.approx(damping, rel=1e-6)
-
-
-@pytest.mark.parametrize(("by", "slower"), [("power", 1.5), ("pitch", 1.0)])
-def test_an_engine_that_lags_slows_its_loop_down_and_nothing_else(filled, by, slower):
-    """3 s of the loop and 1.5 of the engine in a row: k by 1.5, k_i by its square, so that it damps alike."""
-    engine = SimpleNamespace(thrust=SimpleNamespace(lag_s=1.5))
-    lagging = profile._gains(SimpleNamespace(engine=engine, airspeed_by=by))
-    usual = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
-    assert lagging["speed"] == pytest.approx(usual["speed"] / slower)
-    damping = [gain["speed"] / np.sqrt(gain["speed_i"]) for gain in (lagging, usual)]
-    assert damping[0] == pytest.approx(damping[1])
-    assert {name for name in usual if lagging[name] != usual[name]} <= {"speed", "speed_i"}
-    assert lagging["airspeed_s"] == 3.0
-
-
-def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
-    """Attitude 3 1/s; altitude and speed beside it; heading a quarter of bank. Time constants in s."""
-    gain = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
-    assert gain["attitude"] == 3.0
-    assert gain["heading"] == gain["bank"] / 4.0
-    assert {name: gain[name] for name in gain if name.endswith("_s")} == {
-        "alpha_s": 2.0, "airspeed_s": 3.0, "jammed_s": 1.0, "authority_s": 1.0, "bank_s": 6.0,
-    }  # fmt: skip
-    left = {"sideslip": 0.5, "spare_mps": 2.0, "path_per_mps": 0.02, "loose": 0.4, "protection": 2.0}
-    assert {name: gain[name] for name in left} == left
-    assert min(gain.values()) > 0.0  # none is forgotten
-
-
-def test_thrust_is_what_the_slipstream_adds_along_the_body(filled):
-    """Per dynamic pressure and dpt; the part on alpha for the square of dpt. At 1.1 times the mass."""
-    per_mass = AIRCRAFT.geometry.wing_area_m2 / (1.1 * AIRCRAFT.mass.mass_kg)
-    straight = coefficient("CX", dpt=1.0) - coefficient("CX")
-    inclined = coefficient("CX", alpha=0.1, dpt=1.0) - coefficient("CX", alpha=0.1) - straight
-    assert filled[0]["thrust"] == pytest.approx([per_mass * straight, per_mass * inclined / 0.1])
-
-
-def test_the_dihedral_is_the_roll_that_sideslip_sustains(filled):
-    beta, V = 0.05, 45.0
-    p = -filled[0]["dihedral"] * V * beta
-    ph = p * AIRCRAFT.geometry.span_m / (2.0 * V)
-    assert coefficient("Cl", beta=beta) < 0.0
-    assert coefficient("Cl", beta=beta, ph=ph) == pytest.approx(coefficient("Cl"), abs=1e-12)
-
-
-def test_the_weathercock_holds_full_power_at_the_largest_sideslip_accepted(filled):
-    dpt = filled[0]["dpt_cubed_held_by_sideslip"] ** (1.0 / 3.0)
-    pulled = coefficient("Cn", dpt=dpt) - coefficient("Cn")
-    assert abs(pulled) > 1e-4
-    beta = -np.sign(pulled) * 0.2  # rad, a third of what is a departure
-    assert coefficient("Cn", dpt=dpt, beta=beta) == pytest.approx(coefficient("Cn"), abs=1e-12)
 
 
 def level(qdyn_pa, flap_rad):

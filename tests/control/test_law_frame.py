@@ -12,7 +12,6 @@ from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
-from law_records import fields, put
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -47,56 +46,6 @@ def accommodated(frame, **faults):
     whole.assess_faults(frame)
     whole.accommodate(frame)
     return frame["control"]["surfaces"]["output"]
-
-
-@pytest.mark.parametrize("name", ["nominal", "adaptive", "fault-tolerant-published"])
-def test_the_published_law_inverts_the_model_and_integrates(name):
-    """G u = xm' + Kp (xm - x) + Ki int - f, the flap in trim; within the travel nothing is taken back."""
-    frame = new_frame(name)
-    control = put(frame["control"], governed_rate=0.01, governed_acceleration=0.02)
-    feedback, out, f = fields(control["published"]), control["allocation"]["output"], frame["prediction"]["f"]
-    feedback["integral"] = 0.003
-    before = feedback["integral"].copy()
-    commanded(frame)
-    error = 0.01 - X
-    wanted = 0.02 + feedback["Kp"] * error + feedback["Ki"] * before - f
-    assert G @ out["command"] == pytest.approx(wanted)
-    assert out["command"][FLAP] == pytest.approx(control["layout"]["trim"][FLAP])
-    assert feedback["integral"] == pytest.approx(before + control["reference"]["config"]["dt"] * error)
-    assert control["axes"]["hold"] == pytest.approx(-f)
-
-
-def believed(frame, surface, theta=-0.6, detected=1):
-    """The isolated loss of a surface, by its estimator."""
-    fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n_estimators"])]
-    place = estimators["surface"].tolist().index(surface)
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, place
-    fdi["isolation"]["estimator"][place]["theta"] = theta
-    return fdi
-
-
-def test_an_isolated_loss_scales_its_own_surface_alone():
-    frame = new_frame("fault-tolerant-published")
-    fdi = believed(frame, RUDDER)
-    surfaces = accommodated(frame)
-    assert surfaces["target"] == pytest.approx([1.0, 1.0, 0.4, 1.0])
-    expected = max(0.4, 1.0 - frame["control"]["surfaces"]["config"]["effectiveness_step"])
-    assert surfaces["effectiveness"][RUDDER] == pytest.approx(expected)
-    assert surfaces["effectiveness"][AILERON] == 1.0
-    assert not surfaces["offset"].any()
-    fdi["verdict"]["has_effectiveness"], fdi["verdict"]["effectiveness"] = 1, (0.9, 0.8, 0.7, 0.6)
-    assert accommodated(frame)["target"] == pytest.approx([0.9, 0.8, 0.7, 0.6])
-
-
-def test_the_oracle_knows_and_no_other_law_looks():
-    true = {"present": 1, "effectiveness": (0.5, 1, 1, 1), "effective": 0.1}
-    for name, target in (("oracle-published", 0.5), ("fault-tolerant-published", 1.0)):
-        frame = new_frame(name)
-        frame["prediction"]["u"] = 0.1
-        surfaces = accommodated(frame, **true)
-        assert surfaces["target"][AILERON] == target
-        assert surfaces["offset"][AILERON] == pytest.approx(0.1 - 0.05 if target == 0.5 else 0.0)
 
 
 @pytest.mark.parametrize("measure", [SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE])

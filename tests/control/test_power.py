@@ -57,42 +57,6 @@ def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
     return np.array(history)
 
 
-class TestWhen:
-    def test_it_waits_out_its_patience_and_then_stays(self):
-        control = control_record(patience_s=1.0)
-        lose_pitch(control)
-        history = steered(control, 300, V=lambda t: 44.0 + min(t, 1.0))
-        assert (history[:99] == 20.0).all()
-        assert (history[110:] < 20.0).all()
-        assert control["power"]["output"]["from_s"] == pytest.approx(0.99, abs=0.011)
-
-    @pytest.mark.parametrize(("lack", "stop", "engaged"), [(0.3, 1, 1), (0.3, 0, 0), (0.04, 1, 0)])
-    def test_a_lack_that_lasts_counts_when_the_elevator_has_nothing_left(self, lack, stop, engaged):
-        control = control_record()
-        control["axes"]["shortfall"][1], control["allocation"]["output"]["saturated"][ELEVATOR] = lack, stop
-        steered(control, 200)
-        assert control["power"]["memory"]["engaged"] == engaged
-
-    def test_when_a_surface_is_back_the_engine_goes_back_to_its_trim_exactly(self):
-        control = control_record(release_s=2.0)
-        lose_pitch(control)
-        steered(control, 300, V=lambda t: 45 + t)
-        control["surfaces"]["output"]["effectiveness"][FLAP] = 1.0
-        history = steered(control, 600)
-        assert history[150] != 20.0
-        assert history[-1] == 20.0
-        assert not control["power"]["output"]["in_use"]
-
-    def test_without_an_alarm_only_the_oracle_acts(self):
-        control = control_record()
-        lose_pitch(control)
-        for informed, engaged in ((0, 0), (1, 1)):
-            control["config"]["informed"] = informed
-            for _ in range(200):
-                steer(control, np.zeros(3), Y, 0, 0.0)
-            assert control["power"]["memory"]["engaged"] == engaged
-
-
 class TestWithin:
     @settings(max_examples=samples(40), deadline=None)
     @given(st.lists(st.tuples(st.floats(20, 90), st.floats(-1, 1), st.floats(0, 4)), min_size=3, max_size=12))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.control import accommodation, allocation, laws
+from beaver_ftc.control import allocation, laws
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
@@ -65,43 +65,6 @@ def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, lef
     assert handed_over(allocated, 1, left) == pytest.approx(part * lost, abs=1e-15)
 
 
-def withdraw(control, s, suspected):
-    memory, saturated = control["rejecting"]["memory"], control["allocation"]["output"]["saturated"]
-    rejecting.withdraw(memory, control["layout"], s, saturated[s], suspected, DT)
-    accommodation.approach(control["surfaces"], s, 1.0, 1.0, memory["withdrawn"][s])
-
-
-class TestWithdraw:
-    def held(self, surface, frames, saturated=True, suspected=True):
-        """(frames until it is given up or None, the record) of a surface at its stop."""
-        control, _ = record()
-        put(control, target=1.0, effectiveness=1.0)
-        control["allocation"]["output"]["saturated"][surface] = saturated
-        for k in range(frames):
-            withdraw(control, surface, suspected)
-            if control["rejecting"]["memory"]["withdrawn"][surface]:
-                return k + 1, control
-        return None, control
-
-    @pytest.mark.parametrize(("surface", "patience_s"), [(ELEVATOR, 0.5), (FLAP, 0.5), (RUDDER, 1.0)])
-    def test_a_suspect_at_its_stop_is_given_up_in_time(self, surface, patience_s):
-        frames, control = self.held(surface, 300)
-        assert frames == pytest.approx(patience_s / DT, abs=2)
-        assert (
-            control["surfaces"]["output"]["target"][surface]
-            == control["surfaces"]["output"]["effectiveness"][surface]
-            == 0.0
-        )
-        assert control["rejecting"]["memory"]["at_stop_s"][surface] == 0.0
-        assert control["rejecting"]["memory"]["withdrawn"].sum() == 1
-
-    def test_neither_a_healthy_one_nor_one_within_its_travel(self):
-        assert self.held(RUDDER, 300, suspected=False)[0] is None
-        none, control = self.held(RUDDER, 300, saturated=False)
-        assert none is None
-        assert control["surfaces"]["output"]["target"][RUDDER] == 1.0
-
-
 @given(st.integers(0, 50))
 def test_the_observer_is_that_of_its_equations(seed):
     control, rng = record(seed)
@@ -159,17 +122,3 @@ def led(lead, command, u):
 def test_a_command_leads_a_lagging_actuator_within_the_travel():
     command = led([3.0, 1.0, 4.0, 0.0], [0.1, -0.1, 0.4, 0.5], [0.05, -0.2, 0.3, 0.4])
     assert command == pytest.approx([0.05 + 3 * 0.05, -0.1, 0.44, 0.5])
-
-
-@given(st.floats(0.0, 1.0), st.floats(0.01, 1.0), st.floats(0.001, 0.1))
-def test_handed_back_the_share_of_the_stand_in_leaps_by_no_more_than_its_step(given, left, step):
-    """Whatever the main surface is believed to be from then on; in the end it carries nothing."""
-    allocated = record()[0]["allocation"]
-    allocated["output"]["hand_over"] = given
-    shares = [handed_over(allocated, 1, left)]
-    allocated["config"]["hand_over_step"] = step
-    while allocated["output"]["hand_over"] > 0.0:
-        shares.append(handed_over(allocated, 0, 1.0))
-    assert shares[-1] == 0.0 or len(shares) == 1
-    assert np.all(np.diff(shares) <= 0.0)
-    assert np.all(np.diff(shares) >= -1.5 * step)  # the steepest of 3 s^2 - 2 s^3

@@ -7,9 +7,7 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import parity
-from beaver_ftc.diagnosis.detection.likelihood import STEP_FAULT
 from beaver_ftc.diagnosis.detection.parity import configure_parity_views
-from beaver_ftc.diagnosis.state import LOSS
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
@@ -103,19 +101,6 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     shown = has_eG * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_Z"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
-
-
-def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_direction(fdi, rng):
-    view, Gu = fdi["statistical"]["views"][PAST_RUDDER], rng.normal(size=(3, 4))
-    view["direction"][:3] = 0.5, 0.3, -0.7
-    hypotheses = view["block"]["hypothesis"]
-    view["block"]["n_h"], hypotheses["signature"] = 3, 9.0
-    hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP_FAULT, LOSS), (FLAP, -1, AILERON)
-    Across.sign(fdi, view, Gu)
-    m = view["direction"][:3]
-    assert hypotheses["signature"][:3, 0] == pytest.approx([m @ Gu[:, FLAP], 1.0, m @ Gu[:, AILERON]])
-    assert (hypotheses["signature"][:, 1] == 9.0).all()
-    assert (hypotheses["signature"][3:] == 9.0).all()
 
 
 @pytest.mark.parametrize(

@@ -4,18 +4,10 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from innovations import Detector, by_onset
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden, rotation_lengths
 from beaver_ftc.diagnosis.detection import statistical
-from beaver_ftc.diagnosis.detection.likelihood import (
-    GROWING_LOSS,
-    LOSS_END,
-    N_SLOTS,
-)
-from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
-from beaver_ftc.diagnosis.state import LOSS
 
 AIRCRAFT = load()
 SPAN_M, CHORD_M = AIRCRAFT.geometry.span_m, AIRCRAFT.geometry.chord_m
@@ -44,43 +36,6 @@ def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
     walk = sqrt(i**2 - ramp**2)
     w0 = (walk / (noise**2 * dt)) ** 0.25
     assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) / (walk * w0)) == pytest.approx(level / 2)
-
-
-def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
-    record = np.zeros(1, statistical_dtype())[0]
-    record["noise"]["q"], record["test"]["alarm_level"] = (
-        rapidity,
-        6.0,
-    )
-    return statistical.derive_length(record, V, rate_hz, moving * rolling)
-
-
-def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
-    """eta_bar sqrt(T / 2 i) / tau over the longest window; no later than the rolling gust does."""
-    rapidity, rate_hz = 3.0, 50.0
-    tau = returning(rapidity, moving=0) / V
-    longest_s = 2 ** (N_SLOTS - 1) / rate_hz
-    assert sqrt(longest_s / (2.0 * rapidity)) / tau == pytest.approx(6.0 / 2)
-    assert returning(rapidity, rolling=2.0) == 2.0
-    assert returning(rapidity, rolling=1e6) == pytest.approx(tau * V)
-    assert returning(0.0) == 200.0
-    assert returning(0.0, moving=0) == 0.0
-
-
-@pytest.fixture(scope="module")
-def alone():
-    return Detector(50.0, forgetting_time_s=4.0, bounds={"sensors": "tactical-grade", "turbulence": "light"})
-
-
-def test_a_sense_is_kept_for_every_onset(alone):
-    """A loss is a loss from whichever onset: what takes away counts against it."""
-    for block in alone.blocks:
-        n = int(block["n_h"])
-        kinds = block["hypothesis"]["kind"][:n]
-        signs = [{LOSS: -1.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}.get(int(kind), 0.0) for kind in kinds]
-        sense = by_onset(block, "supporting_correlation_sign")
-        assert (sense[:, :n] == signs).all()
-        assert not sense[:, n:].any()
 
 
 def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():

@@ -155,25 +155,6 @@ def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evide
     )
 
 
-def looked_like_by(kind):
-    """The constant types that are not named while `kind` is left."""
-    constant = set(ALL) - set(COURSES)
-    return {other for other in constant if verdict.can_be_another(one(other, kind)[1], other, True)}
-
-
-def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
-    assert looked_like_by(GROWING_BIAS) == {CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN}
-    assert not verdict.can_be_another(one(STUCK)[1], STUCK, True)
-    for direction, stop in ((UP, 1), (DOWN, 0)):  # what has run to the stop has not come there by and by
-        _, surface = one(direction, GROWING_BIAS)
-        surface["growing_bias"]["has_run"][stop] = 1
-        assert not verdict.can_be_another(surface, direction, True)
-        surface["growing_bias"]["has_run"][:] = 1 - surface["growing_bias"]["has_run"]
-        assert verdict.can_be_another(surface, direction, True)
-    assert not verdict.can_be_another(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
-    assert verdict.can_be_another(one(STUCK, GROWING_BIAS)[1], STUCK, False)
-
-
 @pytest.mark.parametrize(
     ("kinds", "evidence", "half_cycles", "found", "in_coarse_sets"),
     [
@@ -224,16 +205,6 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
     assert verdict.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
-def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
-    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_silent=0)
-    fdi["types"]["config"]["dt"] = dt
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.1, 0.2
-    there = [bool(on(verdict.fault_shows, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
-    assert there.index(False) + 1 == round(0.2 / dt)
-    assert not any(there[there.index(False) :])
-
-
 @pytest.mark.parametrize(
     ("kinds", "at_fault", "off"),
     [
@@ -266,67 +237,7 @@ def n_rest(low=0.1, high=0.2, frames=1, **fields):
     return fdi, surface
 
 
-def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
-    rng, fdi, length = np.random.default_rng(6), new_case(), 4
-    fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = (
-        length,
-        length * DT,
-    )
-    fdi["types"]["block"]["nu"], fdi["types"]["block"]["nu_bound"] = 9.0, 9.0
-    innovation, eta = rng.normal(size=(length, 3)), rng.uniform(0.1, 0.2, (length, 3))
-    noise = rng.uniform(0.01, 0.02, (length + 1, 3))
-    Z, offset = rng.uniform(1, 2, (length, 8, 3)), rng.normal(size=(length, 8, 3))
-    spread = rng.uniform(0, 0.1, (length, 8, 3))
-    Z[:, :, YAW] += 5.0
-    for k in range(length):
-        fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["n_old"], fdi["bound"]["n_gyro"] = (
-            noise[k],
-            noise[k + 1],
-        )
-        fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
-        fdi["isolation"]["estimator"]["effect"]["base"][:8] = offset[k]
-        fdi["isolation"]["estimator"]["effect"]["e"][:8] = spread[k]
-        on(registry.extend_block, fdi)
-        assert fdi["types"]["block"]["n_so_far"] == (k + 1) % length
-        assert fdi["types"]["frame_index"] == (k + 1 == length)
-    assert fdi["types"]["block"]["nu"] == pytest.approx(innovation.mean(axis=0))
-    ends = (noise[0] + noise[-1]) / (length * DT)
-    assert fdi["types"]["block"]["nu_bound"] == pytest.approx(eta.mean(axis=0) + ends)
-    mean = fdi["isolation"]["estimator"][4 + RUDDER]["mean_effect"]
-    assert mean["regressor"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
-    assert mean["base"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
-    assert mean["e"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
-
-
 # Two faults at once.
-
-
-def lateral(one_left=True, other_left=True, alarmed=1, **pair):
-    """Who is named in roll and yaw: (aileron, rudder, whether the fault is outside the class)."""
-    left = {"aileron": (BIAS,) if one_left else None, "rudder": (BIAS,) if other_left else None}
-    fdi = new_case(**left)
-    for s, kept in ((AILERON, one_left), (RUDDER, other_left)):
-        if not kept:
-            leave(fdi["types"]["surface"][s], BIAS)
-    fdi["types"]["pair"]["group_alarm"] = 0, alarmed
-    for name, value in pair.items():
-        fdi["types"]["pair"][name] = value
-    outside = on(pairs.isolate_lateral, fdi, 3.0)
-    return [
-        bool(fdi["types"]["surface"]["status"]["is_isolated"][AILERON]),
-        bool(fdi["types"]["surface"]["status"]["is_isolated"][RUDDER]),
-        bool(outside),
-    ]
-
-
-def test_who_is_named_in_roll_and_yaw():
-    assert lateral() == [False, False, False]
-    assert lateral(one_left=False) == [False, True, False]
-    assert lateral(other_left=False) == [True, False, False]
-    assert lateral(False, False) == [True, True, False]
-    assert lateral(False, False, alarmed=0) == [False, False, False]
-    assert lateral(False, False, lateral_outside=1) == [False, False, True]
 
 
 @pytest.mark.parametrize("seed", range(3))

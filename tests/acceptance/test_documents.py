@@ -77,39 +77,3 @@ def test_pages_show_commands_and_no_exception_has_become_idle():
     idle = [exempt.pattern for exempt in TABLE if not any(map(exempt.matches, lines))]
     assert idle == []
     assert [exempt.pattern for exempt in TABLE if not exempt.reason] == []
-
-
-def test_commands_are_taken_out_of_every_form_of_a_page():
-    text = """
-Say `beaver-ftc run
-one` or `quoted` and `beaver-ftc`.
-
-```console
-$ beaver-ftc run two   # why
-its output
-```
-
-    beaver-ftc run three       # why
-    its output
-
-```bash
-# a comment
-beaver-ftc run four | wc
-```
-
-```yaml
-    steps:
-      - run: beaver-ftc run five
-```
-
-```python
-beaver-ftc run six
-```
-"""
-    assert commands_of(text) == [
-        "beaver-ftc run one",
-        "beaver-ftc run two",
-        "beaver-ftc run three",
-        "beaver-ftc run four | wc",
-        "beaver-ftc run five",
-    ]

@@ -60,11 +60,6 @@ def test_examples_of_help_that_no_page_shows_run(helps, installation, tmp_path):
             assert done.returncode in (0, 1), f"{line}\n{done.stderr}"
 
 
-def test_examples_are_taken_out_of_a_help_text():
-    text = "Usage: beaver-ftc run SCENARIO\n\n  Fly.\n\n  $ beaver-ftc run a  # why\n  beaver-ftc list\n"
-    assert examples_of_help(text) == ["beaver-ftc run a", "beaver-ftc list"]
-
-
 def test_no_command_at_all_shows_the_help(beaver, helps):
     done = beaver()
     assert done.returncode == 2

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from .documents import ROOT, named_files, steps
+from .documents import ROOT, steps
 from .exceptions import instead
 
 TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
@@ -50,36 +50,3 @@ def test_tutorials_are_numbered_and_lead_to_each_other():
         last = titles[number].read_text(encoding="utf-8").rpartition("## Next")[2]
         link = rf"\[[Tt]utorial {number + 1}\]\({titles[number + 1].name}\)"
         assert re.search(link, last), titles[number].name
-
-
-def test_named_files_and_steps_are_taken_out_of_a_page():
-    text = """
-Write this into `a.yaml`:
-
-```yaml
-name: a
-```
-
-```console
-$ beaver-ftc run a.yaml   # why
-```
-
-<!-- printed: fly -->
-```console
-$ fly
-```
-<!-- /printed -->
-
-```python
-print(1)
-```
-
-    make test
-"""
-    assert named_files(text) == {"a.yaml": "name: a\n"}
-    assert [(step.kind, step.text) for step in steps(text)] == [
-        ("file", "name: a\n"),
-        ("command", "beaver-ftc run a.yaml"),
-        ("python", "print(1)\n"),
-        ("command", "make test"),
-    ]

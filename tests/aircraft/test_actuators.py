@@ -76,12 +76,6 @@ def test_position_stops(surface, travel):
     assert surface.run() == [travel.min_rad]
 
 
-def test_travel_can_be_overridden(surface):
-    surface.plant.write(f"actuators/{surface.name}/position-max-rad", 0.05)
-    surface.command(5.0)
-    assert surface.run() == [0.05]
-
-
 @pytest.mark.parametrize("norm", [-1.0, -0.3, 0.4, 1.0])
 def test_normalised_command_adds_scaled_to_the_travel_on_its_side(surface, travel, norm):
     side = travel.max_rad if norm > 0 else -travel.min_rad
@@ -170,14 +164,6 @@ def test_a_repaired_surface_returns_by_its_own_dynamics(surface, failure, bandwi
         assert position == pytest.approx(x, abs=1e-13)
 
 
-def test_a_repaired_ideal_surface_follows_again_at_once(surface):
-    surface.fail(hardover=-1)
-    surface.run(10)
-    surface.fail(hardover=0)
-    surface.command(0.05)
-    assert surface.run() == [0.05]
-
-
 def test_bias_is_added_after_the_actuator(surface, travel):
     surface.command(0.03)
     surface.fail(bias__rad=-0.05)
@@ -210,25 +196,6 @@ def test_a_slow_actuator_with_no_declared_limit_has_a_share_of_the_runaway_rate(
     surface.command(-0.09)
     where = surface.position
     assert (surface.run(20) == where).all()
-
-
-def test_a_start_puts_the_surfaces_in_place_whatever_their_dynamics(beaver, trim_point):
-    for name in SURFACES:
-        Surface(beaver, name).actuator(bandwidth=5.0, rate_limit=0.1)
-    beaver.start(trim_point)
-    for name in SURFACES:
-        assert Surface(beaver, name).position == getattr(trim_point, f"{name}_rad")
-
-
-def test_the_aircraft_loads_healthy_and_ideal():
-    plant = Plant(rate_hz=100)
-    for name in SURFACES:
-        healthy = {"effectiveness": 1, "rate-scale": 1} | dict.fromkeys(
-            ("stuck", "stuck-at-rad", "hardover", "float", "bias-rad", "oscillation-amplitude-rad"), 0
-        )
-        assert {each: plant.read(f"failures/{name}/{each}") for each in healthy} == healthy
-        assert plant.read(f"actuators/{name}/bandwidth-rad_sec") == 0
-        assert plant.read(f"actuators/{name}/rate-limit-rad_sec") == 0
 
 
 @pytest.mark.parametrize("bandwidth", [0.0, 10.0])

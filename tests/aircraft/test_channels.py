@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.aircraft.schema import AircraftFile, ChannelsSection, OutputSection
+from beaver_ftc.aircraft.schema import AircraftFile, OutputSection
 from trainer import trainer_file
 
 
@@ -39,17 +39,3 @@ def test_what_no_output_is(given, says):
     (error,) = refused.value.errors()
     told = error["ctx"]["conflicts"][0][1] if error["type"] == "conflict" else error["msg"]
     assert says.replace("\\", "") in told
-
-
-def test_outputs_of_a_surface_there_is_not():
-    given = trainer_file(channels={"surfaces": {"elevatr": [{"channel": 1}]}})
-    with pytest.raises(ValidationError) as refused:
-        AircraftFile.model_validate(given)
-    (where, says), *_ = refused.value.errors()[0]["ctx"]["conflicts"]
-    assert where == ("channels", "surfaces", "elevatr")
-    assert says.startswith("unknown surface")
-
-
-def test_a_surface_has_outputs_or_is_left_out():
-    with pytest.raises(ValidationError, match="at least 1 item"):
-        ChannelsSection.model_validate({"surfaces": {"elevator": []}})

@@ -1,12 +1,11 @@
 """An aircraft's file: its contract, what it must not say, and what follows from it."""
 
-from math import isnan, radians
 from types import SimpleNamespace
 
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile, writing_property
 from kept import keys_of
 from trainer import trainer, trainer_file
@@ -37,7 +36,6 @@ def box(**keys):
 THRUST = {"airspeed_mps": [40, 60], "setting": [0, 900, 3000], "force_n": [[-9, 7, 80], [-30, 5, 60]]}
 SHARE = {"throttle": "a/b", "share": 0.5, "right_m": -4.9}
 EFFECTORS = {"left": SHARE, "right": SHARE | {"throttle": "a/c", "right_m": 4.8}}
-TAB = {"tab": {"travel_rad": [-0.1, 0.2]}}
 CANNOT = {
     "ends": {"envelope": {"airspeed_mps": [65, 65], "alpha_deg": [14, -4]}},
     "stops": {"surfaces": {"tab": {"travel_rad": [0.2, 0.2]}}},
@@ -118,78 +116,6 @@ def test_what_is_just_allowed(case):
     assert trainer(**CAN[case]).n in (3, 4)
 
 
-# A tab that does nothing; one that pitches more than the elevator; a rudder above the wing, that rolls more
-# than it yaws; ailerons that hardly roll.
-BUILDS = {
-    "trainer": {},
-    "tab of nothing": {"surfaces": TAB},
-    "strong tab": {"surfaces": TAB,
-                   "moments": {"Cm": [term("a", surface="elevator"), term("b", surface="tab")]},
-                   "groups": {"pitch": ["tab", "elevator"]}},
-    "high rudder": {"moments": {"Cn": [term("a", surface="rudder"), term("b", {"beta": 1})],
-                                "Cl": [term("c", surface="rudder"), term("d", surface="aileron")]}},
-    "elevator that yaws more than the rudder": {"moments": {
-        "Cl": [term("c", surface="rudder", value=8.0), term("d", surface="aileron")],
-        "Cm": [term("e", surface="elevator", value=9.0)],
-        "Cn": [term("a", surface="rudder"), term("f", surface="elevator", value=1.5), term("b", {"beta": 1})],
-    }},
-    "rudder of alpha": {**box(alpha_rad=[0.1, 0.3]), "moments": {
-        "Cl": [term("a", {"alpha": 2}, surface="aileron"), term("b", {"alpha": 1}, surface="rudder")],
-        "Cn": [term("c", {"alpha": 1}, surface="aileron"), term("d", surface="rudder")],
-    }},
-    "signals": {**box(signals={"dpt": [0.2, 0.6]}), "signals": {"dpt": {"property": "aero/dpt"}},
-                "start": {"airspeed_mps": 44.0}, "model_error_rad_s2": {"p": 1, "q": 2, "r": 3}},
-    "no forces": {"forces": None, "mass": {"mass_kg": None}},
-    "sideslip's rate": {"forces": {"CY": [term("CY_betadot", {"betadoth": 1}), term("CY_p", {"ph": 1})]}},
-}  # fmt: skip
-
-
-def told(aircraft):
-    """What follows from a file."""
-    terms = {
-        kind: [[term.name, *term.factors] for term in getattr(aircraft, kind)]
-        for kind in ("moments", "forces", "measurable_forces")
-    }
-    return terms | {
-        "surfaces": aircraft.surfaces, "axes": aircraft.dominant_axis, "primary": aircraft.primary,
-        "groups": dict(aircraft.groups), "signals": aircraft.signal_names,
-        "usual": dict(aircraft.usual_signals),
-        "travel": {name: (of.min_rad, of.max_rad) for name, of in aircraft.travel.items()},
-        "mass": vars(aircraft.mass), "usual_airspeed_mps": aircraft.usual_airspeed_mps,
-        "model_error_rad_s2": aircraft.model_error_rad_s2,
-        "engine instruments": aircraft.has_engine_instruments,
-        "named": list(aircraft.terms),
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize("build", [*BUILDS, "beaver"])
-def test_what_follows_from_a_file(build, changed):
-    assert not changed(told(load() if build == "beaver" else trainer(**BUILDS[build])))
-
-
-def test_where_a_term_stands_and_what_a_coefficient_is():
-    aircraft = trainer()
-    assert [aircraft.index(name) for name in ("Cl_constant", "Cl_beta", "Cm_0", "Cn_rudder")] == [0, 1, 7, 19]
-    of = {"alpha": 0.2, "beta": 0.1, "qh": 0.01, "elevator": -0.3}
-    expected = 0.045 - 0.72 * 0.2 - 11.5 * 0.01 - 0.35 * 0.1**2 - 1.15 * -0.3 + 0.9 * 0.2 * -0.3
-    assert aircraft.coefficient("Cm", of) == pytest.approx(expected)
-    scaled = aircraft.coefficient("Cm", of, {"Cm_q": 3.0, "Cm_0": 0.0})
-    assert scaled == pytest.approx(expected - 0.045 - 2 * 11.5 * 0.01)
-    assert aircraft.alpha_rad == (radians(-4), radians(14))
-    assert isnan(trainer(mass={"mass_kg": None}).mass.mass_kg)
-
-
-def test_ends_of_a_box_in_their_order():
-    names = ("p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "density_kg_m3")
-    spans = {name: (i, i + 0.5) for i, name in enumerate(names)}
-    signals = {"a": (7, 8), "b": (8, 9)}
-    given = trainer_file(
-        **box(**spans, signals=signals), signals={name: {"property": "a/b"} for name in signals}
-    )
-    made = AircraftFile.model_validate(given).model_error_map.boxes[0]
-    assert made.ends(["b", "a"]) == [*spans.values(), (8, 9), (7, 8)]
-
-
 @pytest.mark.parametrize(
     ("text", "names"),
     [
@@ -200,15 +126,6 @@ def test_ends_of_a_box_in_their_order():
 )
 def test_properties_that_write(text, names):
     assert writing_property(text) == names
-
-
-def test_level_flight_is_in_the_innermost_box_and_engines_are_known_if_they_are_in_all():
-    boxes = [box(alpha_rad=[0.1, 0.3])["model_error_map"]["boxes"][0], box()["model_error_map"]["boxes"][0]]
-    for known in ((None, None), (0.1, None), (None, 0.2), (0.1, 0.2)):
-        both = [of | ({} if e is None else {"engines_apart": e}) for of, e in zip(boxes, known, strict=True)]
-        aircraft = trainer(model_error_map=box()["model_error_map"] | {"boxes": both})
-        assert aircraft.usual_signals["alpha"] == pytest.approx(0.2)
-        assert aircraft.file.model_error_map.knows_engines is (None not in known)
 
 
 PLACE = {"travel_rad": [-0.2, 0.3]}

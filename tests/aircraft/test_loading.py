@@ -1,14 +1,11 @@
 """From what a scenario calls its aircraft to the aircraft, and what is said where there is none."""
 
-import os
 import shutil
-from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from beaver_ftc.aircraft import aircraft, load
-from beaver_ftc.aircraft.aircraft import UnknownAircraft, derived_folder, is_derived, read
+from beaver_ftc.aircraft.aircraft import UnknownAircraft, read
 from beaver_ftc.documents.errors import BadInput
 from trainer import FOLDER
 
@@ -50,16 +47,6 @@ def test_what_is_no_aircraft(beside, reference, says):
     assert str(caught.value).startswith(says)
 
 
-def test_a_folder_is_remembered_while_it_is_the_only_one(beside, tmp_path):
-    with pytest.raises(UnknownAircraft, match=r"there is no folder to find './trainer' in"):
-        load("./trainer")
-    assert load("./trainer", beside) is load("./trainer") is read(beside / "trainer")
-    shutil.copytree(FOLDER, tmp_path / "there" / "trainer")
-    load("./trainer", tmp_path / "there")
-    with pytest.raises(UnknownAircraft, match="no folder to find"):
-        load("./trainer")
-
-
 def test_links_stay_below_the_scenario_s_folder(beside):
     (beside / "notes").write_text("n")
     (beside / "trainer" / "notes").symlink_to(beside / "notes")
@@ -68,15 +55,6 @@ def test_links_stay_below_the_scenario_s_folder(beside):
     (beside / "trainer" / "Systems" / "link").symlink_to(beside.parent / "secret")
     with pytest.raises(UnknownAircraft, match=r"'./trainer/Systems/link' leads outside"):
         load("./trainer", beside)
-
-
-def test_a_file_is_read_again_once_it_changed(beside):
-    file = beside / "trainer" / "aircraft.yaml"
-    before = read(beside / "trainer")
-    assert read(beside / "trainer") is before
-    file.write_text(file.read_text().replace("span_m: 10.4", "span_m: 11.5"))
-    os.utime(file, ns=(1, 1))
-    assert (before.geometry.span_m, read(beside / "trainer").geometry.span_m) == (10.4, 11.5)
 
 
 @pytest.mark.parametrize(
@@ -101,53 +79,3 @@ def test_a_file_of_nothing_or_too_much(beside, text):
         BadInput, match=r"is empty, allowed: a mapping with the keys of an aircraft|is too large"
     ):
         read(beside / "trainer")
-
-
-def test_what_was_derived_by_this_way_of_deriving_is_an_aircraft(beside):
-    name = "n" * 60
-    folder = derived_folder(name)
-    assert not is_derived(name)
-    shutil.copytree(FOLDER, folder)
-    text = (FOLDER / "aircraft.yaml").read_text()
-    for line, known in (
-        (aircraft.first_line(), True),
-        (aircraft.first_line().replace("version ", "version 1"), False),
-    ):
-        (folder / "aircraft.yaml").write_text(line + text)
-        assert is_derived(name) is known
-    (folder / "aircraft.yaml").write_text(aircraft.first_line() + text)
-    assert load(f"jsbsim:{name}").name == "trainer"
-
-
-@pytest.mark.parametrize(
-    "changed", ["actuator.xml", "instrumented.xml", "model_file.py", "fit.py", "outline.yaml"]
-)
-def test_what_was_derived_by_other_templates_or_code_is_derived_again(changed, beside, monkeypatch):
-    """A template of the copy, the code that copies, the code and the outline of the fit."""
-    name, text = "mine", (FOLDER / "aircraft.yaml").read_text()
-    shutil.copytree(FOLDER, derived_folder(name))
-    (derived_folder(name) / "aircraft.yaml").write_text(aircraft.first_line() + text)
-    assert is_derived(name)
-    read_bytes = Path.read_bytes
-    monkeypatch.setattr(Path, "read_bytes", lambda path: read_bytes(path) + b" " * (path.name == changed))
-    assert not is_derived(name)
-
-
-def test_what_a_surface_does_is_the_sum_of_its_terms_at_the_usual_signals():
-    """p: span / Ix, q: chord / Iy, r: span / Iz; each signal of a term to its power."""
-
-    def term(coefficient, surface, value, *of):
-        return SimpleNamespace(coefficient=coefficient, surface=surface, value=value, of=of)
-
-    its = SimpleNamespace(
-        mass=SimpleNamespace(Ix_kg_m2=2.0, Iy_kg_m2=5.0, Iz_kg_m2=7.0),
-        geometry=SimpleNamespace(span_m=3.0, chord_m=1.1), surfaces=("tab", "flap"),
-        usual_signals={"alpha": 0.2, "dpt": 3.0},
-        moments=[
-            term("Cl", "tab", 0.5, ("alpha", 2)), term("Cl", "tab", 0.3), term("Cn", "tab", 0.7, ("dpt", 1)),
-            term("Cm", "flap", -2.0, ("alpha", 1), ("dpt", 2)), term("Cm", None, 4.0, ("alpha", 1)),
-        ],
-    )  # fmt: skip
-    effect = aircraft.Aircraft.effect.func(its)
-    assert effect["tab"] == pytest.approx([(0.5 * 0.04 + 0.3) * 3.0 / 2.0, 0.0, 2.1 * 3.0 / 7.0])
-    assert effect["flap"] == pytest.approx([0.0, -2.0 * 0.2 * 9.0 * 1.1 / 5.0, 0.0])

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -71,65 +70,12 @@ def test_all_are_compiled_and_kept_however_the_second_process_fares(tmp_path, mo
             os.waitpid(each, os.WNOHANG)
 
 
-def test_each_is_compiled_by_one_of_both(tmp_path, monkeypatch):
-    """The first process takes none that the second is at; here it waits until the second has done all."""
-    monkeypatch.setattr(cache, "can_fork", lambda: True)
-    first, wanted = os.getpid(), wanted_of(tmp_path)
-    compile_it = Wanted.compile
-
-    def after_the_second(each):
-        deadline = time.monotonic() + 60.0
-        while os.getpid() == first and kept(tmp_path) != ALL and time.monotonic() < deadline:
-            time.sleep(0.01)
-        compile_it(each)
-
-    monkeypatch.setattr(Wanted, "compile", after_the_second)
-    cache.compile_missing(wanted)
-    assert kept(tmp_path) == ALL
-    assert not any(each.kernel.overloads for each in wanted), "the first process has compiled nothing"
-    assert agree(tmp_path)
-
-
 def test_the_first_missing_kernel_compiles_all_that_are_expected(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "can_fork", lambda: False)
     wanted = wanted_of(tmp_path)
     cache.expect(lambda: wanted[1:])
     assert wanted[0].kernel(np.array([3.0])) == 6.0
     assert kept(tmp_path) == ALL
-
-
-def test_one_that_is_expected_may_call_the_first_missing_kernel(tmp_path, monkeypatch):
-    """A glider's first flight asks for the frame, and the expected segment calls the frame."""
-    monkeypatch.setattr(cache, "can_fork", lambda: False)
-    frame = kernels(tmp_path)[0]
-    space = {"__name__": __name__, "frame": frame}
-    exec("def segment(x):\n    return frame(x) + 1.0\n", space)
-    segment = compiled.compile_into(tmp_path, space["segment"])
-    cache.expect(lambda: [Wanted.of(segment, KINDS)])
-    assert frame(np.array([3.0])) == 6.0
-    assert segment(np.array([3.0])) == 7.0
-
-
-def test_one_that_another_process_compiles_is_left_to_it(tmp_path):
-    """Another process holds the lock of a kernel: nobody else compiles it, and whoever calls it waits."""
-    pytest.importorskip("fcntl")
-    (each,) = wanted_of(tmp_path)[:1]
-    place = each.kernel._cached.place(KINDS, each.kernel.targetctx.codegen())
-    holder = (
-        f"from pathlib import Path; from beaver_ftc.compiled.cache import locked\n"
-        f"with locked(Path({str(tmp_path)!r}), {place}):\n    print('held', flush=True); input()"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", holder], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline() == "held\n"
-    each.compile()
-    with cache.locked(tmp_path, place, wait=False) as mine, cache.locked(tmp_path, place + 1) as other:
-        assert (mine, other) == (False, True)
-    assert kept(tmp_path) == []
-    process.communicate("\n")
-    each.compile()
-    assert kept(tmp_path) == ALL[:1]
 
 
 INTERRUPTED = """

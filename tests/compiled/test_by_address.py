@@ -4,11 +4,9 @@ import importlib
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import target
 
 MODULE = """
 from pathlib import Path
@@ -67,12 +65,6 @@ def test_it_is_compiled_only_when_it_is_called(made, tmp_path):
     assert kept(tmp_path) == ["often", "rare"]
 
 
-def test_numbers_of_another_type_have_code_of_their_own(made, tmp_path):
-    for by in (1.5, 2, 1.5):
-        assert made.often(made.records(1), by) == {1.5: 2.5, 2: 1.0}[by]
-    assert kept(tmp_path) == ["often", "often", "rare", "rare"]
-
-
 def test_another_process_compiles_nothing(made, tmp_path):
     made.often(made.records(1), 1.5)
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").iterdir()}
@@ -87,33 +79,6 @@ def test_another_process_compiles_nothing(made, tmp_path):
 def test_what_it_raises_reaches_the_caller(made):
     with pytest.raises(ValueError, match="less than nothing"):
         made.often(made.records(1), -1.0)
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
-def test_what_happens_while_it_is_compiled_reaches_the_caller_who_may_call_again(made, monkeypatch, error):
-    def fail(*_):
-        raise error
-
-    with monkeypatch.context() as patched:
-        patched.setattr(target.Kernel, "result", fail)
-        with pytest.raises(error):
-            made.often(made.records(1), 1.5)
-    assert made.often(made.records(1), 1.5) == 2.5
-
-
-def test_one_that_answers_is_refused(made):
-    with pytest.raises(TypeError, match=r"answering.* returns something"):
-        made.often(made.records(2), 1.5)
-
-
-def test_python_calls_it_like_any_kernel_and_has_its_plain_form(made):
-    there = made.records(0)
-    made.rare(there[0], 1.5)
-    assert list(there["value"][0]) == [0.0, 0.5, 1.5]
-    plain = there.view(np.recarray)[0]
-    compiled.plain(made.rare)(plain, 1.0)
-    assert list(plain.value) == [0.0, 0.0, 0.5]
-    assert made.rare.__doc__.startswith("Take `by` off")
 
 
 FLIGHTS = """

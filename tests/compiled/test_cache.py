@@ -1,21 +1,17 @@
 """Where compiled code is kept: it must be found again by the next process, wherever the package lies."""
 
-import errno
 import os
 import shutil
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import beaver_ftc
 from beaver_ftc import compiled
 from beaver_ftc.compiled import cache
 from beaver_ftc.documents import files
-from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import data_root
 
 REPOSITORY = data_root()
@@ -46,26 +42,7 @@ def test_numbas_own_setting_beats_it(nowhere, tmp_path):
     assert compiled.cache_folder().parent == tmp_path / "numba"
 
 
-def test_without_a_home_there_is_the_folder_for_temporary_files(nowhere, tmp_path):
-    nowhere.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path))
-    folder = compiled.cache_folder().parent
-    assert folder.parent == tmp_path
-    assert folder.stat().st_mode & 0o077 == 0, "code is loaded from it: it is nobody else's business"
-
-
 def test_with_nowhere_to_write_nothing_is_kept(nowhere):
-    assert compiled.cache_folder() is None
-
-
-def test_no_home_at_all_and_no_folder_for_temporary_files_is_no_error(nowhere):
-    def none(*_):
-        raise RuntimeError("no home directory")
-
-    def no_folder():
-        raise FileNotFoundError("no usable temporary directory")
-
-    nowhere.setattr(files.Path, "expanduser", none)
-    nowhere.setattr(files.tempfile, "gettempdir", no_folder)
     assert compiled.cache_folder() is None
 
 
@@ -107,50 +84,6 @@ def test_no_code_is_run_from_a_folder_that_others_may_write(where, tmp_path, mod
         f"beaver-ftc: no compiled code is run from {bad}: its mode is {mode:04o}, "
         "allowed: a folder of your own that neither group nor others can write (chmod go-w)\n"
     )
-
-
-@pytest.mark.skipif(os.name != "posix", reason="folders have no mode here")
-def test_in_a_folder_where_everybody_keeps_his_own_ours_is_what_counts(where, tmp_path):
-    shared = tmp_path / "shared"
-    shared.mkdir()
-    shared.chmod(0o1777)  # as /tmp
-    ours, said = where(NUMBA_CACHE_DIR=str(shared))
-    assert (ours.parent, said) == (shared, "")
-    assert ours.stat().st_mode & 0o077 == 0
-    ours.rmdir()
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    ours.symlink_to(elsewhere)
-    other, said = where(NUMBA_CACHE_DIR=str(shared), XDG_CACHE_HOME=str(tmp_path))
-    assert other.parent == tmp_path / "beaver-ftc"
-    assert said.startswith(f"beaver-ftc: no compiled code is run from {ours}: it is a link, allowed: ")
-
-
-def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
-    base = tmp_path / "beaver-ftc"
-    old = [base / f"{i:016x}" for i in range(14)]
-    for i, folder in enumerate(old):
-        folder.mkdir(parents=True)
-        os.utime(folder, (i, i))
-    (base / "keep-me").mkdir()
-    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
-    new = compiled.cache_folder().name
-    assert {path.name for path in base.iterdir()} == {
-        new,
-        "keep-me",
-        *(folder.name for folder in old[-files._VERSIONS_KEPT :]),
-    }
-
-
-def test_what_was_not_used_for_longest_goes_where_much_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "MOST_BYTES", 250)
-    for i, name in enumerate(["a-1", "b-2", "c-3", "d-4", "lock"]):
-        (tmp_path / name).write_bytes(b"x" * 100)
-        os.utime(tmp_path / name, (i, i))
-    os.utime(tmp_path / "a-1", (9, 0))  # the oldest was read last
-    (tmp_path / "parts-3").mkdir()
-    cache.discard_unused(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"a-1", "d-4", "lock", "parts-3"}
 
 
 PROGRAM = """
@@ -302,79 +235,3 @@ def test_several_processes_compile_once(tmp_path):
     command = [sys.executable, tmp_path / "small.py", tmp_path / "cache"]
     several = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     assert sorted(one.communicate()[0].strip() for one in several) == ["compiled", "loaded"]
-
-
-RECORDS = """
-import sys
-from pathlib import Path
-import numpy as np
-from beaver_ftc.compiled import compile_into
-def inner(record):
-    return record.last
-def outer(records):
-    return compiled_inner(records[0])
-folder = Path(sys.argv[1])
-compiled_inner, compiled = compile_into(folder, inner), compile_into(folder, outer)
-for n in map(int, sys.argv[2:]):
-    records = np.zeros(1, [("first", "f8", (n,)), ("last", "f8")])
-    records["last"] = n
-    print(compiled(records))
-names = [result.fndesc.mangled_name for result in compiled.overloads.values()]
-print(*names, file=sys.stderr)
-"""
-
-
-def test_code_that_two_processes_kept_is_told_apart_by_a_third(tmp_path):
-    """Each has compiled for a record of its own, under a name of its own; the third runs both."""
-
-    (tmp_path / "records.py").write_text(RECORDS)
-    command = [sys.executable, tmp_path / "records.py", tmp_path / "cache"]
-    names = []
-    for sizes in (["2"], ["5"], ["2", "5"]):
-        done = subprocess.run([*command, *sizes], capture_output=True, text=True, check=True)
-        assert [float(n) for n in done.stdout.split()] == [float(n) for n in sizes]
-        names += done.stderr.split()
-    assert len(names) >= 2
-    assert len(set(names)) == 2
-
-
-def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
-    @partial(compiled.compile_into, None)
-    def inner(x):
-        return np.sqrt(x[0]) + max(x[1], 0.5)
-
-    @partial(compiled.compile_into, None)
-    def outer(x):
-        x[:] = x * 2.0
-        return inner(x) + 1.0
-
-    assert inner(np.array([9, 4])) == 7.0
-    assert outer(np.array([2.0, 1.5])) == 6.0
-    assert inner(np.array([9.0, 0.0])) == 3.5
-    assert outer(np.array([2.0, 1.5])) == 6.0
-
-
-def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(cache, "PATIENCE_S", 0.0)
-    kernels = [
-        lambda x: x + 1,
-        lambda x: x - 2,
-        lambda x: x * 3,
-        lambda x: x * x,
-    ]
-    said = cache.COMPILING.format(1.0)
-    for folder, new in ((None, kernels[:2]), (tmp_path, kernels[2:])):  # two kernels, one word
-        say_once.cache_clear()
-        for kernel in new:
-            assert compiled.compile_into(folder, kernel)(0.0) == kernel(0.0)
-        assert capsys.readouterr().err == f"beaver-ftc: {said}\n"
-
-
-def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeypatch, capsys):
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(cache.CodeCache, "_write", full)
-    twice = compiled.compile_into(tmp_path, lambda x: 2 * x)
-    assert twice(3) == 6
-    assert "compiled code cannot be kept in" in capsys.readouterr().err

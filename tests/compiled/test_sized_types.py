@@ -1,11 +1,8 @@
 """Compiled code of one size of record is that of all, on whatever copy of a record, and refuses any other."""
 
-import copy
-import io
 import json
 import multiprocessing
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -17,10 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import direct, kernel, plain, record, sized, target
-from beaver_ftc.compiled.records import LINE_BYTES, Room, shape_of
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, BlockCapacity, StatisticalSize
-from beaver_ftc.loop.assembly import frame_dtype, taken
+from beaver_ftc.compiled import direct, kernel, plain, record, sized
+from beaver_ftc.compiled.records import shape_of
 
 of_known = pytest.mark.skipif(
     numba.config.DISABLE_JIT or not compiled.borrows(), reason="records have sizes to this compiler"
@@ -118,39 +113,6 @@ def test_one_compiled_code_serves_all_sizes():
     assert len(everything.overloads) == 1
 
 
-def copies(records):
-    file = io.BytesIO()
-    np.save(file, records)
-    file.seek(0)
-    single = records[0].copy()
-    again = np.zeros(1, records.dtype)
-    again[0] = single
-    return {
-        "array": records.copy(), "record": again, "deep": copy.deepcopy(records),
-        "pickle": pickle.loads(pickle.dumps(records)), "file": np.load(file),
-        "recarray": records.view(np.recarray).copy(),
-        "bytes": np.frombuffer(bytearray(records.tobytes()), records.dtype),
-        "of two": np.concatenate([records, filled(3, 2, 5)])[:1],
-    }  # fmt: skip
-
-
-def test_a_copy_is_as_good_as_the_record():
-    records = filled(3, 2, 7)
-    expected, totals = as_plain(records)
-    for name, other in copies(records).items():
-        found = np.zeros(6)
-        everything(other, found)
-        assert np.array_equal(other, expected), name
-        assert found == pytest.approx(totals), name
-
-
-def test_a_single_record_and_its_copy_too():
-    block = filled(3, 2, 7)[0]["first"]
-    expected = plain(add_up)(block.copy().view((np.record, block.dtype)), 2.0)
-    assert add_up(block.copy(), 2.0) == add_up(pickle.loads(pickle.dumps(block)), 2.0) == expected
-    assert add_up(block, 2.0) == expected
-
-
 def _in_a_worker(records):
     found = np.zeros(6)
     everything(records, found)
@@ -194,61 +156,8 @@ def test_a_record_laid_out_otherwise_is_refused():
         direct(everything, filled(2, 2), found)(others, found)
 
 
-def test_strangers_compile_with_such_a_record_by_numbas_own_means():
-    @numba.njit
-    def level(block):
-        return block.level + block.state.sum()
-
-    block = filled(2, 3)[0]["first"]
-    assert level(block) == block["level"] + block["state"].sum()
-    assert isinstance(numba.typeof(block), numba.types.Record)
-
-
-def test_what_changes_in_size_stands_last():
-    dtype = whole_dtype(4, 2)
-    assert dtype.names == ("k", "test", "share", "column", "room", "first", "blocks", "views")
-    starts = [whole_dtype(n, 3).fields[name][1] for n in (1, 6) for name in dtype.names[:4]]
-    assert starts[:4] == starts[4:]
-    assert shape_of(TEST) is None
-    assert shape_of(dtype) == shape_of(whole_dtype(1, 7)) != shape_of(block_dtype(4, 2))
-
-
 def begins(array):
     return array.__array_interface__["data"][0]
-
-
-@pytest.mark.parametrize("n", [3, 17])
-def test_what_fills_several_lines_of_the_cache_begins_with_one(n):
-    """In a flight's memory, of whatever size; what is smaller stands close, without a gap before it."""
-    frames = taken((3,), frame_dtype(n, StatisticalSize(BlockCapacity(9, 5), BlockCapacity(7, 6), 2, 3)))
-    for frame in frames:
-        for block in frame["fdi"]["statistical"]["block"]:
-            assert begins(block["tests"]) % LINE_BYTES == 0
-            assert begins(block["R"]) % LINE_BYTES == 0
-    close = record(k=int, few=Room(3), other=Room(5))
-    assert [close.fields[name][1] for name in close.names] == [0, 8, 32]
-    assert close.itemsize == 72
-
-
-def test_a_room_stays_one_in_sums_products_and_quotients():
-    n = Room(4)
-    made = (n + 1, 1 + n, 3 * n, n * 3, n - 1, 2 + 3 * n, (n + 3) // 3)
-    assert made == (5, 5, 12, 12, 3, 14, 2)
-    assert {type(each) for each in made} == {Room}
-
-
-def test_records_that_change_in_size_stand_in_a_row():
-    with pytest.raises(TypeError, match="no arrays of 2 dimensions"):
-        record(views=(block_dtype(2, 2), 3, Room(3)))
-
-
-@of_known
-def test_flights_of_all_sizes_have_one_type():
-    """Surfaces, terms of the model, boxes of its error map, delays: none makes another."""
-    kind_of = target.kind_of
-    large = StatisticalSize(BlockCapacity(105, 62), BlockCapacity(108, 21), 47, 20)
-    sizes = [(n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_SIZE, large) for line in (512, 9000)]
-    assert {kind_of(frame_dtype(*of), 1) for of in sizes} == {kind_of(frame_dtype(4), 1)}
 
 
 ASKED = """

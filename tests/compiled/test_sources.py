@@ -2,16 +2,11 @@
 
 import sys
 from importlib import import_module
-from pathlib import Path
-from pkgutil import walk_packages
-from types import BuiltinFunctionType, FunctionType, ModuleType, NoneType
+from types import ModuleType
 
-import numpy as np
 import pytest
 
-import beaver_ftc
 from beaver_ftc import compiled
-from beaver_ftc.compiled import cache, records, target
 from beaver_ftc.compiled.cache import digest_of
 
 SOLE = """
@@ -126,73 +121,6 @@ def test_what_changes_its_code_makes_another_name(digest, file, before, after):
 )
 def test_what_changes_nothing_of_its_code_leaves_its_name(digest, before, after):
     assert digest() == digest("sole.py", before, after)
-
-
-CONTENTS = (
-    NoneType,
-    float,
-    np.ndarray,
-    np.generic,
-    np.dtype,
-    tuple,
-    list,
-    frozenset,
-    bool,
-    int,
-    complex,
-    str,
-    bytes,
-)
-NAMES = (BuiltinFunctionType, FunctionType, ModuleType)  # of a library, or followed by their contents
-
-
-def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
-    """By its contents; of a value of any other kind, an instance of a class, only its name would count."""
-    value, other, kernels = cache._value, set(), 0
-
-    def noted(found, seen):
-        plain = getattr(found, "py_func", found)
-        intrinsic = isinstance(getattr(found, "_defn", None), FunctionType)
-        of_records = any(found is each for each in OF_RECORDS)
-        if not (isinstance(plain, CONTENTS + NAMES) or intrinsic or of_records):
-            other.add(f"{type(found).__qualname__} {getattr(found, '__name__', found)}")
-        yield from value(found, seen)
-
-    monkeypatch.setattr(cache, "_value", noted)
-    for module in walk_packages(beaver_ftc.__path__, "beaver_ftc."):
-        if module.name.startswith("beaver_ftc.integrations"):  # former places of products
-            continue
-        for made in vars(import_module(module.name)).values():
-            if isinstance(made, target.Kernel) and made.py_func.__module__ == module.name:
-                kernels += 1
-                digest_of(made.py_func)
-    assert kernels > 300
-    assert other == set()
-
-
-# What makes records' types, which are no part of code: it has the name of a kernel, `record`.
-OF_RECORDS = (records.Room, records.Part, records.Shape, records._shapes)
-
-
-def test_how_code_is_compiled_names_the_folder(monkeypatch, tmp_path):
-    files = sorted(Path(compiled.__file__).parent.glob("*.py"))
-    for file in files:
-        (tmp_path / file.name).write_bytes(file.read_bytes())
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(compiled, "_FOLDER", tmp_path)
-
-    def name():
-        compiled.cache_folder.cache_clear()
-        return compiled.cache_folder().name
-
-    names = [name(), name()]
-    for file in files:
-        (tmp_path / file.name).write_bytes(file.read_bytes() + b"\n")
-        names.append(name())
-    monkeypatch.undo()
-    compiled.cache_folder.cache_clear()
-    assert names[0] == names[1]
-    assert len(set(names)) == 1 + len(files)
 
 
 PROGRAM = """

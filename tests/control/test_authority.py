@@ -1,17 +1,14 @@
 """Lost authority: the attainable moments, the reference bent to them, and the probe that nobody feels."""
 
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.aircraft.aircraft import Travel
 from beaver_ftc.control import allocation, laws
 from law_records import fields, new_control
-from telling import apart
 
 DT = 0.01
 LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1.03])
@@ -33,17 +30,6 @@ def test_the_attainable_interval_is_spanned_by_the_corners_of_the_travel(row):
     assert greatest == pytest.approx(max(corners), abs=1e-12)
 
 
-def test_without_a_loss_the_law_follows_the_reference_model_to_the_bit():
-    control = control_record()
-    for k in range(50):
-        wanted = np.array([0.05 * np.sin(k / 9), 0.02, -0.01])
-        laws.follow(control["reference"]["config"], control["reference"]["output"], wanted)
-        laws.govern(control["reference"], wanted, control["axes"]["shortfall"], False)
-        assert np.array_equal(
-            control["reference"]["output"]["governed_rate"], control["reference"]["output"]["model_rate"]
-        )
-
-
 def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_comes_back():
     control = control_record()
     control["reference"]["memory"]["active"] = 1
@@ -57,17 +43,6 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
     for _ in range(round(5 * laws.RECOVERY_S / DT)):
         laws.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
     assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
-
-
-def test_a_demand_beyond_the_stops_is_noted():
-    control = control_record()
-    out, by_engines = control["allocation"]["output"], np.zeros((2, 3))
-    control["axes"]["G"][1, 3], out["command"] = 2.2, (0.0, 0.0, 0.0, -0.1)  # nothing but the flap is left
-    control["axes"]["demand"] = [0.0, -1.0, 0.0]
-    control["axes"]["hold"] = [0.0, -0.5, 0.0]
-    allocation.note_shortfall(control["axes"], out["command"], control["layout"], np.zeros(4), by_engines)
-    assert control["axes"]["shortfall"][1] == pytest.approx(-1.0 + 0.22)
-    assert list(control["axes"]["beyond"]) == [0, 1, 0]
 
 
 def test_what_a_lagging_surface_still_gives_is_no_shortfall():
@@ -112,23 +87,3 @@ class TestProbing:
         axes["demand"] = 0.0, needed, 0.0
         allocation.allocate(axes, out, control["layout"], np.ones(4), 0.0, probe)
         assert (G @ out["command"])[1] == pytest.approx(needed, abs=1e-12)
-
-
-SIX = {"left": (-0.4, 0.1), "right": (-0.2, 0.25), "elevator": (-0.5, 0.3), "stabiliser": (-0.05, 0.15),
-       "rudder": (-0.35, 0.48), "flap": (-0.1, 1.0)}  # fmt: skip
-EFFECT = {"left": (-7.0, 0.5, 0.3), "right": (-6.0, 0.4, 0.2), "elevator": (0.1, -9.0, 0.6),
-          "stabiliser": (0.7, -11.0, 0.8), "rudder": (0.9, 1.1, -3.0), "flap": (1.2, 2.0, 1.3)}  # fmt: skip
-
-
-@pytest.mark.parametrize("aside", [(), ("flap",)])
-def test_whose_the_authority_is_goes_by_effect_times_the_whole_travel(aside):
-    apart(travel=[high - low for low, high in SIX.values()], effect=list(EFFECT.values()))
-    of = SimpleNamespace(
-        n=6, surfaces=tuple(SIX), primary=("left", "elevator", "rudder"), stand_ins=aside, effect=EFFECT,
-        travel={name: Travel(*stops) for name, stops in SIX.items()}, dominant_axis=(0, 0, 1, 1, 2, 1),
-    )  # fmt: skip
-    shares = allocation._authority(of, {"main": [0, 2, 4], "is_backup": [name in aside for name in SIX]})
-    pitch = np.array([0.0, 0.0, 9.0 * 0.8, 11.0 * 0.2, 0.0, 0.0 if aside else 2.0 * 1.1])
-    assert shares[1] == pytest.approx(pitch / pitch.sum())
-    assert shares[0] == pytest.approx(np.array([7.0 * 0.5, 6.0 * 0.45, 0, 0, 0, 0]) / 6.2)
-    assert shares[2].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]

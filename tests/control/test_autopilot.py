@@ -6,12 +6,8 @@ from pydantic import ValidationError
 
 from beaver_ftc.control import autopilot as setup
 from beaver_ftc.control.autopilot import (
-    ALTITUDE,
     AUTOPILOT,
     BANK,
-    HEADING,
-    SPEED,
-    advance_commands,
     set_body_rates,
 )
 from beaver_ftc.control.laws.rejecting import margins
@@ -45,44 +41,6 @@ def altitude_error_bound_m(log):
 
 def heading_off(log):
     return np.degrees(np.arcsin(np.sin(log["psi_rad"] - log["heading_command_rad"])))
-
-
-class TestProfile:
-    def record(self, **legs):
-        autopilot = np.zeros(1, AUTOPILOT)[0]
-        autopilot["dt"] = 0.1
-        channels = {"altitude": ALTITUDE, "speed": SPEED, "heading": HEADING, "bank": BANK}
-        for name, (at_s, value, pace) in legs.items():
-            c = channels[name]
-            autopilot["n_legs"][c] = len(at_s)
-            autopilot["leg_starts_at_s"][c, : len(at_s)], autopilot["leg_value"][c, : len(at_s)] = at_s, value
-            autopilot["leg_max_command_rate"][c, : len(at_s)] = pace
-        return autopilot
-
-    def at(self, autopilot, t_s, measured=(100.0, 40.0, 0.0, 0.0)):
-        for t in np.arange(round(t_s / 0.1) + 1) * 0.1:
-            advance_commands(autopilot, measured, t)
-        return autopilot
-
-    def test_a_climb_at_its_pace_and_no_further(self):
-        climb = {"altitude": ([1.0], [110.0], [2.0])}
-        assert self.at(self.record(**climb), 0.9)["is_commanded"][ALTITUDE] == 0
-        # from 1 s on, 2 m/s: after 3 s of it 6 m, and the first step is taken in the frame at 1 s
-        assert self.at(self.record(**climb), 3.9)["command"][ALTITUDE] == pytest.approx(106.0)
-        assert self.at(self.record(**climb), 20.0)["command"][ALTITUDE] == pytest.approx(110.0)
-
-    def test_hold_stops_a_climb_where_it_is(self):
-        autopilot = self.record(altitude=([0.0, 2.0], [200.0, np.nan], [5.0, 5.0]))
-        assert self.at(autopilot, 30.0)["command"][ALTITUDE] == pytest.approx(110.0)
-
-    def test_hold_takes_what_is_flown_if_nothing_was_commanded(self):
-        assert self.at(self.record(speed=([0.0], [np.nan], [1.0])), 3.0)["command"][SPEED] == 40.0
-
-    @pytest.mark.parametrize(("start", "goal", "way"), [(350, 10, 20), (10, 350, -20), (0, 170, 170)])
-    def test_a_turn_goes_the_shorter_way(self, start, goal, way):
-        autopilot = self.record(heading=([0.0], [np.radians(goal)], [np.inf]))
-        self.at(autopilot, 0.0, (0.0, 0.0, np.radians(start), 0.0))
-        assert np.degrees(autopilot["command"][HEADING]) - start == pytest.approx(way)
 
 
 def test_body_rates_of_a_steady_turn():
@@ -182,13 +140,6 @@ class TestFlights:
         assert np.degrees(np.abs(log["phi_rad"])).max() < 20.0
         assert metrics(flight)["profile"]["heading_deg"] < 8.0
 
-    def test_the_reference_is_added_to(self):
-        roll = {"p": [{"sine": {"amplitude_deg_s": 2, "frequency_hz": 0.5}}]}
-        _, log = flown(12.0, reference=roll)
-        _, plain = flown(12.0)
-        added = log["p_reference_rad_s"] - plain["p_reference_rad_s"]
-        assert np.degrees(np.abs(added[200:])).max() == pytest.approx(2.0, rel=0.5)
-
 
 def mistakes(keys):
     with pytest.raises(ValidationError) as caught:
@@ -209,43 +160,3 @@ class TestScenario:
     )
     def test_mistakes_are_refused(self, autopilot, says):
         assert says in mistakes({"autopilot": autopilot})
-
-    @pytest.mark.parametrize("key", ["altitude_within_m", "airspeed_within_mps", "heading_within_deg"])
-    def test_nothing_is_expected_of_a_profile_that_is_not_flown(self, key):
-        assert "there is no profile" in mistakes({"expect": {key: 5}})
-
-    @pytest.mark.parametrize("channel", ["altitude_m", "airspeed_mps", "heading_deg"])
-    def test_nothing_arrives_without_a_profile(self, channel):
-        said = mistakes({"expect": {"arrives": {channel: 5}}})
-        assert f"('expect', 'arrives', '{channel}'), 'there is no profile" in said
-
-    def test_where_it_arrives_is_the_mean_of_its_last_seconds(self):
-        expect = {"arrives": {"altitude_m": 3, "airspeed_mps": 1, "heading_deg": 0.001, "in_envelope": True}}
-        flight, log = flown(40.0, expect=expect)
-        document = metrics(flight)
-        age_s = log["t_s"][-1] - log["t_s"]
-        weights = np.exp(-age_s / 10.0) / np.exp(-age_s / 10.0).sum()
-        off = {
-            "altitude_m": (log["altitude_m"] - log["altitude_command_m"]) @ weights,
-            "airspeed_mps": (log["airspeed_mps"] - log["airspeed_command_mps"]) @ weights,
-        }
-        for channel, mean in off.items():
-            assert document["arrival"][channel] == pytest.approx(mean, abs=0.05)
-        assert document["arrival"]["in_envelope"]
-        passed = {one["name"]: one["passed"] for one in document["expectations"]}
-        assert passed == {
-            "arrives.altitude_m": True, "arrives.airspeed_mps": True, "arrives.heading_deg": False,
-            "arrives.in_envelope": True,
-        }  # fmt: skip
-
-    def test_expectations_are_judged(self):
-        expect = {
-            "altitude_within_m": 5, "airspeed_within_mps": 2, "heading_within_deg": 0.001,
-            "pre_fault_rms_deg_s": {"p": 0.5}, "stays_in_envelope": True,
-        }  # fmt: skip
-        flight, _ = flown(20.0, expect=expect)
-        passed = {one["name"]: one["passed"] for one in metrics(flight)["expectations"]}
-        assert passed == {
-            "altitude_within_m": True, "airspeed_within_mps": True, "heading_within_deg": False,
-            "pre_fault_rms_deg_s.p": True, "stays_in_envelope": True,
-        }  # fmt: skip

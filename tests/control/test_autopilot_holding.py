@@ -5,15 +5,13 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.control import allocation
 from beaver_ftc.control import autopilot as holding
-from beaver_ftc.control.autopilot import AUTOPILOT, FASTEST, SPEED, elevator_needed
+from beaver_ftc.control.autopilot import AUTOPILOT, elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import verdict_lines
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
-from law_records import new_control
 
 MASS_KG, DENSITY = 2288.231, 1.0238  # the latter at 1828.8 m
 STRAIGHT = {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}
@@ -67,40 +65,6 @@ def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, 
         assert slowest == pytest.approx(speeds[~can].min() if not can.all() else 55.0, abs=0.1)
 
 
-def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
-    autopilot = table()
-    record = autopilot.view(np.recarray)[0]
-    record.dt, record.holding.max_airspeed_rate_mps2, record.command[SPEED] = 0.1, 1.0, 45.0
-    record.holding.fastest = np.inf
-    holding.approach_airspeed_to_fly(record)
-    assert record.airspeed_to_fly == 45.0
-    record.holding.fastest = 40.0
-    flown = [record.airspeed_to_fly]
-    for _ in range(80):
-        holding.approach_airspeed_to_fly(record)
-        flown.append(record.airspeed_to_fly)
-    np.testing.assert_allclose(np.diff(flown)[:50], -0.1)
-    assert flown[-1] == 40.0
-    record.holding.fastest = np.inf
-    for _ in range(60):
-        holding.approach_airspeed_to_fly(record)
-    assert (record.airspeed_to_fly, record.holding.limits_airspeed) == (45.0, 0)
-
-
-def test_the_flap_takes_what_an_elevator_at_its_stop_leaves():
-    control = new_control(main=(0, 1, 2), stand_in=3, command=(0.0, -0.4, 0.0, 0.0), saturated=(0, 1, 0, 0))
-    layout, out, axes = control["layout"], control["allocation"]["output"], control["axes"]
-    layout["low"], layout["high"] = [-0.5, -0.4, -0.4, -0.1], [0.5, 0.4, 0.4, 1.0]
-    G, u, axes["demand"] = axes["G"], out["command"], (0.0, 5.0, 0.0)
-    G[1, 1], G[1, 3] = -10.0, 2.5
-    allocation.spill_to_flap(axes, out, layout)
-    assert u[3] == pytest.approx(0.4)
-    assert (G @ u)[1] == pytest.approx(5.0)
-    out["saturated"][1], u[3] = 0, 0.2
-    allocation.spill_to_flap(axes, out, layout)
-    assert u[3] == 0.2
-
-
 class TestFlights:
     @pytest.mark.parametrize("position_deg", [-6.0, -7.4])
     def test_a_jam_nose_up_is_flown_at_a_speed_that_can_be_held(self, position_deg):
@@ -118,27 +82,6 @@ class TestFlights:
         assert np.abs(np.diff(log["airspeed_limited_mps"])).max() < 0.0101  # no bump: 1 m/s2 at 100 Hz
         said = dict(verdict_lines(measure(flight)))["limited"]
         assert said.startswith(f"airspeed to at most {limits[0]['value']:.1f} m/s from 2")
-
-    def test_a_jam_that_can_be_held_limits_nothing(self):
-        flight, log = jammed(0.6, 60.0)
-        assert metrics(flight)["limits"] == []
-        np.testing.assert_array_equal(log["airspeed_limited_mps"], log["airspeed_command_mps"])
-
-    def test_a_repaired_elevator_gives_the_commanded_airspeed_back(self):
-        sim = bf.Simulation({"name": "back", "duration_s": 120, "autopilot": STRAIGHT, "actuators": "servo",
-                             "fdi": {"fault_class": "all"}, "control": {"law": "oracle"}})  # fmt: skip
-        autopilot = sim._loop.frames["autopilot"][0]
-        for t_s, fault in ((10.0, True), (50.0, False), (110.0, None)):
-            while sim.t_s < t_s:
-                sim.step()
-            if fault:
-                sim.inject({"type": "stuck", "actuator": "elevator", "position_deg": -7.0})
-            elif fault is False:
-                assert autopilot["holding"]["in_force"][FASTEST]
-                assert autopilot["airspeed_to_fly"] == pytest.approx(40.0, abs=1.0)
-                sim.repair("elevator")
-        assert autopilot["airspeed_to_fly"] == autopilot["command"][SPEED]
-        assert not autopilot["holding"]["in_force"][FASTEST]
 
     def test_a_lost_aileron_limits_the_bank_and_says_so(self):
         fault = {"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 10.0}

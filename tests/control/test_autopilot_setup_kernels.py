@@ -1,7 +1,6 @@
 """What the autopilot takes from the aircraft's file: each number as the balance it stands for."""
 
 from math import inf, radians
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from scipy.optimize import root
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import autopilot as profile
-from beaver_ftc.control.autopilot import AUTOPILOT, GAIN, N_FLAP, N_QDYN
+from beaver_ftc.control.autopilot import AUTOPILOT, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -40,32 +39,6 @@ def filled():
     return set_up()
 
 
-def coefficient(name, **of):
-    """A coefficient of the aircraft's file where only these signals are not zero."""
-    neutral = {factor: 0.0 for term in AIRCRAFT.terms.values() for factor in term.factors}
-    return AIRCRAFT.coefficient(name, neutral | of)
-
-
-def test_without_a_profile_it_is_off():
-    pilot, control = set_up(autopilot=None)
-    assert pilot.tobytes() == np.zeros(1, AUTOPILOT)[0].tobytes()
-    assert control["reference"]["config"]["steered"] == 0
-
-
-def test_the_legs_are_in_si_and_what_is_held_has_no_value(filled):
-    pilot, control = filled
-    assert (pilot["enabled"], control["reference"]["config"]["steered"]) == (1, 1)
-    assert pilot["dt"] == pytest.approx(0.01)
-    assert pilot["n_legs"].tolist() == [2, 1, 1, 0]
-    assert pilot["leg_starts_at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]
-    assert np.isnan(pilot["leg_value"][0, 0])
-    assert pilot["leg_value"][0, 1] == 1900.0
-    assert pilot["leg_value"][1:3, 0] == pytest.approx([42.0, np.pi / 2.0])
-    assert pilot["leg_max_command_rate"][0, 1] == 2.5
-    assert pilot["leg_max_command_rate"][1:3, 0].tolist() == [0.4, inf]
-    assert (pilot["changed_at_s"] == -inf).all()
-
-
 @pytest.mark.parametrize(
     ("loop", "rate", "damping"),
     [("altitude", 0.8, 2.0), ("speed", 0.3, 1.224745), ("bank", 1.0, 1.118034), ("heading", 0.25, 1.976424)],
@@ -75,67 +48,6 @@ def test_a_loop_that_integrates_what_is_missing_does_not_overshoot_by_it(filled,
     gain = filled[0]["gain"]
     assert gain[loop] == rate
     assert gain[loop] / (2.0 * np.sqrt(gain[f"{loop}_i"])) == pytest.approx(damping, rel=1e-6)
-
-
-@pytest.mark.parametrize(("by", "slower"), [("power", 1.5), ("pitch", 1.0)])
-def test_an_engine_that_lags_slows_its_loop_down_and_nothing_else(filled, by, slower):
-    """3 s of the loop and 1.5 of the engine in a row: k by 1.5, k_i by its square, so that it damps alike."""
-    engine = SimpleNamespace(thrust=SimpleNamespace(lag_s=1.5))
-    lagging = profile._gains(SimpleNamespace(engine=engine, airspeed_by=by))
-    usual = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
-    assert lagging["speed"] == pytest.approx(usual["speed"] / slower)
-    damping = [gain["speed"] / np.sqrt(gain["speed_i"]) for gain in (lagging, usual)]
-    assert damping[0] == pytest.approx(damping[1])
-    assert {name for name in usual if lagging[name] != usual[name]} <= {"speed", "speed_i"}
-    assert lagging["airspeed_s"] == 3.0
-
-
-def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
-    """Attitude 3 1/s; altitude and speed beside it; heading a quarter of bank. Time constants in s."""
-    gain = {name: float(filled[0]["gain"][name]) for name in GAIN.names}
-    assert gain["attitude"] == 3.0
-    assert gain["heading"] == gain["bank"] / 4.0
-    assert {name: gain[name] for name in gain if name.endswith("_s")} == {
-        "alpha_s": 2.0, "airspeed_s": 3.0, "jammed_s": 1.0, "authority_s": 1.0, "bank_s": 6.0,
-    }  # fmt: skip
-    left = {"sideslip": 0.5, "spare_mps": 2.0, "path_per_mps": 0.02, "loose": 0.4, "protection": 2.0}
-    assert {name: gain[name] for name in left} == left
-    assert min(gain.values()) > 0.0  # none is forgotten
-
-
-def test_limits_and_the_engines_range_are_taken_over(filled):
-    pilot, _ = filled
-    assert [pilot[f"{name}_power"] for name in ("trim", "low", "high")] == [20.0, 12.0, 28.0]
-    assert pilot["max_healthy_rate"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
-    assert (pilot["max_healthy_bank"], pilot["steepest_alpha"]) == pytest.approx(
-        (radians(30.0), radians(15.0))
-    )
-    assert pilot["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
-    assert pilot["gravity"] == pytest.approx(9.80665)
-
-
-def test_thrust_is_what_the_slipstream_adds_along_the_body(filled):
-    """Per dynamic pressure and dpt; the part on alpha for the square of dpt. At 1.1 times the mass."""
-    per_mass = AIRCRAFT.geometry.wing_area_m2 / (1.1 * AIRCRAFT.mass.mass_kg)
-    straight = coefficient("CX", dpt=1.0) - coefficient("CX")
-    inclined = coefficient("CX", alpha=0.1, dpt=1.0) - coefficient("CX", alpha=0.1) - straight
-    assert filled[0]["thrust"] == pytest.approx([per_mass * straight, per_mass * inclined / 0.1])
-
-
-def test_the_dihedral_is_the_roll_that_sideslip_sustains(filled):
-    beta, V = 0.05, 45.0
-    p = -filled[0]["dihedral"] * V * beta
-    ph = p * AIRCRAFT.geometry.span_m / (2.0 * V)
-    assert coefficient("Cl", beta=beta) < 0.0
-    assert coefficient("Cl", beta=beta, ph=ph) == pytest.approx(coefficient("Cl"), abs=1e-12)
-
-
-def test_the_weathercock_holds_full_power_at_the_largest_sideslip_accepted(filled):
-    dpt = filled[0]["dpt_cubed_held_by_sideslip"] ** (1.0 / 3.0)
-    pulled = coefficient("Cn", dpt=dpt) - coefficient("Cn")
-    assert abs(pulled) > 1e-4
-    beta = -np.sign(pulled) * 0.2  # rad, a third of what is a departure
-    assert coefficient("Cn", dpt=dpt, beta=beta) == pytest.approx(coefficient("Cn"), abs=1e-12)
 
 
 def level(qdyn_pa, flap_rad):
@@ -183,79 +95,3 @@ def test_what_takes_more_thrust_or_incidence_than_there_is_cannot_be_held(qdyn_p
     expected = level(qdyn_pa, flap_rad) if held else np.nan
     assert needed[0, 1] == pytest.approx(expected, abs=1e-7, nan_ok=True)
     assert needed[1, 0] == pytest.approx(level(900.0, 0.3), abs=1e-7)
-
-
-def test_without_a_surface_that_stands_in_nothing_is_known_of_what_can_be_held():
-    hold = set_up(stand_in=-1)[0]["holding"]
-    assert (hold["has_table"], hold["fastest"]) == (0, inf)
-    assert not hold["qdyn"].any()
-
-
-def made_up(terms, **autopilot):
-    """A scenario of an aircraft that has these terms alone."""
-    aircraft = SimpleNamespace(
-        name="glider",
-        airspeed_by="",
-        terms={name: SimpleNamespace(value=value) for name, value in terms.items()},
-        geometry=SimpleNamespace(wing_area_m2=20.0, span_m=10.0),
-        mass=SimpleNamespace(mass_kg=500.0),
-        envelope=SimpleNamespace(airspeed_mps=(25.0, 50.0)),
-    )
-    legs = SimpleNamespace(**({"airspeed_mps": ()} | autopilot))
-    return SimpleNamespace(
-        name="aloft", aircraft=aircraft, autopilot=legs, design_model=SimpleNamespace(mass=1.0)
-    )
-
-
-def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
-    pilot = np.zeros(1, AUTOPILOT)[0]
-    profile._set_up_aircraft_values(pilot, made_up({}))
-    assert not pilot["thrust"].any()
-    assert pilot["dihedral"] == pytest.approx(0.01 * 2.0 / 10.0)
-    assert pilot["dpt_cubed_held_by_sideslip"] == inf  # no power yaws it
-    unstable = {"Cn_dpt3": -0.1, "Cn_beta": -0.2, "Cl_beta": -0.3, "Cl_p": -0.5}
-    profile._set_up_aircraft_values(pilot, made_up(unstable))
-    assert pilot["dpt_cubed_held_by_sideslip"] == 0.0
-    assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
-    profile._set_up_aircraft_values(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
-    assert pilot["dpt_cubed_held_by_sideslip"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
-
-
-def test_nothing_is_climbed_within_two_metres_a_second_of_the_slowest_flight(filled):
-    assert filled[0]["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
-
-
-THRUST = SimpleNamespace(airspeed_mps=(20.0, 60.0), setting=(0.0, 0.5, 1.0), force_n=((0.0, 400.0, 900.0),
-                         (-50.0, 300.0, 700.0)))  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("by", "terms", "filled", "pitch"),
-    [("power", {}, True, 0), ("power", {"CX_adpt2": 0.2, "CX_dpt": 0.1}, False, 0), ("pitch", {}, False, 1)],
-)
-def test_the_table_of_thrust_serves_where_power_holds_the_airspeed_and_no_slipstream_says_it(
-    by, terms, filled, pitch
-):
-    """At 1.2 times the mass of 500 kg; with 1e-4 m/s2 a setting, so that each has its own."""
-    scenario = made_up(terms)
-    scenario.aircraft.airspeed_by, scenario.aircraft.engine = by, SimpleNamespace(thrust=THRUST)
-    scenario.design_model.mass = 1.2
-    pilot = np.zeros(1, AUTOPILOT)[0]
-    profile._set_up_aircraft_values(pilot, scenario)
-    engine = pilot["engine"]
-    assert pilot["pitch_holds_airspeed"] == pitch
-    assert (engine["airspeeds"], engine["settings"]) == ((2, 3) if filled else (0, 0))
-    expected = np.array(THRUST.force_n) / 600.0 + 1e-4 * np.arange(3) if filled else np.zeros((2, 3))
-    assert engine["table"][:2, :3] == pytest.approx(expected)
-    of_slipstream = [terms.get(name, 0.0) * 20.0 / 600.0 for name in ("CX_dpt", "CX_adpt2")]
-    assert pilot["thrust"] == pytest.approx(of_slipstream)
-    assert pilot["slowest_mps"] == pytest.approx(25.0 + 2.0)
-
-
-@pytest.mark.parametrize(("fastest", "slowest"), [(50.0, 27.0), (30.0, 26.0)])
-def test_a_fifth_of_a_narrow_envelope_is_kept_above_its_slowest_airspeed(fastest, slowest):
-    scenario = made_up({})
-    scenario.aircraft.envelope.airspeed_mps = (25.0, fastest)
-    pilot = np.zeros(1, AUTOPILOT)[0]
-    profile._set_up_aircraft_values(pilot, scenario)
-    assert pilot["slowest_mps"] == pytest.approx(slowest)

@@ -16,7 +16,6 @@ from flying import loss
 
 UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12.0}
 OURS = {"fdi.scheme": "adaptive-estimators", "fdi.thresholds": "published", "fdi.sharpen": "none"}
-SHARPENED = {"fdi.thresholds": "interval", "fdi.sharpen": "all"}
 PUBLISHED, DEFAULT = "fault-tolerant-published", "fault-tolerant"
 
 
@@ -78,23 +77,3 @@ def test_pitch_is_handed_back_without_a_leap(law):
     gone = {"fault": "elevator", "from_s": 12.0, "to_s": 16.0, "because": because}
     assert document["isolation"]["withdrawn"] == [gone]
     assert document["isolation"]["so_far"] is None  # a plug-in says itself how sure it is
-
-
-@pytest.mark.parametrize("law", [PUBLISHED, DEFAULT])
-@pytest.mark.parametrize("airspeed_mps", [38.0, 43.0, 48.0, 52.0])
-def test_the_unanticipated_fault_is_never_left_named_by_the_sharpened_estimators(law, airspeed_mps):
-    document, _, frame = unanticipated(law, airspeed_mps, **SHARPENED)
-    assert document["isolation"]["fault"] == "unanticipated"
-    assert document["isolation"]["so_far"] is False
-    assert document["isolation"]["withdrawn"] == []
-    assert document["supervisor"][-1]["mode"] == "unanticipated"
-    assert frame["control"]["allocation"]["output"]["hand_over"] == 0.0
-
-
-@pytest.mark.parametrize(("airspeed_mps", "named"), [(43.0, "unanticipated"), (48.0, "elevator")])
-def test_where_the_norm_bound_leaves_a_surface_named_the_verdict_says_so_far(airspeed_mps, named):
-    document, _, _ = unanticipated(PUBLISHED, airspeed_mps)
-    isolation = document["isolation"]
-    assert isolation["fault"] == named
-    assert isolation["so_far"] is (named == "elevator")
-    assert [gone["fault"] for gone in isolation["withdrawn"]] == ["elevator"] * (named == "unanticipated")

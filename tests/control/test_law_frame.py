@@ -5,16 +5,13 @@ import pytest
 
 from beaver_ftc.control import row_of
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.control.laws import compiled_rivals, published
-from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
-from law_records import fields, put
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -49,66 +46,6 @@ def accommodated(frame, **faults):
     whole.assess_faults(frame)
     whole.accommodate(frame)
     return frame["control"]["surfaces"]["output"]
-
-
-@pytest.mark.parametrize("name", ["nominal", "adaptive", "fault-tolerant-published"])
-def test_the_published_law_inverts_the_model_and_integrates(name):
-    """G u = xm' + Kp (xm - x) + Ki int - f, the flap in trim; within the travel nothing is taken back."""
-    frame = new_frame(name)
-    control = put(frame["control"], governed_rate=0.01, governed_acceleration=0.02)
-    feedback, out, f = fields(control["published"]), control["allocation"]["output"], frame["prediction"]["f"]
-    feedback["integral"] = 0.003
-    before = feedback["integral"].copy()
-    commanded(frame)
-    error = 0.01 - X
-    wanted = 0.02 + feedback["Kp"] * error + feedback["Ki"] * before - f
-    assert G @ out["command"] == pytest.approx(wanted)
-    assert out["command"][FLAP] == pytest.approx(control["layout"]["trim"][FLAP])
-    assert feedback["integral"] == pytest.approx(before + control["reference"]["config"]["dt"] * error)
-    assert control["axes"]["hold"] == pytest.approx(-f)
-
-
-def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
-    frame = new_frame("fault-tolerant")
-    commanded(frame)
-    control = frame["control"]
-    assert control["rejecting"]["observer"]["begun"] == 1
-    assert control["rejecting"]["observer"]["rate"] == pytest.approx(X)
-    assert not control["published"]["memory"]["integral"].any()
-    assert control["axes"]["hold"] == pytest.approx(-frame["prediction"]["f"])
-
-
-def believed(frame, surface, theta=-0.6, detected=1):
-    """The isolated loss of a surface, by its estimator."""
-    fdi = frame["fdi"]
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n_estimators"])]
-    place = estimators["surface"].tolist().index(surface)
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, place
-    fdi["isolation"]["estimator"][place]["theta"] = theta
-    return fdi
-
-
-def test_an_isolated_loss_scales_its_own_surface_alone():
-    frame = new_frame("fault-tolerant-published")
-    fdi = believed(frame, RUDDER)
-    surfaces = accommodated(frame)
-    assert surfaces["target"] == pytest.approx([1.0, 1.0, 0.4, 1.0])
-    expected = max(0.4, 1.0 - frame["control"]["surfaces"]["config"]["effectiveness_step"])
-    assert surfaces["effectiveness"][RUDDER] == pytest.approx(expected)
-    assert surfaces["effectiveness"][AILERON] == 1.0
-    assert not surfaces["offset"].any()
-    fdi["verdict"]["has_effectiveness"], fdi["verdict"]["effectiveness"] = 1, (0.9, 0.8, 0.7, 0.6)
-    assert accommodated(frame)["target"] == pytest.approx([0.9, 0.8, 0.7, 0.6])
-
-
-def test_the_oracle_knows_and_no_other_law_looks():
-    true = {"present": 1, "effectiveness": (0.5, 1, 1, 1), "effective": 0.1}
-    for name, target in (("oracle-published", 0.5), ("fault-tolerant-published", 1.0)):
-        frame = new_frame(name)
-        frame["prediction"]["u"] = 0.1
-        surfaces = accommodated(frame, **true)
-        assert surfaces["target"][AILERON] == target
-        assert surfaces["offset"][AILERON] == pytest.approx(0.1 - 0.05 if target == 0.5 else 0.0)
 
 
 @pytest.mark.parametrize("measure", [SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE])
@@ -162,33 +99,6 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt
 
 
-def alarmed(known=0, speaks=0, score=2.0):
-    frame = new_frame()
-    fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
-    fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
-    fdi["bank"]["output"]["threshold"] = 0.1
-    fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
-    fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
-    fdi["isolation"]["estimator"]["xhat"] = 9.0
-    adaptive_estimators.update_verdict(fdi, frame["prediction"], frame["measured"], 5.0)
-    return fdi
-
-
-def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
-    fdi = alarmed()
-    first = int(fdi["isolation"]["config"]["n_estimators"])
-    assert fdi["verdict"]["detected"] == 1
-    assert fdi["isolation"]["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
-    assert fdi["fdae"]["network"]["output"].all()
-    assert (alarmed(known=1)["isolation"]["estimator"]["xhat"][:first] == 9.0).all()
-    quiet = alarmed(score=0.5)
-    assert quiet["verdict"]["detected"] == 0
-    assert not quiet["fdae"]["network"]["output"].any()
-    silenced = alarmed(speaks=1)  # an instrument is broken: no surface is named
-    assert silenced["verdict"]["detected"] == 0
-
-
 def test_known_laws_are_those_of_the_page():
     given = {
         "nominal": (0, 0, 0), "adaptive": (1, 0, 0), "fault-tolerant": (1, 1, 0),
@@ -199,42 +109,3 @@ def test_known_laws_are_those_of_the_page():
     files = {name: row_of(name).file for name in ("fault-tolerant", "fault-tolerant-published")}
     assert files == {"fault-tolerant": "rejecting", "fault-tolerant-published": "published"}
     assert LOSS == 0
-
-
-@pytest.mark.parametrize(("name", "share"), [("nominal", 1.0), ("adaptive", 0.5)])
-def test_all_but_the_nominal_law_reckon_with_what_is_believed_of_a_surface(name, share):
-    frame = new_frame(name)
-    surfaces = fields(frame["control"]["surfaces"])
-    surfaces["effectiveness"][RUDDER], surfaces["effectiveness_step"] = 0.5, 0.0
-    believed = commanded(frame)["axes"]["G"]
-    assert believed[:, RUDDER] == pytest.approx(share * G[:, RUDDER])
-    assert believed[:, AILERON] == pytest.approx(G[:, AILERON])
-
-
-def test_what_the_unknown_is_taken_for_is_taken_off_the_demand():
-    control, f, fhat = new_frame()["control"], np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.07, -0.09])
-    put(control, governed_rate=0.01, governed_acceleration=0.02)
-    law, feedback = control["published"], fields(control["published"])
-    feedback["integral"] = 0.003
-    published.demand(law, control["reference"]["output"], X, f, fhat)
-    wanted = 0.02 + feedback["Kp"] * (0.01 - X) + feedback["Ki"] * 0.003 - f - fhat
-    assert feedback["demand"] == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize("incremental", [1, 0])
-def test_a_compiled_rival_commands_by_itself(incremental):
-    """From what is measured and G, and nothing that the law of ours keeps is moved."""
-    frame, alone = new_frame(), new_frame()
-    for each in (frame, alone):
-        control, rival = each["control"], fields(each["control"]["compiled_rivals"])
-        put(control, law="lqr", model_rate=0.01, model_acceleration=0.02)
-        rival["incremental"] = incremental
-        rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
-        rival["Kp"], rival["Ki"], rival["keep"], rival["surface_filter"] = 2.0, 1.0, 0.5, 0.01
-    given, told = commanded(frame), alone["control"]
-    parts = alone["assessment"], alone["faults"], alone["prediction"], alone["measured"]
-    compiled_rivals.command(told, *parts, MODE_ADAPTIVE, 1.0)
-    command = given["allocation"]["output"]["command"]
-    assert command.tolist() == told["allocation"]["output"]["command"].tolist()
-    assert (command != 0.01).any()
-    assert given["axes"]["hold"].tolist() == told["axes"]["hold"].tolist()

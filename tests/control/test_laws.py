@@ -130,26 +130,6 @@ class TestAllocation:
         assert np.max(np.abs(np.diff(flap))) < 0.02 * np.ptp(flap)
         assert np.abs(np.diff(flap)[[0, -1]]).max() < 0.001 * np.ptp(flap)  # no kink at either end
 
-    def test_a_lost_elevator_is_not_asked_for_anything(self):
-        control = control_record()
-        (
-            control["surfaces"]["output"]["effectiveness"][ELEVATOR],
-            control["allocation"]["output"]["hand_over"],
-        ) = 0.05, 1.0
-        control["axes"]["demand"] = [0.0, 0.3, 0.0]
-        allocation.form_effectiveness_matrix(control["axes"], G_TYPICAL, control["surfaces"], True)
-        G = control["axes"]["G"].copy()
-        u = allocated(control, G)
-        assert u[ELEVATOR] == 0.0
-        assert u[FLAP] == pytest.approx(0.3 / 2.1)
-
-    def test_a_saturated_rudder_leaves_the_roll_demand_met(self):
-        control = control_record()
-        control["axes"]["demand"] = [0.5, 0.0, 3.0]
-        u = allocated(control, G_TYPICAL)
-        assert control["allocation"]["output"]["saturated"][RUDDER] == 1
-        assert (G_TYPICAL @ u)[0] == pytest.approx(0.5, abs=1e-12)
-
 
 def test_effectiveness_moves_no_faster_than_allowed():
     control = control_record()

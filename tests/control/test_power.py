@@ -1,15 +1,11 @@
 """Engine power on pitch: when it takes over, what it may do, and that it helps."""
 
-import shutil
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-import beaver_ftc as bf
-from beaver_ftc.aircraft import load
 from beaver_ftc.control import engines
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
@@ -17,13 +13,9 @@ from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.metrics import measure, metrics
-from beaver_ftc.results.verdict import verdict_lines
-from beaver_ftc.results.views import views
 from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
-from beaver_ftc.studies.matrix.pitch_lost import closed_loop
 from beaver_ftc.studies.mismatch.linear import in_fdc
 from flying import flown, scenario
 from samples import samples
@@ -63,69 +55,6 @@ def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
         steer(control, np.array([0.0, q(k * DT), 0.0]), y, 1, k * DT)
         history.append(float(control["power"]["output"]["command"][0]))
     return np.array(history)
-
-
-class TestWhen:
-    def test_it_waits_out_its_patience_and_then_stays(self):
-        control = control_record(patience_s=1.0)
-        lose_pitch(control)
-        history = steered(control, 300, V=lambda t: 44.0 + min(t, 1.0))
-        assert (history[:99] == 20.0).all()
-        assert (history[110:] < 20.0).all()
-        assert control["power"]["output"]["from_s"] == pytest.approx(0.99, abs=0.011)
-
-    def test_what_attitude_was_missed_before_is_not_its_business(self):
-        control = control_record(patience_s=0.1)
-        control["power"]["memory"]["attitude"] = 0.3
-        engines.watch(control["power"], is_lost(control), 0.0)
-        assert control["power"]["memory"]["attitude"] == 0.3
-        lose_pitch(control)
-        for k in range(20):
-            engines.watch(control["power"], is_lost(control), k * DT)
-            if not control["power"]["memory"]["engaged"]:
-                control["power"]["memory"]["attitude"] = 0.3
-        assert control["power"]["memory"]["engaged"]
-        assert control["power"]["memory"]["attitude"] == 0.0
-
-    def test_one_of_the_two_is_enough_to_do_without(self):
-        for surface in (ELEVATOR, FLAP):
-            control = control_record()
-            control["surfaces"]["output"]["effectiveness"][surface] = 0.0
-            assert (steered(control, 300, V=lambda t: 45 + t) == 20.0).all()
-
-    @pytest.mark.parametrize(("lack", "stop", "engaged"), [(0.3, 1, 1), (0.3, 0, 0), (0.04, 1, 0)])
-    def test_a_lack_that_lasts_counts_when_the_elevator_has_nothing_left(self, lack, stop, engaged):
-        control = control_record()
-        control["axes"]["shortfall"][1], control["allocation"]["output"]["saturated"][ELEVATOR] = lack, stop
-        steered(control, 200)
-        assert control["power"]["memory"]["engaged"] == engaged
-
-    def test_a_lack_that_changes_sign_is_no_less_of_one(self):
-        control = control_record()
-        control["allocation"]["output"]["saturated"][ELEVATOR] = 1
-        for k in range(40):
-            control["axes"]["shortfall"][1] = 0.2 * np.sign(np.sin(k))
-            steered(control, 5)
-        assert control["power"]["memory"]["engaged"] == 1
-
-    def test_when_a_surface_is_back_the_engine_goes_back_to_its_trim_exactly(self):
-        control = control_record(release_s=2.0)
-        lose_pitch(control)
-        steered(control, 300, V=lambda t: 45 + t)
-        control["surfaces"]["output"]["effectiveness"][FLAP] = 1.0
-        history = steered(control, 600)
-        assert history[150] != 20.0
-        assert history[-1] == 20.0
-        assert not control["power"]["output"]["in_use"]
-
-    def test_without_an_alarm_only_the_oracle_acts(self):
-        control = control_record()
-        lose_pitch(control)
-        for informed, engaged in ((0, 0), (1, 1)):
-            control["config"]["informed"] = informed
-            for _ in range(200):
-                steer(control, np.zeros(3), Y, 0, 0.0)
-            assert control["power"]["memory"]["engaged"] == engaged
 
 
 class TestWithin:
@@ -199,15 +128,6 @@ class TestTheDesign:
         else:
             F[:4] += np.outer(B, K)
         return F
-
-    def test_the_range_is_the_engines(self):
-        config = EnginePower()
-        assert (config.lowest_inhg, config.highest_inhg) == load().engine.settings[
-            "manifold_pressure_inhg"
-        ].range
-
-    def test_it_is_the_loop_of_the_report(self):
-        assert closed_loop(*self.plant(45.0), EnginePower()) == pytest.approx(self.loop(45.0), abs=1e-12)
 
     def phugoid_damping(self, F):
         poles = np.linalg.eigvals(F)
@@ -302,58 +222,7 @@ def test_an_aircraft_lost_without_power_is_kept_with_it(V, off_deg, flap_deg):
     assert flight.departure is None
 
 
-@pytest.mark.parametrize("severity", ["light", "moderate"])
-def test_in_turbulence_it_steadies_too(severity):
-    """With noisy instruments; over four seeds, as one flight says little of random air."""
-
-    def unrest(enabled):
-        squares = []
-        for seed in range(1, 5):
-            air = {"turbulence": "dryden", "severity": severity}
-            _, log = lost(45.0, enabled=enabled, seed=seed, environment=air, sensors="tactical-grade")
-            after = log["t_s"] > 15.0
-            squares.append([np.var(log[name][after]) for name in ("theta_rad", "airspeed_mps")])
-        return np.sqrt(np.mean(squares, axis=0))
-
-    assert (unrest(True) < 0.75 * unrest(False)).all()
-
-
-def test_an_ambiguous_verdict_is_no_obstacle():
-    flight, _ = lost(45.0, law="fault-tolerant-published", flap_at_s=20.0)
-    assert flight.isolated in (None, "unanticipated")
-    assert 20.0 < flight.engine_power["from_s"] < 30.0
-
-
-@pytest.mark.parametrize("V", SPEEDS)
-def test_two_jams_named_one_after_the_other_are_acted_upon_at_once(V):
-    fdi = {"fault_class": "all", "pairs": True}
-    flight, _ = lost(V, 1.0, law="fault-tolerant-published", flap_at_s=20.0, fdi=fdi)
-    assert 21.0 <= flight.engine_power["from_s"] < 21.2
-
-
-def test_the_design_model_knows_what_the_engine_does():
-    """Without uncertainty the design model makes of every frame what the truth does, power moving or not."""
-    _, log = lost(45.0, uncertainty={})
-    moving = np.abs(np.diff(log["manifold_pressure_inhg"])) > 0.01
-    error = (log["q_design_rad_s2"][1:] - np.diff(log["q_rad_s"]) / DT)[1:]
-    assert moving.sum() > 200
-    assert np.abs(error[moving[1:]]).max() < 0.02 * 0.02  # a fiftieth of the admitted uncertainty
-
-
-def test_python_hands_the_command_over_as_compiled_code_does(monkeypatch):
-    _, native = lost(45.0, duration_s=20.0)
-    monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
-    _, plain = lost(45.0, duration_s=20.0)
-    assert np.ptp(native["manifold_pressure_inhg"]) > 1.0
-    assert np.array_equal(native.rows, plain.rows, equal_nan=True)
-
-
 class TestOtherwise:
-    def test_the_published_class_knows_nothing_of_it(self):
-        flight, log = lost(45.0, law="fault-tolerant-published", fdi={}, duration_s=20.0)
-        assert "manifold_pressure_inhg" not in log.columns
-        assert flight.engine_power is None
-
     @pytest.mark.parametrize("law", ["oracle-published", "fault-tolerant-published"])
     def test_the_engine_stays_as_it_is_while_elevator_or_flap_act(self, law):
         for faults in ([], [{"actuator": "elevator", "type": "stuck", "at_s": 5.0, "position_deg": 0.6}]):
@@ -368,41 +237,7 @@ class TestOtherwise:
         assert "manifold_pressure_inhg" not in log.columns
 
 
-def test_it_is_reported():
-    flight, log = lost(45.0, duration_s=30.0)
-    document = metrics(flight)["engine_power"]
-    assert document["from_s"] == pytest.approx(13.0, abs=0.02)
-    assert document["in_charge_s"] == pytest.approx(17.0, abs=0.05)
-    assert document["lowest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].min())
-    assert document["highest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].max())
-    assert "took over pitch at 12.99 s" in dict(verdict_lines(measure(flight)))["engine power"]
-    names = [view.name for view in views(log.columns, power=True)]
-    assert "engine" in names
-    assert "engine" not in [view.name for view in views(log.columns)]
-
-
 def test_a_range_upside_down_is_refused_in_one_line():
     text = "name: x\ncontrol:\n  power: {lowest_inhg: 30, highest_inhg: 20}\n"
     with pytest.raises(BadInput, match=r"control\.power\.highest_inhg: below lowest_inhg, allowed: 30 inHg"):
         load_text(text)
-
-
-def test_a_range_may_be_one_value():
-    power = load_text("name: x\ncontrol:\n  power: {lowest_inhg: 21, highest_inhg: 21}\n").control.power
-    assert (power.lowest_inhg, power.highest_inhg) == (21.0, 21.0)
-
-
-def test_an_engine_of_which_no_speed_is_known_is_flown_by_its_range(tmp_path):
-    """The slipstream cannot be computed without: the range of the file is all that is known."""
-    folder = tmp_path / "a"
-    shutil.copytree(load().folder, folder)
-    kept = [
-        line for line in (folder / "aircraft.yaml").read_text().splitlines(keepends=True)
-        if not line.strip().startswith("engine_rpm:")
-    ]  # fmt: skip
-    (folder / "aircraft.yaml").write_text("".join(kept))
-    (tmp_path / "s.yaml").write_text("name: s\naircraft: ./a\nduration_s: 0.5\n")
-    slow = bf.load(tmp_path / "s.yaml")
-    assert "engine_rpm" not in type(slow.initial).model_fields
-    flight = bf.fly(slow)
-    assert len(flight.log) == 50

@@ -40,8 +40,3 @@ def test_mode(law, situation):
 def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
     reached = MODES[next_mode(MODES.index(now), MODES.index(wanted))]
     assert reached == ("adaptive" if now == "nominal" and wanted != "nominal" else wanted)
-
-
-def test_a_relieved_surface_is_whichever_it_is():
-    """An elevator may come first among an aircraft's surfaces."""
-    assert MODES[mode_of(new_control(law="fault-tolerant")["config"], 1, 0, True)] == "reallocated"

@@ -1,7 +1,5 @@
 """Standard air against its tables, and turbulence against its spectra [MIL-F-8785C; Yeager1998]."""
 
-from math import sqrt
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -46,33 +44,3 @@ def test_standard_air_is_that_of_the_tables_up_to_20_km(altitude_m, hpa, celsius
     assert standard_air(altitude_m) == (pytest.approx(hpa, rel=2e-4), pytest.approx(celsius))
     assert standard_density(altitude_m) == pytest.approx(kg_m3, rel=2e-4)
     assert altitude_of(standard_density(altitude_m)) == pytest.approx(altitude_m, abs=1e-6)
-
-
-SEVERE = {"none": (0.0, 0.0), "light": (7.4, 2.53), "moderate": (10.6, 5.06), "severe": (23.6, 7.6)}
-
-
-@pytest.mark.parametrize("severity", SEVERE)
-def test_what_is_known_of_turbulence_by_its_severity(severity):
-    """High and low above the ground: deviations, and how gusts and rotation walk over short times."""
-    air, (high_ft_s, low_ft_s), b, V = Dryden(severity), SEVERE[severity], 12.3, 41.0
-    sigma, low = 0.3048 * high_ft_s, 0.3048 * low_ft_s
-    rolling, pitching, yawing = rotation_lengths(b)
-    assert (air.moves, air.rank) == (severity != "none", list(SEVERE).index(severity))
-    assert (air.sigma_mps, air.low_sigma_mps) == pytest.approx((sigma, low))
-    roll = 1.9 * sigma / sqrt(SCALE_M * b)
-    assert air.rotation_limit_rad_s(b) == pytest.approx(roll)
-    assert air.low_rotation_limit_rad_s(b) / sqrt(80.0) == pytest.approx(1.9 * low / sqrt(80.0 * b))
-    # a first-order process of deviation s and length l walks by 2 s^2 / l a metre, its slope by that over l^2
-    walks = [2.0 * roll**2 / rolling, *(3.0 * sigma**2 / SCALE_M / of**2 for of in (pitching, yawing))]
-    assert air.rotation_walk(b) == pytest.approx(walks)
-    h, walks_low = 70.0, air.rotation_walk_at_1_m(b) / np.array([70.0**1.5, 70.0, 70.0])
-    roll_low, length = 1.9 * low / sqrt(h * b), sqrt(h * b) / 2.6
-    slopes = [3.0 * low**2 / h / of**2 for of in (pitching, yawing)]
-    assert walks_low == pytest.approx([2.0 * roll_low**2 / length, *slopes])
-    assert air.velocity_walk(V, 1.7) == pytest.approx(3.0 * sigma**2 * 1.7 * V / 533.4)
-    assert air.velocity_walk(V, 1.0) == pytest.approx(air.angle_walk(V) * V**2)
-    assert air.angle_walk(V) == pytest.approx(3.0 * sigma**2 / (533.4 * V))
-    if air.moves:
-        assert low**2 / air.low_m == pytest.approx(sigma**2 / 533.4)
-    else:
-        assert air.low_m == 0.0

@@ -13,7 +13,6 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.design import model
 from beaver_ftc.design.model import (
     both_responses,
-    both_responses_along,
     coefficient_slopes,
     design_record,
     engine_power_kw,
@@ -65,15 +64,6 @@ def test_it_gives_the_angular_accelerations_of_fdc():
     assert np.all(error <= 2e-5 * np.sqrt(np.mean(np.square(theirs), axis=0)))
 
 
-def test_along_a_flight_it_gives_what_it_gives_of_each_frame():
-    design = design_record()[0]
-    y = np.array([measured(row)[1] for row in rows()[:7]])
-    f, G = np.zeros(3), np.zeros((len(y), 3, 4))
-    both_responses_along(design, np.zeros(3), y, f, G)
-    assert G.tolist() == [split(design, np.zeros(3), of)[1].tolist() for of in y]
-    assert f.tolist() == split(design, np.zeros(3), y[-1])[0].tolist()
-
-
 def moment_form(design, x, y, u):
     """Euler's equations with the inertia tensor and the table of terms: no inertia constant is used."""
     table, terms = np.zeros(MAX_TERMS), load().moments
@@ -112,13 +102,6 @@ def test_split_equals_eulers_equations(x, y, u):
     assert f + G @ u == pytest.approx(moment_form(design, x, y, u), rel=1e-9, abs=1e-9)
 
 
-def test_neglecting_the_engine_removes_its_three_terms_alone():
-    x, y, _ = measured(rows()[7])
-    without = split(design_record(engine_terms=False)[0], x, y)[0]
-    y[4] = 0.0
-    assert without == pytest.approx(split(design_record()[0], x, y)[0], abs=1e-14)
-
-
 def published(x, y, u):
     """Cl, Cm, Cn as the source prints them [TM88]: a second writing of what the aircraft's file says."""
     (a, be, V, _, dpt), (da, de, dr, df) = y, u
@@ -149,12 +132,6 @@ def test_the_slopes_of_the_coefficients_are_those_of_the_published_polynomials()
             step = 1e-5 * np.eye(3)[axis]
             wanted = (published(x + step, y, u) - published(x - step, y, u)) / 2e-5
             assert found[:, 2 + axis] * per_rate[axis] == pytest.approx(wanted, abs=1e-8)
-
-
-def test_the_atmosphere_used_here_is_the_standard_one():
-    assert density(0.0) == pytest.approx(1.225, rel=1e-4)
-    assert density(1000.0) == pytest.approx(1.1117, rel=1e-3)
-    assert density(3000.0) == pytest.approx(0.9093, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -189,12 +166,3 @@ def test_acceleration_is_f_plus_G_u():
     f, G, u, found = rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=4), np.zeros(3)
     model.acceleration(f, G, u, found)
     assert found == pytest.approx(f + G @ u, rel=1e-12)
-
-
-def test_as_many_monomials_as_there_is_room_for():
-    """The first is 1; each is one factor longer than an earlier one, and stands once."""
-    assert model._chain([(3, 1, 4), (3, 1), (2,), (3, 5)]) == [(), (3,), (3, 1), (3, 1, 4), (2,), (3, 5)]
-    singles = [(i,) for i in range(MAX_MONOMIALS)]
-    assert model._chain(singles[:-1]) == [(), *singles[:-1]]
-    with pytest.raises(ValueError, match=f"{MAX_MONOMIALS + 1} monomials, allowed: at most {MAX_MONOMIALS}"):
-        model._chain(singles)

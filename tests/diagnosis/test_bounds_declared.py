@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden
-from beaver_ftc.design.context import Declared
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
@@ -14,18 +12,6 @@ from flying import scenario
 def told(**keys):
     loop = Loop(scenario(duration_s=1, **keys), Recorder())
     return loop.plugin_frame.detector.context.declared
-
-
-def test_nothing_declared_is_nothing_told():
-    declared = told(sensors="tactical-grade", environment={"turbulence": "dryden", "severity": "light"})
-    assert not declared.errors
-    assert not declared.air
-    assert not declared.turbulence_rad_s2.any()
-    for name, zeros in vars(Declared()).items():
-        if name == "coefficients":
-            assert not getattr(declared, name).any()
-        elif name not in ("gust_time_s", "gust_effect"):
-            assert np.array_equal(getattr(declared, name), zeros), name
 
 
 def test_instruments_are_told_as_the_preset_has_them():
@@ -42,17 +28,6 @@ def test_the_actuators_are_told():
     assert declared.bandwidth_rad_s == pytest.approx([20.0] * 4)
     assert declared.rate_limit_rad_s == pytest.approx(np.radians([60.0] * 4))
     assert not declared.errors
-
-
-def test_one_coefficient_off_gives_its_own_share_of_the_acceleration():
-    """Cm_alpha off by a tenth: a tenth of its moment, over the inertia."""
-    declared = told(fdi={"bounds": {"coefficients": {"Cm_alpha": 0.1}}})
-    loop = Loop(scenario(duration_s=1), Recorder())
-    alpha, _, _, qdyn = loop.plugin_frame.detector.context.trim_y[:4]
-    expected = 0.1 * abs(load().terms["Cm_alpha"].value) * alpha * qdyn * 23.23 * 1.5875 / 6928.93
-    assert declared.model_rad_s2 == pytest.approx([0.0, expected, 0.0], abs=1e-9)
-    wanted = [0.1 * abs(term.value) * (term.name == "Cm_alpha") for term in load().moments]
-    assert declared.coefficients == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("severity", ["light", "moderate"])

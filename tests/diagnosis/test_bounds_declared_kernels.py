@@ -7,8 +7,6 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis.bounds import (
-    air_rotation_slopes,
-    model_error_std,
     plugin_errors,
 )
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -17,7 +15,6 @@ from flying import declared_in
 AIRCRAFT = load()
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 U = np.array([0.1, -0.15, 0.05, 0.2])
-N_AIR_DATA = 4
 
 
 @pytest.fixture
@@ -42,32 +39,6 @@ def acceleration(design, y, u, off=()):
     )
 
 
-def test_errors_of_the_model_add_by_their_squares(design):
-    """Each measurement, surface and coefficient off by itself: what that moves, one after the other."""
-    air_data, deflection = np.array([0.02, 0.03, 2.0, 60.0]), np.array([0.03, 0.02, 0.05, 0.0])
-    tolerance = np.zeros(len(AIRCRAFT.moments))
-    tolerance[[1, 5, 8]] = 0.3 * np.abs(design["moments"]["value"][0][[1, 5, 8]])
-    here = acceleration(design, Y, U)
-    apart = [acceleration(design, Y + np.eye(8)[i] * air_data[i], U) - here for i in range(N_AIR_DATA)]
-    apart += [acceleration(design, Y, U + e) - here for e in np.diag(deflection)]
-    for k in (1, 5, 8):
-        term = AIRCRAFT.moments[k]
-        more = 1.0 + 0.3 * np.sign(design["moments"]["value"][0][k])
-        apart.append(acceleration(design, Y, U, {term.name: more}) - here)
-    found = model_error_std(design, Y, U, air_data, tolerance, deflection)
-    assert found == pytest.approx(np.sqrt(np.square(apart).sum(axis=0)), rel=1e-9)
-    assert (found > 1e-3).all()
-
-
-def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
-    for i in (0, 1, 3):
-        air_data = 0.04 * Y[:N_AIR_DATA] * (np.arange(N_AIR_DATA) == i)
-        found = model_error_std(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), np.zeros(4))
-        off = Y.copy()
-        off[i] *= 1.04
-        assert found == pytest.approx(np.abs(acceleration(design, off, U) - acceleration(design, Y, U)))
-
-
 def declared(design, **bounds):
     return plugin_errors(declared_in(Bounds.model_validate(bounds), AIRCRAFT), design, Y, U)
 
@@ -87,23 +58,6 @@ def test_of_an_air_datum_noise_bias_and_rounding_count(design):
     assert declared(design, sensors={"p": {"noise_std_deg_s": 0.3}}).model_rad_s2.tolist() == [0.0] * 3
 
 
-def test_deflections_inertia_and_the_air_are_told_in_si(design):
-    told = declared(design, deflection_deg=1.5, inertia=0.1, turbulence="light")
-    moved = [
-        np.radians(1.5) * (acceleration(design, Y, e) - acceleration(design, Y, 0 * e)) for e in np.eye(4)
-    ]
-    assert told.model_rad_s2 == pytest.approx(np.sqrt(np.square(moved).sum(axis=0)), rel=1e-6)
-    assert (told.deflection_rad, told.inertia) == (pytest.approx(np.radians(1.5)), 0.1)
-    rotation, time_s = Dryden("light").rotation(45.0, AIRCRAFT.geometry.span_m)
-    assert (told.gust_rad_s.tolist(), told.gust_time_s.tolist()) == (rotation.tolist(), time_s.tolist())
-
-
-def test_a_tolerance_is_a_share_of_each_coefficient(design):
-    bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = plugin_errors(declared_in(bounds, AIRCRAFT), design, Y, U)
-    assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
-
-
 @pytest.mark.parametrize(("severity", "feet_a_s"), [("light", 7.4), ("severe", 23.6)])
 @pytest.mark.parametrize("b", [14.6, 60.0])
 def test_gusts_turn_the_air_as_their_spectra_say(b, severity, feet_a_s):
@@ -121,14 +75,3 @@ def test_gusts_turn_the_air_as_their_spectra_say(b, severity, feet_a_s):
         assert time_s[axis] == pytest.approx(length / V)
     assert rotation[0] == pytest.approx(1.9 * sigma / np.sqrt(L * b))
     assert time_s[0] == pytest.approx(np.sqrt(L * b) / 2.6 / V)
-
-
-def test_rotating_air_shows_by_a_central_difference():
-    """Of the opposite rates. A cube adds step^2 to a slope taken on both sides, and nothing else."""
-    A = np.array([[-5.0, 0.1, 2.0], [0.0, -3.0, -0.3], [-0.9, 0.2, -0.5]])
-
-    class Cubic:
-        def f(self, x, y):
-            return A @ x + x**2 + 1e6 * x**3
-
-    assert air_rotation_slopes(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)

@@ -95,11 +95,6 @@ def test_one_coefficient_alone_attains_its_bound():
     assert bound(x, y, u, coefficients={"Cm_alpha": 0.05})[1] == pytest.approx(abs(error[1]), rel=1e-9)
 
 
-def test_nothing_declared_adds_nothing():
-    x, y, u = state(np.random.default_rng(3))
-    assert (bound(x, y, u) == 0.0).all()
-
-
 @settings(max_examples=samples(100), deadline=None)
 @given(st.integers(0, 2**32))
 def test_inertia_coefficients_are_extreme_at_the_corners(seed):

@@ -1,14 +1,10 @@
 """Each number of the diagnosis is read from its own field of the record: no two numbers in it are alike."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import readout
 from beaver_ftc.diagnosis.readout import DiagnosisReadout
 from beaver_ftc.diagnosis.schemes import fdi_dtype
-from beaver_ftc.diagnosis.state import scheme_number
 from telling import fill
 
 N_SURFACES, N_ESTIMATORS, WORST_TEST = 3, 4, 2
@@ -149,123 +145,3 @@ def test_each_truth_value_of_a_diagnosis_is_read_from_its_own_field(fdi):
         for name, other in FLAGS.items():
             assert of_readout(diagnosis, name) == (other != path), (off, name)
         put(fdi, path, kept)
-
-
-def test_inside_of_the_map_is_not_outside_of_all_boxes(fdi):
-    assert not DiagnosisReadout(fdi).mapped_error.is_inside_map
-    fdi["bound"]["error_map"]["outside"] = 0
-    assert DiagnosisReadout(fdi).mapped_error.is_inside_map
-
-
-def test_there_are_as_many_parts_as_the_record_counts(fdi):
-    fdi["isolation"]["estimator"][1]["skip"] = (0, 1, 0)
-    diagnosis = DiagnosisReadout(fdi)
-    assert len(diagnosis.estimators) == len(diagnosis.is_estimator_excluded) == N_ESTIMATORS
-    assert [one.active_axes for one in diagnosis.estimators] == [(), (0, 2), (), ()]
-    assert len(diagnosis.surface_fault_types) == N_SURFACES
-    blocks = fdi["statistical"]["block"]
-    for found, block, n_axes, n_hypotheses, n_regressors in zip(
-        diagnosis.statistical_filters, blocks, N_AXES, N_HYPOTHESES, N_REGRESSORS, strict=True
-    ):
-        assert found.axis_indices == tuple(block["axes"][:n_axes])
-        tolerances = found.regressor_coefficient_error_bound
-        assert tolerances.tolist() == block["tol"][:n_regressors].tolist()
-        assert [one.score_in_std for one in found.hypotheses] == block["hypothesis"]["score"][
-            :n_hypotheses
-        ].tolist()
-        by_onset, tests = found.hypothesis_tests_by_onset, block["tests"]
-        for name, field in {
-            "score": "score",
-            "supporting_correlation_sign": "supporting_correlation_sign",
-            "correlation_predictable_in_calm_air": "N_p",
-            "correlation_from_coarse_gust": "correlation_from_coarse_gust",
-        }.items():
-            shown, in_record = getattr(by_onset, name), tests[field].ravel()
-            assert shown.shape == (n_hypotheses, readout.N_SLOTS), name
-            assert shown.ravel().tolist() == in_record[: shown.size].tolist(), name
-
-
-def test_gyros_have_bounds_where_errors_are_declared(fdi):
-    errors = fdi["bound"]["declared_errors"]
-    found = DiagnosisReadout(fdi).declared_bounds
-    at_rest = found.gyro_error_bound_at_rest_rad_s.tolist()
-    assert at_rest == errors["e0"][:3].tolist()
-    assert found.gyro_error_bound_per_rate.tolist() == errors["e1"][:3].tolist()
-    errors["given"] = 0
-    none = DiagnosisReadout(fdi).declared_bounds
-    for name in (
-        "gyro_error_bound_at_rest_rad_s",
-        "constant_gyro_error_bound_rad_s",
-        "gyro_error_bound_per_rate",
-    ):
-        assert getattr(none, name).tolist() == [0.0, 0.0, 0.0]
-    assert none.eta_bar_rad_s2.tolist() == found.eta_bar_rad_s2.tolist()
-
-
-# What a certificate wants of each frame, by the name it has there; of the estimators the first two.
-OF_EVERY_FRAME = {
-    "eta_bar": "bound.eta_bar", "noise": "bound.n_gyro",
-    "offset": "isolation.estimator.effect.base",
-    "slope": "isolation.estimator.effect.regressor",
-    "spread": "isolation.estimator.effect.e",
-    "excluded": "isolation.estimator.excluded", "types": "types.surface.sets.excluded",
-}  # fmt: skip
-OF_EVERY_TYPE = {
-    "command_low": "types.surface.commands.cmd_min",
-    "command_high": "types.surface.commands.cmd_max",
-    "least": "types.surface.commands.u_min",
-    "greatest": "types.surface.commands.u_max",
-}
-UNTIL_THE_ALARM = {
-    "reach_low": "isolation.estimator.reach_lo",
-    "reach_high": "isolation.estimator.reach_hi",
-}
-OF_THE_STATISTICAL_DETECTOR = {name: f"statistical.block.{name}" for name in (
-    "a", "eta_rate", "state", "P_xx", "P_xd", "P_dd",
-    "Q_d", "Q_x", "R_y", "p",
-    "g_c", "x_Z", "g_Z",
-)} | {
-    "signature": "statistical.block.hypothesis.signature",
-    "bounded": "statistical.noise.eta",
-    "air": "statistical.gust.output.acc_mean",
-    "leap": "statistical.gust.output.var_turn",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("more", [False, True])
-def test_a_certificate_takes_each_array_from_its_own_field(fdi, more):
-    def held(found: Mapping[str, np.ndarray], paths: Mapping[str, str]):
-        assert set(found) == set(paths)
-        for name, path in paths.items():
-            wanted = of_record(fdi, path)
-            wanted = wanted[:2] if path.startswith("isolation.estimator.") else wanted
-            assert np.array_equal(found[name], wanted), name
-            assert np.shares_memory(found[name], fdi), name
-
-    every = readout.frame_arrays(fdi, 2, more)
-    held(every, OF_EVERY_FRAME | (OF_EVERY_TYPE if more else {}))
-    early = readout.alarm_arrays(fdi, 2, more)
-    held(early, UNTIL_THE_ALARM | (OF_THE_STATISTICAL_DETECTOR if more else {}))
-
-
-def test_alarms_are_those_of_the_surfaces_and_of_the_sensors(fdi):
-    fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"] = 1, 0
-    assert readout.alarm_flags(fdi) == (1, 0)
-
-
-@pytest.mark.parametrize(("enabled", "scheme"), [(1, "none"), (0, None)])
-def test_a_diagnosis_that_is_stopped_is_none(fdi, enabled, scheme):
-    """Of a plug-in, which goes on, the scheme stays what it is."""
-    fdi["config"]["enabled"], before = enabled, int(fdi["config"]["scheme_number"])
-    readout.disable_diagnosis(fdi)
-    assert fdi["config"]["scheme_number"] == (before if scheme is None else scheme_number(scheme))
-    assert (fdi["config"]["enabled"], fdi["sensor_monitor"]["config"]["enabled"]) == (0, 0)
-
-
-@pytest.mark.parametrize("enabled", [False, True])
-def test_statistical_tests_are_switched_alone(fdi, enabled):
-    before = fdi.copy()
-    readout.switch_statistical_tests(fdi, enabled)
-    assert fdi["statistical"]["test"]["enabled"] == enabled
-    before["statistical"]["test"]["enabled"] = enabled
-    assert fdi == before

@@ -8,26 +8,15 @@ import numpy as np
 import pytest
 import yaml
 
-from beaver_ftc.aircraft import load
-from beaver_ftc.design import Dryden, rotation_lengths
-from beaver_ftc.design.fdc import MASS
+from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import gusts
-from beaver_ftc.diagnosis.gusts import GUST_RECORD
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.schema import load as load_given
-from flying import declared_in, scenario
+from flying import scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
 FT = 0.3048
-
-
-def air_of(turbulence="light"):
-    """The record as before a flight."""
-    record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    gusts.configure_gust(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
-    return record
 
 
 class Flown:
@@ -95,14 +84,6 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
 
-@pytest.mark.parametrize("keys", [{"substeps": 4}, {"rate_hz": 200}, {"rate_hz": 50}])
-def test_and_at_other_rates_and_between_jsbsims_frames(keys):
-    flown = Flown("light", duration_s=20, seed=3, **keys)
-    left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.MIN_UNMEASURED_SHARES[1]
-    assert left[2] < gusts.MIN_UNMEASURED_SHARES[2]
-
-
 def test_a_steady_wind_is_not_taken_for_a_gust():
     still, windy = (
         Flown("light", duration_s=10, seed=3, environment={"wind_mps": wind})
@@ -118,12 +99,6 @@ def test_all_three_true_gusts_drift_no_faster_than_declared(turbulence):
     share = np.mean([flight.intensity(flight.true) for flight in flights], axis=0)
     assert (share < 1.0).all()
     assert (share > 0.5).all()
-
-
-def test_still_air_shows_no_gust():
-    flown = Flown("none", duration_s=20)
-    assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 2e-4
-    assert np.abs(flown.seen[:, 1:]).max() < 5e-3  # against 0.03 rad/s in light turbulence
 
 
 @pytest.mark.parametrize("forces", ["felt", "nobody's", "claimed"])
@@ -165,62 +140,6 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     seen = float(np.abs(statistical["gust"]["output"]["acc"]).max())
     assert (seen == 0.0) is (forces == "nobody's")
     assert (seen > 0.05) is (forces == "claimed")
-
-
-@pytest.fixture
-def without_forces(tmp_path, monkeypatch):
-    """A folder with the trainer, whose file says no forces."""
-    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
-    file = tmp_path / "trainer/aircraft.yaml"
-    text = yaml.safe_load(file.read_text())
-    del text["forces"]
-    file.write_text(yaml.safe_dump(text))
-    monkeypatch.chdir(tmp_path)
-
-
-def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
-    """What the view of roll and yaw that gathers for long reckons with covers a first-order gust of each
-    axis at every frequency, and where it is slow by no more than itself."""
-    fdi = {"statistical": {}, "bounds": {"turbulence": "light"}}
-    statistical = Loop(load_given({"aircraft": "./trainer", "fdi": fdi})).frames["fdi"]["statistical"][0]
-    long, record = statistical["block"][2], statistical["gust"]
-    lengths = rotation_lengths(float(record["config"]["span"]))
-    omega = np.geomspace(1e-4, 1e2, 50)  # rad/m
-    for g in range(3):
-        true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
-        reckoned = (
-            long["Q_scale"]
-            * gusts.rolling_scale(record, g)
-            / (1.0 / long["drift_correlation_length_m"] ** 2 + omega**2)
-        )
-        assert (reckoned >= true * (1.0 - 1e-9)).all()
-        assert reckoned[0] == pytest.approx(true[0], rel=1e-3)
-
-
-def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_that_answers_them(
-    without_forces,
-):
-    """As JSBSim has it, in turns and climbs, over a filter's memory; the innovation keeps all of it."""
-    sine = {"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.2}}
-    flown = Flown(
-        "moderate", aircraft="./trainer", duration_s=20, seed=3, reference={"p": [sine], "q": [sine]}
-    )
-    seen, true = (gust[5:, 1:] - gust[:-5, 1:] for gust in (flown.seen, flown.true))
-    for axis in (0, 1):
-        assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
-    record = flown.record
-    assert np.abs(record["output"]["acc_coarse"]).max() > 0.0 == np.abs(record["output"]["acc"]).max()
-
-
-def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
-    """Elevator and rudder from stop to stop: JSBSim gives a new force half a frame more than it has acted."""
-    jumps = {
-        "q": [{"square": {"amplitude_deg_s": 60, "frequency_hz": 0.7}}],
-        "r": [{"sine": {"amplitude_deg_s": 40, "frequency_hz": 0.2}}],
-    }
-    flown = Flown("none", duration_s=3, rate_hz=30, reference=jumps, control={"law": "nominal"})
-    assert np.abs(np.diff(flown.force[:, 2])).max() > 30.0
-    assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 5e-4
 
 
 def test_the_specific_force_is_the_one_felt_aboard():

@@ -1,17 +1,12 @@
 """The speed through the field of gusts, and the strength of turbulence at a height: closed forms, by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
 from beaver_ftc.diagnosis.bounds import errors_dtype
-from beaver_ftc.scenario.diagnosis import Bounds
-from flying import declared_in
 
 SPAN_M, FT = 14.63, 0.3048
 # sigma_w below 1000 ft: a tenth of 25.3, 50.6 and 76.0 ft/s; above 2000 ft: 7.4, 10.6 and 23.6 ft/s
@@ -55,53 +50,6 @@ def test_the_speed_is_that_through_the_air_without_the_gust():
     assert record["memory"]["start_left"] == pytest.approx(0.8 * kept**2)
 
 
-def test_no_gust_is_taken_for_stronger_than_is_likely():
-    record = in_moving_air()
-    record["config"]["v_max"] = 2.0
-    gusts.update_gust_speed(record, (46.0, -71.5, 0.3), 44.1, 0.01)
-    assert record["memory"]["v_g"][:2] == pytest.approx([2.0, -2.0])
-
-
-def test_where_no_gust_is_seen_the_airspeed_serves():
-    record = in_moving_air()
-    record["output"]["measured"] = 0
-    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, 0.5)
-    assert record["output"]["V"] == 44.1
-    assert gusts.unmeasured_share(record, 1) == 0.0
-
-
-@pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
-def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further):
-    record = in_moving_air()
-    (
-        record["memory"]["share"],
-        record["memory"]["start_share"],
-        record["memory"]["turn_past"],
-    ) = (
-        (1.0, 0.003, 0.03),
-        0.02,
-        0.05,
-    )
-    (
-        record["output"]["V"],
-        record["config"]["var_V"],
-        record["config"]["var_v"],
-        record["config"]["speed_error_share"],
-    ) = 40.0, 1.3, 4.7, 2.5
-    off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert gusts.unmeasured_share(record, g) == pytest.approx(record["memory"]["share"][g] + off + further)
-    assert gusts.unmeasured_share(record, 0) == 1.0
-
-
-def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
-    # q' = -q / tau + w' followed with tau (1 + e): over the spectrum of the walk w', the error's is
-    # |1 / (s + 1 / tau) - 1 / (s + (1 + e) / tau)|^2 |s|^2, to first order in e
-    e, tau, level = 1e-3, 0.37, 6.6
-    s = 1j * np.geomspace(1e-3, 1e3, 20001)
-    error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert gusts.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
-
-
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
 @pytest.mark.parametrize("height_ft", [4.0, 10.0, 120.0, 300.0, 900.0, 5000.0])
 def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_than_aloft(
@@ -136,101 +84,3 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     bounds.set_air_rotation(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
     assert declared_errors["wg"] == pytest.approx(6.0 * sigma)
-
-
-def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_reckoned_with():
-    for severity, low in LOW.items():
-        for h in np.linspace(10.0, 1000.0, 100):  # sigma_v^2 / L_v of the standard
-            shape = 0.177 + 0.000823 * h
-            sigma_v, L_v = low / shape**0.4, h / shape**1.2
-            assert sigma_v**2 / L_v <= low**2 / h * (1.0 + 1e-9)
-        for share in np.linspace(0.0, 1.0, 50):
-            sigma = low + share * (HIGH[severity] - low)
-            L = 1000.0 + 750.0 * share
-            assert sigma**2 / L**1.5 <= HIGH[severity] ** 2 / 1750.0**1.5 * (1.0 + 1e-9)
-
-
-SENSORS = {
-    "phi": {"bias_deg": 0.3}, "theta": {"bias_deg": -0.2}, "ax": {"bias_mps2": 0.04, "scale_error": -0.02},
-    "V": {"noise_std_mps": 0.4, "quantum_mps": 0.3, "bias_mps": -0.5, "scale_error": 0.01},
-    "altitude": {"noise_std_m": 2.0, "bias_m": 5.0, "scale_error": 0.03},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("turbulence", ["light", "severe"])
-@pytest.mark.parametrize(("accelerometers", "sensors"), [(1, {}), (1, SENSORS), (0, SENSORS)])
-def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts(turbulence, accelerometers, sensors):
-    """a^3 = 2 b^2 V / (L sigma^2); b: Coriolis, gravity along the path and by the attitude's error, and what
-    accelerometers are off, or what the model's forces are: at most 0.3 of the weight, by 8 % and 5 % mass."""
-    given = Bounds.model_validate({"turbulence": turbulence, "sensors": sensors, "coefficients": 0.08})
-    record = record_of(gusts.GUST_RECORD)
-    record["output"]["gusty"] = record["output"]["measured"] = 1
-    record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust_speed(record, declared_in(given, load()), 6.6, 45.0)
-    sigma, V_L, g = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT), 9.80665
-    b = 2.0 * 7.292115e-5 * 45.0 + 0.3 * 0.03 + (g * np.radians(0.5) if sensors else 0.0)
-    of_the_sensor = 0.04 + 0.3 * g * 0.02 if sensors else 0.0
-    b += of_the_sensor if accelerometers else 0.3 * g * (0.08 + 0.05)
-    a = (2.0 * b**2 * V_L / sigma**2) ** (1.0 / 3.0)
-    speed = np.hypot(0.4, 0.3 / np.sqrt(12.0)) ** 2 + (0.5 + 0.01 * 45.0) ** 2 if sensors else 0.0
-    expected = {
-        "a_v": a, "var_v": sigma**2, "v_max": 4.0 * sigma,
-        "var_V": sigma**2 * a / (a + V_L) + (b / a) ** 2 + speed,
-        "speed_error_share": 6.6**2 / 16.0,
-    }  # fmt: skip
-    for name in record["config"].dtype.names:
-        assert record["config"][name] == pytest.approx(expected.get(name, 0.0), rel=1e-6), name
-
-
-@pytest.mark.parametrize("missing", ["gusty", "measured"])
-def test_where_no_gust_is_measured_no_sum_of_one_is_kept(missing):
-    record = record_of(gusts.GUST_RECORD)
-    record["output"]["gusty"] = record["output"]["measured"] = 1
-    record["output"][missing] = 0
-    declared = declared_in(Bounds(turbulence="light"), load())
-    gusts.configure_gust_speed(record, declared, 6.6, 45.0)
-    assert not any(record["config"][name].any() for name in record["config"].dtype.names)
-
-
-@pytest.mark.parametrize(
-    ("turbulence", "accelerometers", "measured", "coarse"),
-    [("severe", 0, 1, 0), ("severe", 1, 1, 0), ("none", 0, 1, 0)],
-)
-def test_all_that_an_estimate_of_gusts_is_set_up_with(turbulence, accelerometers, measured, coarse):
-    """With the forces of the built-in aircraft, at a mass that is not its own."""
-    given = Bounds.model_validate({"turbulence": turbulence, "sensors": SENSORS})
-    record, aircraft = record_of(gusts.GUST_RECORD), load()
-    record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust(record, declared_in(given, aircraft), replace(aircraft.mass, mass_kg=2000.0))
-    span, L = aircraft.geometry.span_m, 1750.0 * FT
-    aloft = Dryden(turbulence).rotation_walk(span)
-    low = Dryden(turbulence).rotation_walk_at_1_m(span)
-    expected = {
-        "has_forces": 1, "coarse_only": coarse, "S_m": 23.23 / 2000.0,
-        "gravity": 9.80665, "span": span, "Q_aloft": aloft,
-        "Q_1m": low, "L_gust": L,
-        "h0": 4.0 * 2.0 + 5.0, "h1": 0.03,
-        "L_roll": np.sqrt(L * span) / 2.6,
-    }  # fmt: skip
-    for name in record["config"].dtype.names:
-        assert record["config"][name] == pytest.approx(expected.get(name, 0.0), rel=1e-6), name
-    memory, output = record["memory"], record["output"]
-    assert memory["Q"].tolist() == aloft.tolist()
-    assert memory["share"].tolist() == [1.0, 0.003, 0.03]
-    found = output["gusty"], output["measured"], output["uses_accelerometers"]
-    assert found == (turbulence != "none", measured, accelerometers)
-
-
-@pytest.mark.parametrize(("turbulence", "accelerometers"), [("severe", 0), ("severe", 1), ("none", 0)])
-def test_without_forces_a_gust_is_seen_by_accelerometers_or_roughly(turbulence, accelerometers):
-    aircraft = load()
-    blind = replace(aircraft, file=aircraft.file.model_copy(update={"forces": None}))
-    assert not blind.measurable_forces
-    record = record_of(gusts.GUST_RECORD)
-    record["output"]["uses_accelerometers"] = accelerometers
-    gusts.configure_gust(record, declared_in(Bounds(turbulence=turbulence), blind), aircraft.mass)
-    assert record["config"]["has_forces"] == 0
-    assert record["output"]["measured"] == accelerometers
-    assert record["config"]["coarse_only"] == (turbulence == "severe" and not accelerometers)
-    shares = [1.0, 0.003, 0.03] if accelerometers else [1.0, 1.0, 1.0]
-    assert record["memory"]["share"].tolist() == shares

@@ -5,7 +5,6 @@ import pytest
 from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import POSITION_HYPOTHESIS
 
 
 @pytest.mark.parametrize("slope", [2.0, -2.0])
@@ -16,12 +15,6 @@ def test_the_parameters_that_agree_solve_the_inequality(slope):
     assert (low, high) == pytest.approx((agrees[0], agrees[-1]))
     low, high = isolation.consistent_theta(0.6, 0.2, slope, -0.25, 0.25)
     assert sorted([abs(low), abs(high)]) == pytest.approx([0.2, 0.25])
-
-
-def test_without_an_effect_every_parameter_agrees_or_none():
-    assert isolation.consistent_theta(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
-    low, high = isolation.consistent_theta(-0.21, 0.2, 0.0, -1.0, 0.5)
-    assert low > high
 
 
 def agreeing(innovation, **fields):
@@ -74,64 +67,3 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     assert fie["set_hi"] == pytest.approx(-0.5 + half)
     fie["set_lo"][2], fie["set_hi"][2] = -0.2, -0.1
     assert not on(isolation.narrow_sets, fdi, fie)
-
-
-@pytest.mark.parametrize("instants", [1, 4])
-def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
-    """A position whose terms' errors grow with it: the room is a fixed point of where it can have been."""
-    fdi = new_fdi()
-    fie = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.6, high=0.5)
-    (
-        fdi["config"]["n_substeps"],
-        fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["nu_max"],
-    ) = (
-        instants,
-        (0.0, 0.9, 0.0),
-        0.05,
-    )
-    (
-        fdi["bound"]["eG"][:, 1],
-        fdi["bound"]["eGu"][:, 1],
-    ) = (
-        (0.1, 0.4, 0.2),
-        (0.01, 0.02, 0.2),
-    )
-    (
-        fie["effect"]["regressor"],
-        fie["effect"]["base"],
-        fie["effect"]["e"],
-    ) = (
-        (0.1, 5.0, 1.0),
-        -0.1,
-        0.01,
-    )
-    fie["u_far"] = 0.3
-    earlier = 2.0 * 0.3 / instants if instants > 1 else 0.0
-    reach = 0.6
-    for _ in range(isolation.N_ROUNDS):
-        room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
-        reach = min(reach, (1.0 + room) / 5.0)
-    on(isolation.widen_error, fdi, fie)
-    assert fie["u_far"] == pytest.approx(reach)
-    own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
-    assert fie["effect"]["e"] == pytest.approx(0.01 + own)
-
-
-def test_where_no_position_agrees_the_whole_travel_stays_possible():
-    fdi = new_fdi()
-    fie = estimator(fdi, POSITION_HYPOTHESIS, surface=1, low=-0.6, high=0.5)
-    (
-        fdi["config"]["n_substeps"],
-        fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["nu_max"],
-    ) = (
-        1,
-        (0.0, 9.0, 0.0),
-        0.05,
-    )
-    fdi["bound"]["eG"][:, 1] = 0.1
-    fie["effect"]["regressor"] = 0.1, 5.0, 1.0
-    on(isolation.widen_error, fdi, fie)
-    assert fie["u_far"] == 0.6
-    assert fie["effect"]["e"] == pytest.approx([0.06] * 3)

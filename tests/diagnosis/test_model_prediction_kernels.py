@@ -28,15 +28,6 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
             assert prediction["means"]["Gu_old"] == pytest.approx(G[k - 1] * u[k])
 
 
-def test_of_the_first_frame_nothing_is_foreseen():
-    prediction = np.zeros(1, model_prediction.prediction_dtype(2))[0]
-    prediction["w"] = 1.0
-    prediction["sums"]["G"][:, 0] = prediction["sums"]["Gu"][:, 0] = 1.0
-    model_prediction.fill_means(prediction, np.zeros(1, bound_dtype(2))[0])
-    model_prediction.fill_old_effects(prediction["means"])
-    assert not prediction["means"]["Gu_old"].any()
-
-
 def test_actuators_are_believed_an_instant_at_a_time():
     """At 50 Hz of four instants: the share of the way and the longest way in 5 ms, each surface its own."""
     dynamics = {

@@ -18,10 +18,7 @@ import pytest
 
 import beaver_ftc
 import needs
-from beaver_ftc.diagnosis import types
-from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.files import data_root
-from fault_kinds import DOWN, UP
 
 HERE = Path(__file__).parent
 IN_FAULTS, IN_TABLE = "scenario/faults/{}.py", "diagnosis/types/table/{}.py"
@@ -427,26 +424,3 @@ def test_a_forged_certificate_of_it_is_refused(certified, forged, says):
     else:
         del log["aileron_overdrive_gain"]
     assert [why.partition(": ")[2] for why in refused(certificate, log, scenario)] == [says]
-
-
-def test_every_type_keeps_the_contract():
-    for row in registry.TYPES:
-        assert callable(row.consistent_interval)
-        assert row.possible_deflection_range is not types.reachable_range or not row.has_constant_parameter
-        assert bool(row.memory_dtype) == bool(row.memory_record_name)
-
-
-def test_types_of_a_constant_parameter_come_first():
-    constant = [row.has_constant_parameter for row in registry.TYPES]
-    assert constant == sorted(constant, reverse=True)
-    assert sum(constant) == registry.N_CONSTANT
-
-
-def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():
-    """The order of every array of types, of lists and of candidates in a verdict."""
-    assert [(row.name, row.has_constant_parameter) for row in registry.TYPES] == [
-        ("loss_of_effectiveness", True), ("stuck", True), ("float", True), ("hardover", True),
-        ("hardover", True), ("bias", True), ("loss_of_effectiveness", False), ("oscillatory", False),
-        ("rate_limit", False), ("bias", False),
-    ]  # fmt: skip
-    assert (UP, DOWN) == (3, 4)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from design_plant import SURFACES, UNCERTAINTIES, DesignPlant
+from design_plant import UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -131,36 +131,6 @@ def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_
     assert plant.detected_at_s == plant.certain_after_s < np.inf
 
 
-def test_bounds_are_attained_so_no_smaller_ones_would_do():
-    plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
-    assert plant.fdi["bank"]["output"]["peak"][:4] == pytest.approx(1.0, abs=1e-6)
-
-
-def test_filters_and_bounds_are_the_convolutions_they_stand_for():
-    lam = 7.0
-    plant = DesignPlant(seed=2, surface=0, theta=constant(50, 0.5), detection_pole_per_s=lam)
-    plant.fly(200, UNCERTAINTIES["random"])
-    weight = plant.dt * np.exp(-lam * plant.dt * np.arange(198, -1, -1))
-    residual = weight @ np.array(plant.innovations[:199])
-    bound = weight @ np.array(plant.bounds[:199])
-    assert plant.fdi["bank"]["output"]["residual"][0] == pytest.approx(residual, abs=1e-12)
-    assert plant.fdi["bank"]["output"]["threshold"][0] == pytest.approx(bound, abs=1e-10)
-
-
-@settings(max_examples=samples(60), deadline=None)
-@given(st.integers(0, 2**32), st.floats(20, 200), poles, st.integers(0, 2), any_course, uncertainties)
-def test_no_filter_alarms_before_the_innovation_itself(seed, rate_hz, pole, surface, theta, uncertainty):
-    """Where every innovation is inside its bound there is nothing for any filter to find."""
-
-    def alarm(bank, lam):
-        plant = DesignPlant(
-            seed, rate_hz, surface=surface, theta=theta, pole_bank_per_s=bank, detection_pole_per_s=lam
-        )
-        return plant.fly(FRAMES, uncertainty, until=lambda p: p.fdi["verdict"]["detected"]).detected_at_s
-
-    assert alarm([1e6], pole) <= alarm([], pole)
-
-
 @settings(max_examples=samples(60), deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 2), st.floats(0.1, 1.0), uncertainties)
 def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
@@ -173,13 +143,6 @@ def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
 
     none = {"memory": False, "shared_effectiveness": False, "set_membership": False}
     assert excluded({**none}) <= excluded({**none, "memory": True}) <= excluded("all")
-
-
-def test_a_surface_is_named_at_the_alarm_when_no_other_moves_that_axis():
-    plant = DesignPlant(seed=5, surface=1, theta=constant(40, 0.5))
-    plant.fly(200, UNCERTAINTIES["random"], until=lambda p: p.fdi["verdict"]["detected"])
-    assert plant.fdi["verdict"]["isolated_estimator"] == SURFACES.index("elevator")
-    assert plant.fdi["verdict"]["isolated_at_s"] == plant.fdi["verdict"]["detected_at_s"]
 
 
 @settings(max_examples=samples(60), deadline=None)

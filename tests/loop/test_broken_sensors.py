@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.scenario.schema import load
 
@@ -76,19 +75,6 @@ def test_the_flight_goes_on_without_a_vane_or_the_airspeed(sensor):
     assert bf.fly(scenario, log=False).passed
 
 
-@pytest.mark.parametrize(
-    "more", [{}, {"rate_hz": 20}, {"substeps": 4}, {"environment": {"wind_mps": [15, -9, 0]}}]
-)
-def test_sound_instruments_are_never_suspected(more):
-    scenario = flight(fdi={"sensor_monitor": "always"}, duration_s=60, **more)
-    loop = Loop(scenario)
-    for _ in loop.chunks():
-        pass
-    watch = loop.frames[0]["fdi"]["sensor_monitor"]
-    assert watch["memory"]["stage"]
-    assert not watch["output"]["alarmed"]
-
-
 def test_a_surface_fault_is_no_instruments_fault_and_named_a_frame_later_at_most():
     loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 4.0}
     plain, watched = (
@@ -97,23 +83,3 @@ def test_a_surface_fault_is_no_instruments_fault_and_named_a_frame_later_at_most
     assert plain.isolation.fault == watched.isolation.fault == "elevator"
     assert plain.detection.delay_s == watched.detection.delay_s
     assert 0.0 <= watched.isolation.delay_s - plain.isolation.delay_s <= 0.01 + 1e-9
-
-
-def test_a_sensor_can_be_broken_and_repaired_in_flight():
-    sim = bf.Simulation(flight())
-    sim.step(frames=300)
-    sim.inject({"sensor": "alpha", "type": "bias", "magnitude": 3})
-    sim.step(frames=5)
-    assert sim.verdict.isolated == "sensor alpha"
-    sim.repair("alpha")
-    assert sim.scenario_flown().faults[0].end_s == pytest.approx(3.06)
-    with pytest.raises(bf.BadInput, match="sensor: 'alfa' is no sensor, did you mean alpha"):
-        sim.inject({"sensor": "alfa", "type": "freeze"})
-    with pytest.raises(bf.BadInput, match="actuator: 'alfa' is not known, did you mean alpha"):
-        sim.repair("alfa")
-
-
-def test_the_truth_flies_on_undisturbed():
-    """A broken reading that nobody uses changes nothing of the flight: heading, without outer loops."""
-    sound, broken = bf.fly(flight()), bf.fly(flight(fault("altitude", "bias")))
-    assert (sound.log["q_rad_s"] == broken.log["q_rad_s"]).all()

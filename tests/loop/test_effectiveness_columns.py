@@ -6,7 +6,6 @@ import pytest
 from flying import flown, loss
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
-STUCK = {"type": "stuck", "actuator": "elevator", "position_deg": 4, "at_s": 2.0}
 RATE_PER_S = 2.5
 
 
@@ -37,19 +36,7 @@ def test_the_law_comes_by_and_by_to_what_is_estimated(law):
         assert np.all(used[surface] == 1.0)
 
 
-def test_the_nominal_law_uses_none_of_it():
-    _, estimate, used, _ = fly("nominal")
-    assert estimate["elevator"][-1] == pytest.approx(0.6, abs=0.05)
-    assert all(np.all(values == 1.0) for values in used.values())
-
-
 def test_the_oracle_uses_what_no_diagnosis_estimates():
     _, estimate, used, t = fly("oracle", scheme="none")
     assert all(np.all(values == 1.0) for values in estimate.values())
     assert np.array_equal(used["elevator"], np.where(t < 2.0 - 1e-9, 1.0, 0.6))
-
-
-def test_a_surface_that_does_not_follow_has_none():
-    landing, estimate, used, _ = fly("fault-tolerant", STUCK, fault_class="all")
-    assert landing.isolated == "elevator"
-    assert estimate["elevator"][-1] == used["elevator"][-1] == 0.0

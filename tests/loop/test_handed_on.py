@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.loop.loop import Loop
-from flying import loss, scenario
-from telling import bits
+from flying import scenario
 
-FRAMES = 150
-GRADE = {"sensors": {"q": {"bias_deg_s": 0.2, "delay_s": 0.1, "bandwidth_rad_s": 50.0, "dropout_share": 0.1}}}
-# Beside the change itself: the engine's instruments, chance, and a fault that somebody has found by then.
-GIVEN = {"duration_s": 4.0, "faults": [loss(at_s=0.5, magnitude=0.6)], "seed": 5, "fdi": {"statistical": {}}}
 REFERENCE_AND_COMMAND = {
     *(f"reference.output.{name}" for name in ("commanded_rate", "model_rate", "model_acceleration")),
     *(f"reference.output.{name}" for name in ("governed_rate", "governed_acceleration")),
@@ -39,91 +33,6 @@ GOES_ON = {
     },
 }  # fmt: skip
 GOES_ON["observer"] = GOES_ON["law"] | {f"control.rejecting.observer.{name}" for name in ("begun", "rate")}
-BEGINS = {
-    "law": ("control",),
-    "observer": ("control",),
-    "scheme": ("fdi", "verdict"),
-    "sensors": ("instruments",),
-}
-# What the change itself works out, tested below or elsewhere.
-OF_A_LAW = {"control.published.memory.integral", "control.rejecting.observer.disturbance"}
-OWN = {
-    "law": OF_A_LAW,
-    "observer": OF_A_LAW,
-    "scheme": {
-        "since",
-        "fdi.statistical.gust.config.starts_in_flight",
-        "fdi.statistical.vaneless.config.starts_in_flight",
-    },
-    "sensors": {"instruments.taken"},
-}
-
-
-def fields(record, path=""):
-    """{path: value} of every field of a record down to arrays of numbers."""
-    found = {}
-    for name in record.dtype.names:
-        value = record[name]
-        if isinstance(value, np.void):
-            found |= fields(value, f"{path}{name}.")
-        else:
-            found[path + name] = np.array(value)
-    return found
-
-
-MOVED = set().union(*GOES_ON.values(), {"since"})
-
-
-def shift(record, path=""):
-    """Let every number differ from what a flight begins with, and whatever goes on."""
-    for name in record.dtype.names:
-        value = record[name]
-        if isinstance(value, np.void):
-            shift(value, f"{path}{name}.")
-        elif (value.dtype.kind == "f" or path + name in MOVED) and value.dtype.names is None:
-            record[name] = value + value.dtype.type(1)
-
-
-def changed(change):
-    """The record before and after a change, and that of a flight which has always been so."""
-    loop = Loop(scenario(**GIVEN, changes=[{"at_s": FRAMES / 100.0, **change}]))
-    loop.fly_chunk(0, FRAMES)
-    shift(loop.frames[0])
-    before = fields(loop.frames[0])
-    loop.changing.apply(FRAMES)
-    keys = {"law": ("control", "law"), "scheme": ("fdi", "scheme")}
-    always = dict(GIVEN)
-    for name, value in change.items():
-        if name in keys:
-            part, key = keys[name]
-            always[part] = {**always.get(part, {}), key: value}
-        else:
-            always[name] = value
-    return before, fields(loop.frames[0]), fields(Loop(scenario(**always)).frames[0])
-
-
-@pytest.mark.parametrize(
-    ("kind", "change"),
-    [
-        ("law", {"law": "nominal"}), ("observer", {"law": "fault-tolerant"}), ("observer", {"law": "oracle"}),
-        ("scheme", {"scheme": "adaptive-estimators"}), ("scheme", {"scheme": "none"}), ("sensors", GRADE),
-    ],
-)  # fmt: skip
-def test_every_field_begins_anew_or_goes_on(kind, change):
-    before, after, always = changed(change)
-    parts, goes_on = BEGINS[kind], GOES_ON[kind]
-    assert goes_on <= set(after)
-    for name, value in after.items():
-        if name in OWN[kind]:
-            continue
-        begins = name.partition(".")[0] in parts and name not in goes_on
-        expected = always[name] if begins else before[name]
-        assert bits(value) == bits(expected), f"{name} should {'begin anew' if begins else 'go on'}"
-
-
-def test_the_frame_of_a_diagnosis_begun_anew_and_the_first_sample_of_instruments_are_noted():
-    assert changed({"scheme": "none"})[1]["since"] == FRAMES
-    assert not changed(GRADE)[1]["instruments.taken"].any()
 
 
 SENSORS = (

@@ -10,9 +10,7 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.design import altitude_of
 from beaver_ftc.diagnosis.bounds import UNMAPPED_ERROR_RAD_S2
-from beaver_ftc.loop.outcome import inconclusive_now, inconclusive_of
 
 FULL = {
     "p_rad_s": [-9, 9], "q_rad_s": [-9, 9], "r_rad_s": [-9, 9], "alpha_rad": [-1, 1], "beta_rad": [-1, 1],
@@ -49,12 +47,6 @@ def share_by_log(flight):
     return float(np.mean(np.asarray(flight.log["q_eta_bar_rad_s2"]) > 0.4 * UNMAPPED_ERROR_RAD_S2))
 
 
-def test_inside_of_the_map_all_is_as_before(folder):
-    flight = flown(folder, initial={"altitude_m": 1800})
-    assert flight.metrics["detection"]["inconclusive"] is None
-    assert flight.metrics["detection"]["detected"]
-
-
 def test_outside_of_the_altitudes_nothing_is_concluded_and_it_is_said(folder):
     flight = flown(folder, initial={"altitude_m": 3000})
     found = flight.metrics["detection"]["inconclusive"]
@@ -76,36 +68,6 @@ def test_outside_of_the_altitudes_nothing_is_concluded_and_it_is_said(folder):
     )
 
 
-def test_a_flight_longer_than_was_measured(folder):
-    flight = flown(folder, initial={"altitude_m": 1800}, duration_s=20, faults=[], expect={})
-    found = flight.metrics["detection"]["inconclusive"]
-    frames = flight.metrics["frames"]
-    assert found["reasons"][0]["quantity"] == "flown_s"
-    assert (
-        found["share"]
-        == pytest.approx(share_by_log(flight), abs=1.5 / frames)
-        == pytest.approx(0.25, abs=0.01)
-    )
-    assert found["from_s"] == pytest.approx(15.01)
-
-
-def test_without_a_diagnosis_that_is_the_reason():
-    flight = bf.fly({"name": "x", "duration_s": 2, "fdi": {"scheme": "none"}})
-    found = flight.metrics["detection"]["inconclusive"]
-    assert (found["share"], found["reasons"][0]["quantity"]) == (1.0, "scheme")
-    with pytest.raises(bf.BadInput, match=r"fdi.scheme: none: no diagnosis would run, allowed: "):
-        bf.Diagnosis(bf.aircraft("beaver"), fdi={"scheme": "none"})
-
-
-def test_the_live_page_gets_the_reason_of_now(folder):
-    path = folder / "x.yaml"
-    path.write_text(yaml.safe_dump({"name": "x", "aircraft": "./mapped", "initial": {"altitude_m": 3000}}))
-    simulation = bf.Simulation(bf.load(path))
-    simulation.step()
-    assert simulation.inconclusive.startswith("outside the altitudes at which this model was measured")
-    simulation.release()
-
-
 def mapped():
     """An aircraft whose map has two boxes, none the other's: of each quantity (low, high), SI."""
     first = [(-0.1, 0.2), (-0.2, 0.1), (-0.3, 0.3), (-0.05, 0.3), (-0.1, 0.1), (30.0, 50.0), (1.0, 1.1)]
@@ -113,56 +75,3 @@ def mapped():
     boxes = [SimpleNamespace(ends=lambda signals, of=of: [*of, (0.1, 0.9)]) for of in (first, second)]
     file = SimpleNamespace(model_error_map=SimpleNamespace(boxes=boxes, until_s=[5.0, 12.0]))
     return SimpleNamespace(file=file, signals=("dpt",))
-
-
-SPANS_SAID = {
-    "q_rad_s": "outside the pitch rates at which this model was measured: -11.5 to 17.2 deg/s",
-    "altitude_m": "outside the altitudes at which this model was measured: 1,110 to 3,100 m",
-    "dpt": "outside the values of dpt at which this model was measured: 0.1 to 0.9",
-    "flown_s": "later than this model was measured: after 12 s of flight",
-    "between": "in a combination of speeds, angles and rates at which this model was not measured",
-    "scheme": "no diagnosis ran: fdi.scheme is none",
-}
-
-
-def test_of_several_reasons_the_one_of_most_frames_comes_first_and_each_has_its_own_numbers():
-    """Shares of all frames that were watched; they may add up to more than all in which nothing was said."""
-    counted = {
-        "watched": 200, "frames": 120, "from_s": 3.5, "undiagnosed": 10, "late": 40, "between": 15,
-        "beyond": [0, 25, 0, 0, 0, 0, 60, 5, 0], "least": [9.0, -0.3, 9.0, 9.0, 9.0, 9.0, 0.8, 0.95, 9.0],
-        "greatest": [9.0, 0.5, 9.0, 9.0, 9.0, 9.0, 0.85, 1.2, 9.0],
-    }  # fmt: skip
-    found = inconclusive_of({"accounts": {"inconclusive": counted}, "t": 21.25}, mapped())
-    assert (found["share"], found["from_s"]) == (0.6, 3.5)
-    wanted = [
-        ("altitude_m", 0.3, [altitude_of(1.1), altitude_of(0.9)], [altitude_of(0.85), altitude_of(0.8)]),
-        ("flown_s", 0.2, [0.0, 12.0], [12.0, 21.25]), ("q_rad_s", 0.125, [-0.2, 0.3], [-0.3, 0.5]),
-        ("between", 0.075, None, None), ("scheme", 0.05, None, None), ("dpt", 0.025, [0.1, 0.9], [0.95, 1.2]),
-    ]  # fmt: skip
-    assert [reason["quantity"] for reason in found["reasons"]] == [name for name, *_ in wanted]
-    for reason, (name, share, measured, flown) in zip(found["reasons"], wanted, strict=True):
-        assert reason["share"] == pytest.approx(share)
-        assert reason["measured"] == (None if measured is None else pytest.approx(measured))
-        assert reason["flown"] == (None if flown is None else pytest.approx(flown))
-        assert reason["says"] == SPANS_SAID[name]
-    none = {**counted, "frames": 0}
-    assert inconclusive_of({"accounts": {"inconclusive": none}, "t": 21.25}, mapped()) is None
-
-
-INSIDE = [0.0, 0.0, 0.0, 0.1, 0.0, 45.0, 1.0, 0.5, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("changes", "at_s", "error_map", "enabled", "says"),
-    [
-        ({1: 0.4}, 3.0, {}, 1, ["q_rad_s"]), ({1: 0.4, 7: 0.05}, 13.0, {}, 1, ["q_rad_s", "dpt", "flown_s"]),
-        ({6: 0.8}, 12.0, {}, 1, ["altitude_m"]), ({}, 3.0, {}, 1, ["between"]),
-        ({1: 0.4}, 3.0, {"n_boxes": 0}, 1, []), ({1: 0.4}, 3.0, {"outside": 0}, 1, []),
-        ({1: 0.4}, 3.0, {}, 0, ["scheme"]), ({}, 3.0, {"n_boxes": 0}, 0, ["scheme"]),
-    ],
-)  # fmt: skip
-def test_why_nothing_can_be_concluded_now(changes, at_s, error_map, enabled, says):
-    place = np.array([changes.get(i, value) for i, value in enumerate(INSIDE)])
-    here = {"n_boxes": 2, "outside": 1, "coordinates": place, "time_s": at_s} | error_map
-    frame = {"fdi": {"bound": {"error_map": here}, "config": {"enabled": enabled}}}
-    assert inconclusive_now(frame, mapped()) == "; ".join(SPANS_SAID[name] for name in says)

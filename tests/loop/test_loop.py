@@ -1,17 +1,12 @@
 """The closed loop: one suite over every built-in scenario, and what must not depend on how it is run."""
 
-import dataclasses
-from functools import partial
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.diagnosis import Verdict
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import assembly, frame, loop, outcome
-from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.loop import loop
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.verdict import verdict_lines
@@ -138,14 +133,6 @@ class Silent:
         return self.verdict
 
 
-def test_progress_ends_at_one_and_is_told_meanwhile_where_a_plug_in_flies():
-    shares, slow = [], []
-    fly(scenario(duration_s=1), progress=shares.append)
-    fly(scenario(duration_s=1), progress=slow.append, detector=Silent())
-    assert shares[-1] == slow[-1] == 1.0
-    assert slow[:-1] == pytest.approx([16 * n / 100 for n in range(1, 7)])
-
-
 @pytest.mark.parametrize("detector", [None, Silent()])
 def test_a_watch_sees_every_frame_of_a_flight_that_departs(detector):
     seen_s, memory = [], Memory()
@@ -227,53 +214,3 @@ class TestDepartures:
         monkeypatch.setattr(flying.cockpit, "read", poisoned)
         with pytest.raises(SimulationFailed, match=r"beta_rad.*0\.5 s|0\.5 s.*beta_rad"):
             list(flying.chunks())
-
-
-def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
-    frames, room, stays = np.zeros(1, assembly.frame_dtype(4)), MAX_EVENTS, 150
-    envelope = frames[0]["accounts"]["envelope"]
-    for k in range(10 * stays):
-        frame.note_envelope(envelope, k % 10 >= 7, float(k))
-    frames["k"], frames["dt"] = 10 * stays - 1, 1.0
-    exits = outcome._envelope_exits(frames[0])
-    assert len(exits) == room
-    assert exits[:2] == ((7, 10), (17, 20))
-    assert exits[-2:] == ((10 * (room - 2) + 7, 10 * (room - 1)), (10 * stays - 3, 10 * stays - 1))
-    assert (envelope["n_exits"], envelope["outside_frames"]) == (stays, 3 * stays)
-
-
-def test_the_final_mode_is_right_after_any_number_of_changes():
-    frames = np.zeros(1, assembly.frame_dtype(4))
-    frames["control"]["config"]["informed"] = 1
-    supervisor = frames[0]["supervisor"]
-    for k in range(201):
-        frames["t"], frames["truth"]["faulted"] = k, k % 2
-        frame.decide(frames[0])
-    assert supervisor["n_modes"] > MAX_EVENTS
-    assert supervisor["mode_at_s"][-1] == supervisor["n_modes"] - 1
-    assert supervisor["mode_is"][-1] == supervisor["mode"]
-
-
-def test_what_cannot_be_trimmed_is_bad_input():
-    with pytest.raises(BadInput):
-        fly(scenario(initial={"airspeed_mps": 21, "altitude_m": 6000}))
-
-
-def test_a_flight_is_plain_data():
-    flight, _ = flown(duration_s=1)
-    assert dataclasses.replace(flight, frames=1).frames == 1
-
-
-@pytest.mark.parametrize("turbulent", [True, False])
-def test_the_air_is_turned_before_each_of_jsbsims_frames(turbulent):
-    done = []
-    cockpit = SimpleNamespace(native=False, **{
-        name: partial(done.append, name) for name in ("write", "turn_air", "read")
-    })  # fmt: skip
-    loop = SimpleNamespace(
-        _inside=0, _turbulent=turbulent, cockpit=cockpit, frames=7, _look=done.append,
-        plant=SimpleNamespace(run=partial(done.append, "run")),
-    )  # fmt: skip
-    Loop.fly_inside(loop, 2)
-    assert done == ["write", *[*(["turn_air"] if turbulent else []), "run", "read", 7] * 2]
-    assert loop._inside == 2

@@ -15,13 +15,6 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
-from beaver_ftc.results import log, writer
-from beaver_ftc.results.exports import write_acmi
-from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.log import column_names as log_columns
-from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.views import views
-from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.schema import load_scenario, load_text
 
 FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
@@ -123,15 +116,6 @@ def test_what_it_has_not_is_refused_by_its_key():
             load_text(text.replace("actuator: elevator", change), folder=FOLDER)
 
 
-def test_pairs_are_refused_where_there_is_no_pair():
-    with pytest.raises(BadInput, match=r"fdi\.pairs: not available: trainer has not two surfaces in pitch"):
-        fly(quiet(**{"fdi.fault_class": "all", "fdi.pairs": True}))
-
-
-def test_the_file_of_the_flight_is_a_scenario():
-    assert load_scenario(FLIGHT).airframe.name == "trainer"
-
-
 LOST = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6, "at_s": 10.0}
 RUNS_AWAY = {"type": "hardover", "actuator": "elevator", "direction": 1, "at_s": 10.0}
 
@@ -167,25 +151,3 @@ def test_a_result_folder_flies_it_again(tmp_path):
     (kept / "aircraft" / "notes.txt").write_text("mine")
     with pytest.raises(bf.SimulationFailed, match=r"aircraft/notes\.txt"):
         bf.fly(load_scenario(FLIGHT)).save(tmp_path, report=False)
-
-
-def test_its_recording_and_views_have_its_surfaces(tmp_path):
-    with result_folder(tmp_path, "kept") as folder:
-        with ParquetLog(folder / "log.parquet") as log:
-            flight = fly(load_scenario(FLIGHT), log)
-        write_acmi(folder / "log.parquet", measure(flight), folder / "flight.acmi", flight.scenario.airframe)
-        shown = {view.name: view for view in views(log_columns(folder / "log.parquet"))}
-    assert "Flaps" not in (tmp_path / "kept" / "flight.acmi").read_text()
-    assert [panel.label for panel in shown["surfaces"].panels] == ["aileron", "elevator", "rudder"]
-    assert len(shown["effectiveness"].panels[0].traces) == 3
-
-
-def test_a_recorded_command_is_a_share_of_the_longer_way(tmp_path):
-    """The elevator goes further up, to -0.45 rad, than down, to 0.35."""
-    short = load_scenario(FLIGHT).model_copy(update={"duration_s": 0.2})
-    writer.run(short, tmp_path, report=False, recording="table")
-    folder = tmp_path / short.name
-    written = np.genfromtxt(folder / "flight.csv", delimiter=",", names=True)
-    command_rad = log.read(folder / "log.parquet", ["elevator_cmd_rad"])["elevator_cmd_rad"]
-    assert np.abs(command_rad).min() > 0.0
-    assert written["elevator_command"] == pytest.approx(command_rad / 0.45)

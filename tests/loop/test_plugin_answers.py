@@ -5,9 +5,8 @@ import pytest
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.documents.errors import BadInput, SimulationFailed, Stopped
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.plugin_frame import PluginFrame
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -100,79 +99,6 @@ def test_what_is_taken_of_a_verdict(frame, verdict, taken):
     assert record["effectiveness"].tolist() == list(expected)
 
 
-def test_errors_are_put_in_one_line_and_bounded(frame):
-    plugins, _ = frame
-    raising = Answers(error=ValueError("a\n  b" + "c" * 600))
-    with pytest.raises(SimulationFailed) as failed:
-        plugins._ask("mine", raising.step)
-    says = str(failed.value)
-    assert says.startswith("plug-in mine at 0 s: step raised ValueError: a bccc")
-    assert len(says) == len("plug-in mine at 0 s: ") + 500
-    with pytest.raises(SimulationFailed, match="step raised SystemExit: 3"):
-        plugins._ask("mine", Answers(error=SystemExit(3)).step)
-    with pytest.raises(BadInput, match=r"^as it says$"):
-        plugins._ask("mine", Answers(error=BadInput("as it says")).step)
-    for failure in (GeneratorExit("g"), BaseException("g")):
-        with pytest.raises(SimulationFailed, match=f"step raised {type(failure).__name__}: g"):
-            plugins._ask("mine", Answers(error=failure).step)
-
-
-@pytest.mark.parametrize("end", [KeyboardInterrupt(), Stopped(143)])
-def test_a_signal_that_ends_the_command_is_no_failure_of_the_code_it_arrives_in(frame, end):
-    plugins, _ = frame
-    with pytest.raises(type(end)) as ended:
-        plugins._ask("mine", Answers(error=end).step)
-    assert ended.value is end
-
-
-def test_each_is_told_of_its_own_options_once_and_one_that_goes_on_not_again():
-    law = Answers(np.zeros(4))
-    keys = {"fdi": {"scheme": "augmented-ekf", "options": {"alarm": 2.0}},
-            "control": {"law": "lqr", "options": {"q": 3.0}}}  # fmt: skip
-    detector = Answers(Verdict())
-    loop = Loop(_scenario(**keys), detector, law)
-    assert [dict(context.options) for context in detector.contexts + law.contexts] == [
-        {"alarm": 2.0},
-        {"q": 3.0},
-    ]
-    begun = loop.plugin_frame
-    assert begun._names == ("augmented-ekf", "lqr")
-    given = loop.frames, loop.scenario, loop.trimmed
-    PluginFrame(*given, detector, law, begun)
-    assert (len(detector.contexts), len(law.contexts)) == (1, 1)
-    PluginFrame(*given, Answers(Verdict()), law, begun)
-    PluginFrame(*given, detector, Answers(), begun)
-    assert (len(detector.contexts), len(law.contexts)) == (1, 1)
-    PluginFrame(*given, detector, law, None)
-    assert (len(detector.contexts), len(law.contexts)) == (2, 2)
-    unnamed = PluginFrame(loop.frames, _scenario(), loop.trimmed, detector, law, begun)
-    assert unnamed._names == ("Answers", "Answers")
-
-
-class Tolerant(Answers):
-    fault_tolerant = True
-
-
-@pytest.mark.parametrize(
-    ("detector", "law", "named", "expected"),
-    [
-        (None, Answers(np.zeros(4)), "fault-tolerant", (1, (0, 0), 0)),
-        (None, Tolerant(np.zeros(4)), "oracle", (1, (1, 0), 0)),
-        (Answers(Verdict()), None, "fault-tolerant", (0, None, 0)),
-        (Answers(Verdict()), None, "oracle", (0, (1, 1), 1)),
-    ],
-)
-def test_what_a_record_is_made_ready_for(detector, law, named, expected):
-    frames = Loop(_scenario(control={"law": named}), detector, law).frames
-    config, power = frames["control"]["config"][0], frames["control"]["power"]["config"]["enabled"][0]
-    of_law = config["uses_verdict"], config["informed"]
-    assert (
-        frames["fdi"]["config"]["enabled"][0],
-        of_law if expected[1] is not None else None,
-        power,
-    ) == expected
-
-
 class Late(Answers):
     """Fails from 0.05 s on."""
 
@@ -194,16 +120,3 @@ def test_who_fails_in_flight_is_blamed_and_when(detector, law, blamed):
     with pytest.raises(SimulationFailed) as failed:
         loop.fly_chunk(0, 20)
     assert str(failed.value) == f"plug-in {blamed} at 0.05 s: step raised LookupError: no more"
-
-
-def test_every_stage_is_called_as_machine_code():
-    """A dispatcher would look up the type of the record at each call: thirty times a frame's time."""
-    for detector, law, called in (
-        (Answers(Verdict()), None, {"begin", "diagnose", "decide", "command", "finish"}),
-        (None, Answers(np.zeros(4)), {"begin", "diagnose", "decide", "take_command", "finish"}),
-    ):
-        loop = Loop(_scenario(duration_s=0.1), detector, law)
-        assert sum(len(rows) for rows in loop.chunks()) == 10
-        stages = loop.plugin_frame._direct
-        assert {stage.__name__ for stage in stages} == called
-        assert {type(code) for code in stages.values()} == {type(len)}

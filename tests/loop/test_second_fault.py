@@ -51,28 +51,6 @@ def test_a_sensor_that_breaks_later_is_named_beside_the_surface(surface, sensor,
     assert abs(log["airspeed_mps"][-1] - 45.0) < 8.0
 
 
-def test_where_sensors_count_as_sound_the_name_is_withdrawn_and_the_reason_said():
-    first, second = {"actuator": "rudder", "at_s": 8.0, **LOSS}, {"sensor": "q", "type": "bias"}
-    found, _ = flown(first, second | {"magnitude": 2, "at_s": 15.0}, sensor_monitor="never")
-    (gone,) = found.isolation.withdrawn
-    assert (gone.fault, gone.type, gone.to_s) == ("rudder", "loss_of_effectiveness", 15.0)
-    assert gone.because == "no fault of it explains the measurements"
-    assert gone.because in text(found)
-    assert found.isolation.fault == "unanticipated"
-
-
-def test_a_loss_then_a_jam_is_flown_whole_and_the_type_withdrawn():
-    jam = {"actuator": "rudder", "type": "stuck", "at_s": 18.0}
-    found, log = flown({"actuator": "rudder", "at_s": 8.0, **LOSS}, jam)
-    held = log["rudder_effective_rad"][log["t_s"] > 18.02]
-    assert np.ptp(held) == 0.0
-    assert held[0] == pytest.approx(0.5 * log["rudder_pos_rad"][-1])
-    (gone,) = found.isolation.types_withdrawn
-    assert (gone.fault, gone.type) == ("rudder", "loss_of_effectiveness")
-    assert 18.0 <= gone.to_s < 19.0
-    assert "type named before: rudder (loss of effectiveness)" in text(found)
-
-
 def test_an_intermittent_fault_is_scored_window_by_window():
     spells = [(8.0, 13.0, 0.5), (16.0, 21.0, 0.3)]
     faults = [
@@ -101,28 +79,6 @@ def test_of_two_losses_at_once_the_truth_is_their_product_at_the_instant_of_the_
     assert (first.true_size, second.true_size) == (-0.5, -0.75)
     assert first.estimate == pytest.approx(-0.5, abs=0.01)
     assert "at 29.99 s (true 75 %)" in text(found)
-
-
-def test_of_a_growing_loss_the_truth_is_that_of_the_same_instant():
-    loss = {"profile": "incipient", "kappa_per_s": 0.15, **LOSS}
-    found, _ = flown({"actuator": "elevator", "at_s": 8.0, **loss})
-    share = 1.0 - np.exp(-0.15 * (29.99 - 8.0))
-    assert f"at 29.99 s (true {50 * share:.3g} %)" in text(found)
-
-
-def test_a_jam_after_a_loss_that_two_faults_do_not_explain_is_not_left_named():
-    jam = {"actuator": "elevator", "type": "stuck", "at_s": 18.0}
-    loss = {"actuator": "elevator", "at_s": 8.0, **LOSS, "magnitude": 0.4}
-    found, _ = flown(loss, jam, pairs=True, duration_s=40.0)
-    assert found.isolation.fault != "elevator"
-    gone = [one for one in found.isolation.withdrawn if one.fault == "elevator"]
-    assert gone[-1].because == "no fault type explains the measurements"
-
-
-def test_a_flight_with_one_fault_to_its_end_has_no_windows():
-    found, _ = flown({"actuator": "elevator", "at_s": 8.0, **LOSS}, duration_s=12.0)
-    assert found.windows is None
-    assert not {"windows", "estimate_at_s"} & (set(found.document()) | set(found.document()["isolation"]))
 
 
 MASKED = [("stuck", "oscillatory"), ("float", "bias"), ("stuck", "rate_limit"), ("stuck", "stuck")]

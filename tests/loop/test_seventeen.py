@@ -7,14 +7,6 @@ from tests import seventeen
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.diagnosis.detection.parity import required_size
-from beaver_ftc.diagnosis.isolation import list_estimators
-from beaver_ftc.loop.assembly import frame_dtype
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import verdict_text
 from beaver_ftc.scenario.schema import load_text
 
 AILERONS = {"aileron_right_0", "aileron_right_1", "aileron_right_2"}
@@ -54,34 +46,6 @@ def test_all_parts_moved_as_the_whole_are_the_whole(folder):
         assert aircraft.coefficient(name, alike) == pytest.approx(whole.coefficient(name, of), abs=1e-9)
 
 
-def test_it_is_trimmed_as_the_whole_where_one_part_does_the_work(folder):
-    aircraft = load(f"./{seventeen.NAME}", folder)
-    point = trim(45.0, 1828.8, plant=Plant(100, aircraft=aircraft))
-    assert point.surfaces_rad["elevator_0"] == pytest.approx(
-        5.0 * trim(45.0, 1828.8).surfaces_rad["elevator"], rel=0.05
-    )
-
-
-def test_every_loss_and_position_has_an_estimator(folder):
-    aircraft = load(f"./{seventeen.NAME}", folder)
-    assert aircraft.n == 17 <= MAX_SURFACES
-    assert len(list_estimators("all", aircraft)) == 34
-    stand_ins = {part.name for part in seventeen.parts()["flap"]}
-    assert {surface for surface, _, _ in list_estimators("published", aircraft)} == {
-        *aircraft.surfaces
-    } - stand_ins
-
-
-def test_a_record_has_the_room_that_its_aircraft_needs(folder):
-    few, many = load(), load(f"./{seventeen.NAME}", folder)
-    small, large = (frame_dtype(aircraft.n, required_size(aircraft)).itemsize for aircraft in (few, many))
-    assert small < 700_000  # onset tests in groups of four hypotheses, of which a view needs three at most
-    assert 5_000_000 < large < 7_000_000
-    assert (
-        required_size(many).rate_size.max_hypotheses == 3 * 8 + 2
-    )  # ailerons and rudders: losses that are one block's
-
-
 def test_a_healthy_flight_raises_no_alarm_and_ends_in_no_departure(folder):
     flight = bf.fly(scenario(folder, fdi={"fault_class": "all"}))
     assert not flight.metrics["false_alarm"]
@@ -95,29 +59,6 @@ def test_a_runaway_on_one_side_leaves_the_ailerons_of_that_side(folder):
     flight = bf.fly(scenario(folder, fdi={"fault_class": "all"}, faults=[fault]))
     left = {candidate.partition(":")[0] for candidate in flight.metrics["isolation"]["candidates"]}
     assert left == AILERONS
-
-
-def test_noisy_sensors_in_moving_air_raise_no_alarm(folder):
-    air = {"turbulence": "dryden", "severity": "light"}
-    bounds = {"sensors": "tactical-grade", "turbulence": "light"}
-    flight = bf.fly(scenario(folder, sensors="tactical-grade", environment=air, fdi={"bounds": bounds}))
-    assert not flight.metrics["detection"]["detected"]
-
-
-def test_what_is_left_of_an_axis_is_computed_and_said():
-    """Of the Beaver with halves the left aileron is lost: ailerons, flaps and rudder roll, by their terms."""
-    sine = {"amplitude_deg_s": 3, "frequency_hz": 0.25}
-    lost = {"actuator": "aileron_left", "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 2}
-    document = {"aircraft": "beaver-split", "duration_s": 8, "reference": {"p": [{"sine": sine}]}}
-    flight = bf.fly(bf.load(document | {"faults": [lost]}))
-    halves, of = load("beaver-split"), flight.metrics["authority"]["p"]
-    spans = {s: (t.max_rad - t.min_rad) * abs(halves.effect[s][0]) for s, t in halves.travel.items()}
-    expected = 1.0 - spans["aileron_left"] / sum(spans.values())
-    whole = of["healthy_greatest_rad_s2"] - of["healthy_least_rad_s2"]
-    share = (of["greatest_rad_s2"] - of["least_rad_s2"]) / whole
-    assert share == pytest.approx(expected, abs=0.03)
-    assert f"roll authority {100 * share:.0f} %" in verdict_text(Metrics.of(flight.metrics), "here")
-    assert flight.metrics["tracking"]["post_fault_rms_deg_s"]["p"] < 0.2
 
 
 def test_two_surfaces_lost_at_once_are_found_by_the_law_itself():

@@ -7,7 +7,6 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.monitors.redundancy import ALPHA_TEST, BETA_TEST, RPM_TEST
 from beaver_ftc.scenario.schema import load
-from beaver_ftc.scenario.sensors import PRESETS
 
 SWINGING = {
     "p": [{"sine": {"amplitude_deg_s": 10, "frequency_hz": 0.5}}],
@@ -61,16 +60,6 @@ def test_sound_declared_instruments_are_never_suspected(words):
     assert found.log["detected"].max() == 0.0
 
 
-def test_a_heading_that_leaps_past_north_is_sound_while_a_blurred_bank_swings():
-    """A scale error of the heading comes and goes there, and turns each time about another axis."""
-    errors = has(psi={"scale_error": 0.01}, phi={"noise_std_deg": 0.01})
-    errors["fdi"]["bounds"]["turbulence"] = "moderate"
-    air = {"turbulence": "dryden", "severity": "moderate"}
-    for seed in range(40):
-        flight = flown(duration_s=0.3, rate_hz=92, seed=seed, environment=air, **errors)
-        assert not flight.metrics["detection"]["detected"], seed
-
-
 @pytest.mark.parametrize("substeps", [1, 2, 5])
 @pytest.mark.parametrize(
     ("sensor", "kind", "tests"),
@@ -93,14 +82,6 @@ def test_a_broken_instrument_is_found_when_it_breaks_in_verdict_and_log(sensor, 
         assert log["watch_test"][first] == tests
 
 
-def test_a_gyro_that_the_rates_see_first_leaves_its_alarm_in_the_log():
-    broken = {"sensor": "p", "type": "bias", "magnitude": 4, "at_s": 1.0}
-    found = flown(faults=[broken], duration_s=2, fdi={"fault_class": "all"})
-    log = found.log
-    assert found.isolation.fault == "sensor p"
-    assert (log["detected"] == (log["t_s"] >= found.metrics["detection"]["time_s"] - 1e-9)).all()
-
-
 @pytest.mark.parametrize("fault_class", ["published", "all"])
 @pytest.mark.parametrize(("at_s", "name"), [(0.0, None), (0.01, None), (1.01, "elevator")])
 def test_a_surface_broken_from_the_start_is_no_instruments_fault(at_s, name, fault_class):
@@ -112,57 +93,3 @@ def test_a_surface_broken_from_the_start_is_no_instruments_fault(at_s, name, fau
     assert found.detection.detected
     assert found.isolation.fault == name
     assert found.log["watch_share"].max() <= 1.0
-
-
-def test_without_a_watch_there_is_no_column_of_it_and_before_one_no_number():
-    plain = bf.fly(load({"name": "x", "duration_s": 1})).log
-    assert not [name for name in plain.columns if name.startswith("watch")]
-    other = {"scheme": "none", "sensor_monitor": "always"}
-    late = bf.fly(load({"name": "x", "duration_s": 2, "fdi": other,
-                        "changes": [{"at_s": 1.0, "scheme": "adaptive-estimators"}]})).log  # fmt: skip
-    assert late["watch_share"][:100].isna().all()
-    assert late["watch_share"][100:].between(0.0, 1.0).all()
-
-
-def test_an_angle_that_freezes_in_noise_is_no_gyros_fault():
-    """It stands still for two looks when the alarm comes: a third has to say whether it is frozen."""
-    turning = {axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.4}}] for axis in "pqr"}
-    grade = {"sensors": "tactical-grade", "fdi": {"bounds": {"sensors": "tactical-grade"}}}
-    frozen = {"sensor": "psi", "type": "freeze"}
-    names = {
-        bf.fly(
-            load({"name": "x", "duration_s": 5, "rate_hz": 50, "seed": seed, "reference": turning,
-                  "faults": [{**frozen, "at_s": 2.0 + 0.26 * seed}], **grade}), log=False
-        ).isolation.fault
-        for seed in range(10)
-    }  # fmt: skip
-    assert names <= {"sensor psi", "unanticipated", None}
-
-
-@pytest.mark.parametrize(
-    ("seed", "rate_hz", "broken", "coarse", "swings"),
-    [
-        (4, 100, ("psi", 1.2437), {"alpha": 0.0392, "beta": 0.4518, "p": 0.0039, "phi": 0.01303},
-         {"p": (0.245, 0.451), "q": (1.83, 0.571), "r": (0.034, 0.233)}),
-        (128, 30, ("theta", 1.6477),
-         {"beta": 0.0507, "p": 0.0294, "psi": 0.51137, "r": 0.0996, "theta": 0.06574},
-         {"p": (4.653, 0.989), "q": (2.7, 0.412), "r": (0.385, 0.813)}),
-    ],
-)  # fmt: skip
-def test_no_other_is_named_for_a_frozen_angle_that_its_own_test_still_hides(
-    seed, rate_hz, broken, coarse, swings
-):
-    sensors = {name: dict(errors) for name, errors in PRESETS["tactical-grade"].items()}
-    for name, quantum in coarse.items():
-        sensors[name]["quantum_deg_s" if name in "pqr" else "quantum_deg"] = quantum
-    sines = {
-        axis: [{"sine": {"amplitude_deg_s": size, "frequency_hz": f}}] for axis, (size, f) in swings.items()
-    }
-    flight = bf.fly({
-        "name": "hidden", "duration_s": broken[1] + 0.6, "rate_hz": rate_hz, "seed": seed, "reference": sines,
-        "environment": {"turbulence": "dryden", "severity": "severe"}, "sensors": sensors,
-        "fdi": {"fault_class": "all", "bounds": {"sensors": sensors, "turbulence": "severe"}},
-        "faults": [{"sensor": broken[0], "type": "freeze", "at_s": broken[1]}],
-    }, log=False)  # fmt: skip
-    assert flight.detection.detected
-    assert flight.isolation.fault in (None, f"sensor {broken[0]}")

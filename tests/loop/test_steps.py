@@ -1,7 +1,5 @@
 """A flight by steps of all lengths across small chunks of its log, and what is said of it on the way."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -63,18 +61,6 @@ def test_steps_across_chunks(small, monkeypatch):
     assert other.land().metrics == sim.land().metrics
 
 
-def test_the_first_step_flies_frame_0_as_well_unless_somebody_has_looked():
-    one, two = (bf.Simulation(scenario(duration_s=0.2)) for _ in range(2))
-    one.step()
-    assert (len(one.rows), one.frames) == (2, 2)
-    assert two.values[0] == 0.0
-    assert (two.frames, len(two.rows), two.measured.t_s) == (1, 1, 0.0)
-    two.step()
-    assert (two.frames, len(two.rows)) == (2, 1)
-    two.step(frames=3)
-    assert len(two.rows) == 3
-
-
 @pytest.mark.parametrize("frames", [0, -1, 1.5, "3", None])
 def test_so_many_frames_are_no_step(frames):
     sim = bf.Simulation(scenario(duration_s=0.2))
@@ -90,111 +76,3 @@ def test_so_many_frames_are_no_step(frames):
 def test_what_is_no_stick(stick):
     with pytest.raises(bf.BadInput, match=r"^stick: .* is not usable, allowed: 3 finite numbers, rad/s$"):
         bf.Simulation(scenario(duration_s=0.2)).step(stick=stick)
-
-
-def test_of_what_scenario_a_verdict_is():
-    """Flown to its end and left alone: as given. Else as it happened, or as much as a scenario can say."""
-    given = scenario(duration_s=0.5, faults=[loss(at_s=0.2), loss("rudder", at_s=0.45)])
-    left_alone = bf.Simulation(given)
-    left_alone.step(frames=20)
-    assert left_alone.land().scenario.duration_s == pytest.approx(0.21)
-    assert [fault.actuator for fault in left_alone.land().scenario.faults] == ["elevator"]
-    left_alone.step(frames=100)
-    assert left_alone.land().scenario is left_alone._given
-    steered = bf.Simulation(given)
-    steered.step(frames=10, stick=(0.01, 0.0, 0.0))
-    steered.step(frames=100)
-    assert steered.done
-    assert steered.land().scenario.reference != given.reference
-    broken = bf.Simulation(given)
-    broken.step(frames=10)
-    broken.inject({"type": "float", "actuator": "flap"})
-    broken.step(frames=100)
-    assert [fault.actuator for fault in broken.land().scenario.faults] == ["elevator", "rudder", "flap"]
-    by_hand = bf.Simulation(given)
-    by_hand.step(by_hand.trim_rad, frames=10)
-    landed = by_hand.land().scenario
-    assert (landed.duration_s, landed.faults) == (0.5, ())
-    by_hand.step(frames=15)
-    assert [fault.actuator for fault in by_hand.land().scenario.faults] == ["elevator"]
-
-
-def test_what_is_done_before_the_first_step_is_done_after_frame_0():
-    hold = {"altitude_m": [{"hold": True}]}
-    for do, says in (
-        (lambda sim: sim.blow({"velocity_mps": [0, 3, 0]}), lambda it: it.environment.gusts[0].at_s),
-        (lambda sim: sim.change({"law": "nominal"}), lambda it: it.changes[0].at_s),
-        (lambda sim: sim.aim({"altitude_m": 1850.0}), lambda it: it.autopilot.altitude_m[-1].at_s),
-    ):
-        sim = bf.Simulation(scenario(duration_s=0.5, autopilot=hold))
-        do(sim)
-        assert sim.frames == 1
-        sim.step(frames=3)
-        assert says(sim.scenario_flown()) == pytest.approx(0.01)
-    assert sim.log["altitude_command_m"].iloc[-1] > sim.log["altitude_command_m"].iloc[1]
-    fresh = bf.Simulation(scenario(duration_s=0.5))
-    assert fresh.scenario_flown().duration_s == pytest.approx(0.01)
-
-
-def test_another_seed_and_the_same_again():
-    noisy = scenario(duration_s=0.2, sensors={"q": {"noise_std_deg_s": 0.1}})
-    sim, logs = bf.Simulation(noisy), []
-    for seed in (None, 5, None, 1):
-        sim.reset(seed=seed)
-        sim.step(frames=100)
-        logs.append(sim.log["q_measured_rad_s"].to_numpy())
-        assert sim.scenario_flown().seed == (1 if len(logs) in (1, 4) else 5)
-    assert np.array_equal(logs[1], logs[2])
-    assert np.array_equal(logs[0], logs[3])
-    assert not np.array_equal(logs[0], logs[1])
-
-
-def test_without_a_log_it_flies_and_is_judged_all_the_same(small):
-    sim = bf.Simulation(scenario(**SECOND), log=False)
-    sim.step(frames=150)
-    kept = bf.Simulation(scenario(**SECOND))
-    kept.step(frames=150)
-    assert sim.land().metrics == kept.land().metrics
-    with pytest.raises(bf.BadInput, match="kept no log"):
-        _ = sim.log
-
-
-def test_the_same_fault_again_is_the_same_and_only_what_is_there_is_mended():
-    sim = bf.Simulation(scenario(duration_s=1.0, faults=[loss("aileron", at_s=0.9)]))
-    sim.step(frames=10)
-    for actuator in ("rudder", "flap", "rudder"):
-        sim.inject({"type": "stuck", "actuator": actuator})
-    assert [fault.actuator for fault in sim.in_force] == ["rudder", "flap"]
-    sim.step()
-    sim.repair("flap")
-    assert [fault.actuator for fault in sim.in_force] == ["rudder"]
-    assert [(f.actuator, f.end_s) for f in sim._faults] == [
-        ("aileron", None), ("rudder", None), ("flap", pytest.approx(0.12)),
-    ]  # fmt: skip
-    sim.step(frames=200)
-    assert [fault.actuator for fault in sim.in_force] == ["aileron", "rudder"]
-    with pytest.raises(bf.BadInput, match=r"the flight is over at 0\.99 s, allowed: reset\(\)"):
-        sim.step()
-
-
-def test_a_vector_is_so_many_finite_numbers():
-    assert simulation._vector((1, 2.5), 2, "x", "m").tolist() == [1.0, 2.5]
-    for given in ((1,), (1, np.inf), "ab", None, [[1, 2]], {}):
-        with pytest.raises(bf.BadInput, match=r"^x: .* is not usable, allowed: 2 finite numbers, m$"):
-            simulation._vector(given, 2, "x", "m")
-
-
-def test_whose_verdict_it_is():
-    """A plug-in law is told the built-in verdict; a plug-in detector's own stands."""
-    law = SimpleNamespace(reset=lambda context: None, step=lambda *told: sim.trim_rad)
-    said = bf.Verdict(True, "p", "rudder")
-    detector = SimpleNamespace(reset=lambda context: None, step=lambda *told: said)
-    for plug_ins, verdict in (({"law": law}, bf.Verdict()), ({"detector": detector}, said)):
-        sim = bf.Simulation(scenario(duration_s=0.2), **plug_ins)
-        sim.step()
-        assert sim.verdict == verdict
-
-
-def test_a_flight_that_has_not_begun_lands_with_frame_0():
-    sim = bf.Simulation(scenario(duration_s=0.2))
-    assert (sim.land().metrics["frames"], sim.frames) == (1, 1)

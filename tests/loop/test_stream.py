@@ -1,6 +1,5 @@
 """The diagnosis without the loop around it: the same verdicts to the bit, sample for sample."""
 
-import shutil
 import subprocess
 import sys
 import tracemalloc
@@ -10,9 +9,8 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.loop import stream
 from flying import loss, scenario
-from telling import apart, numbers
+from telling import apart
 
 PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
 NOISY = {"p": {"noise_std_deg_s": 0.06}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.04}}
@@ -87,20 +85,6 @@ def test_the_verdicts_are_those_of_the_loop_to_the_bit(flown):
     assert flown.verdicts[-1].detected
 
 
-def test_two_side_by_side_and_a_third_after_a_reset(published):
-    other = Flown(**CASES["of every type"])
-    one, two = published.diagnosis(), other.diagnosis()
-    both = [(one.step(*a), two.step(*b)) for a, b in zip(published.samples, other.samples, strict=True)]
-    assert both == list(zip(published.verdicts, other.verdicts, strict=True))
-    one.reset()
-    assert [one.step(*sample) for sample in published.samples] == published.verdicts
-
-
-def test_the_first_sample_is_the_trim_where_no_other_is_given(published):
-    diagnosis = bf.Diagnosis(bf.aircraft("beaver"), rate_hz=100)
-    assert [diagnosis.step(*sample[:3]) for sample in published.samples] == published.verdicts
-
-
 def test_nothing_grows(published):
     diagnosis = published.diagnosis()
     for sample in published.samples:
@@ -154,57 +138,6 @@ def test_what_is_no_sample_is_refused_and_not_taken(published):
 def test_a_mistake_is_named_by_its_key(keys, says):
     with pytest.raises(bf.BadInput, match=says):
         bf.Diagnosis(bf.aircraft("beaver"), **keys)
-
-
-def test_turbulence_wants_the_attitude():
-    diagnosis = bf.Diagnosis(bf.aircraft("beaver"), fdi={"bounds": {"turbulence": "light"}})
-    with pytest.raises(bf.BadInput, match="attitude_rad: is missing"):
-        diagnosis.step([0, 0, 0], [0.1, 0, 45, 1000, 1], [0] * 4)
-
-
-def test_of_an_aircraft_beside_the_scenario(published, tmp_path):
-    """Another aircraft than the built-in one: the same data in a folder of its own, whose surfaces are named
-    otherwise, gives the same verdicts under those names."""
-    own = own_aircraft(tmp_path)
-    diagnosis = bf.Diagnosis(own, rate_hz=100)
-    assert [diagnosis.step(*sample[:3]) for sample in published.samples] == published.verdicts
-
-
-def own_aircraft(folder):
-    shutil.copytree(bf.aircraft("beaver").folder, folder / "my-uav")
-    return bf.aircraft("./my-uav", folder)
-
-
-def test_it_holds_on_to_the_trim_that_was_given_and_takes_the_sample_as_it_is(monkeypatch):
-    """Without a given trim the first finite sample is one; each is a copy of its own."""
-    seen = []
-    monkeypatch.setattr(
-        stream, "configure_diagnosis_at_trim", lambda frame, scenario, trim: seen.append(trim)
-    )
-    start, sample = (tuple(numbers(n, seed=seed) for n in (3, 5, 4)) for seed in (1, 2))
-    for given in (start, None):
-        diagnosis = bf.Diagnosis(bf.aircraft("beaver"), start=given)
-        places = diagnosis._x, diagnosis._signals, diagnosis._command
-        for place, values in zip(places, sample, strict=True):
-            place[:] = values
-        places[2][1] = np.nan if given is None else places[2][1]
-        diagnosis._begin()
-        assert diagnosis._fresh is (given is None)
-        places[2][:] = sample[2]
-        if diagnosis._fresh:
-            diagnosis._begin()
-        for held, place, values, expected in zip(seen[-1][:3], places, sample, given or sample, strict=True):
-            np.testing.assert_array_equal(held, expected)
-            np.testing.assert_array_equal(place, values)
-            assert not np.shares_memory(held, place)
-    assert len(seen) == 2
-    with pytest.raises(bf.BadInput, match=r"^signals: .* allowed: 5 numbers"):
-        bf.Diagnosis(bf.aircraft("beaver"), start=(start[0], start[0], start[2]))._begin()
-
-
-def test_a_name_is_no_aircraft_of_a_stream():
-    with pytest.raises(bf.BadInput, match=r"aircraft: 'beaver' is none, allowed: what aircraft\(\) gives"):
-        bf.Diagnosis("beaver", rate_hz=100)
 
 
 def test_declared_turbulence_follows_the_altitude_that_is_given():

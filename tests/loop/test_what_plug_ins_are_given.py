@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.studies.compare.replay import Recorder
 from flying import Memory, scenario
@@ -65,13 +65,6 @@ def test_readings_have_the_errors_of_their_instruments():
     assert (steps[0][3:6] > steps[1]).all()
 
 
-def test_a_simulation_shows_the_same_readings():
-    recorder, _ = recorded(**REAL)
-    sim = Simulation(scenario(duration_s=8, **REAL), detector=Recorder())
-    sim.step(frames=100)
-    assert np.array_equal(np.hstack(sim.measured[-3:]), np.hstack(recorder.seen[100][0][-3:]))
-
-
 def test_without_accelerometers_there_is_no_reading_of_theirs():
     sim = Simulation(scenario(duration_s=1))
     sim.step()
@@ -95,11 +88,3 @@ def differences(place, one, other):
         return [] if np.array_equal(one, other) else [place]
     pairs = ((name, part, vars(other)[name]) for name, part in parts.items())
     return [where for name, *two in pairs for where in differences(f"{place}.{name}", *two)]
-
-
-def test_the_former_seed_is_a_number_of_no_flight():
-    """A notice says that it goes."""
-    loop = Loop(scenario(duration_s=1, seed=7), Recorder())
-    with pytest.warns(DeprecationWarning, match="Context.seed"):
-        assert loop.plugin_frame.detector.context.seed == 0
-    loop.release()

@@ -1,14 +1,9 @@
 """The adapter: names are checked, nothing is printed or written, a start is the state it was given."""
 
-import shutil
-
-import jsbsim
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.plant.adapter import FlightState, Plant, UnknownProperty
-from beaver_ftc.plant.addresses import available
 
 STATE = FlightState(
     airspeed_mps=41.0,
@@ -46,12 +41,6 @@ WHERE = {
     "engine_rpm": ("engine/speed-rpm", 1),
     "manifold_pressure_inhg": ("engine/manifold-pressure-inhg", 1),
 }
-
-
-def test_a_strangers_model_of_our_aircraft_is_not_run_by_compiled_code(tmp_path):
-    own = shutil.copytree(load().folder, tmp_path / "own") / load().jsbsim.name
-    assert Plant(100).native is available()
-    assert not Plant(100, model=own).native
 
 
 def test_a_start_is_the_state_it_was_given():
@@ -126,24 +115,3 @@ def test_an_aircraft_that_cannot_be_loaded_is_one_clear_line(capfd, tmp_path):
         Plant(rate_hz=100, model=broken)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
-
-
-def test_what_jsbsim_raises_while_it_loads_is_in_the_line(monkeypatch, tmp_path):
-    class Raises(jsbsim.FGFDMExec):
-        def load_model_with_paths(self, *_):
-            raise jsbsim.BaseError("a\n b")
-
-    (tmp_path / "mine.xml").write_text("<fdm_config/>")
-    monkeypatch.setattr(jsbsim, "FGFDMExec", Raises)
-    with pytest.raises(SimulationFailed, match=r"/mine.xml: a b$"):
-        Plant(rate_hz=100, model=tmp_path / "mine.xml")
-
-
-def test_two_aircraft_do_not_share_anything(trim_point):
-    one, other = Plant(rate_hz=100), Plant(rate_hz=100)
-    for plant in (one, other):
-        plant.start(trim_point)
-    one.write("failures/elevator/effectiveness", 0.5)
-    one.run()
-    assert other.read("failures/elevator/effectiveness") == 1
-    assert other.read("simulation/sim-time-sec") == 0

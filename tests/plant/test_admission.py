@@ -77,13 +77,6 @@ def test_every_property_that_the_file_names_is_looked_for():
     }  # fmt: skip
 
 
-def test_a_model_that_jsbsim_refuses_is_not_loaded_here(trainer, monkeypatch):
-    monkeypatch.setattr(admission, "failure", lambda model: "it ends JSBSim by signal 11")
-    monkeypatch.setattr(admission, "Plant", lambda *a, **k: pytest.fail("loaded in this process"))
-    with pytest.raises(ScenarioError, match="jsbsim: it ends JSBSim by signal 11, allowed: a model that"):
-        airframe.find_aircraft("./trainer", trainer.parent)
-
-
 def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(trainer):
     admission.admit(read(trainer))
     assert len(list(trainer.parent.rglob("admitted/*"))) == 1
@@ -91,27 +84,3 @@ def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(tr
     (trainer / "aircraft.yaml").touch()
     with pytest.raises(BadInput, match="output"):
         admission.admit.__wrapped__(read(trainer))
-
-
-def test_it_is_tried_once_for_each_state_of_the_files(trainer, monkeypatch):
-    tried = []
-    monkeypatch.setattr(admission, "failure", tried.append)
-    for _ in range(2):
-        admission.admit.__wrapped__(read(trainer))
-    assert len(tried) == 1
-    change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
-    admission.admit.__wrapped__(read(trainer))
-    assert len(tried) == 2
-
-
-def test_an_admission_is_of_the_models_and_the_file_by_name_and_content(trainer):
-    """Another file's content is another aircraft, a note beside them is not."""
-    seen = [admission.digest_of(trainer)]
-    (trainer / "notes.txt").write_text("not read")
-    assert admission.digest_of(trainer) == seen[0]
-    for name in ("aircraft.yaml", "trainer.xml"):
-        (trainer / name).write_text((trainer / name).read_text() + "\n")
-        seen.append(admission.digest_of(trainer))
-    (trainer / "trainer.xml").rename(trainer / "other.xml")
-    seen.append(admission.digest_of(trainer))
-    assert len(set(seen)) == 4

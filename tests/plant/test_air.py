@@ -5,8 +5,7 @@ import pytest
 
 from beaver_ftc.design import Dryden
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
-from beaver_ftc.scenario.airframe import Gust
+from beaver_ftc.plant.trim import configure, take_off, trim_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.truth import Truth
 
@@ -116,33 +115,3 @@ def test_a_gust_rises_to_its_height_and_fades():
     assert at[2.0] == pytest.approx(-4.0)
     assert at[1.25] == pytest.approx(-2.0, abs=0.15)
     assert at[2.75] == pytest.approx(-2.0, abs=0.15)
-
-
-@pytest.mark.parametrize(("at_s", "frame"), [(0.0, 0), (0.07, 7), (0.071, 8), (0.0799, 8), (0.08, 8)])
-def test_a_gust_between_frames_begins_in_the_next(at_s, frame):
-    class Noted:
-        def __init__(self):
-            self.written = []
-
-        def write(self, name, value):
-            self.written.append(name)
-
-    plant = Noted()
-    schedule = GustSchedule((Gust(at_s=at_s, velocity_mps=(0, 0, 5)),), plant, 100.0)
-    plant.written.clear()
-    for k in range(12):
-        schedule.apply(k)
-        assert plant.written.count("atmosphere/cosine-gust/start") == (k >= frame)
-    assert schedule.next_change(frame - 1) == frame
-    assert schedule.next_change(frame) == NEVER
-
-
-def test_turbulence_does_not_mind_a_fault_in_the_first_frame():
-    """Accelerations are settled with time standing still, where the filters of the turbulence have none."""
-    plant, _ = airborne(environment={"turbulence": "dryden", "severity": "moderate"})
-    before, _ = airborne(environment={"turbulence": "dryden", "severity": "moderate"})
-    plant.settle()
-    a, b = (flown(one, AIR + ROTATION, 50) for one in (plant, before))
-    assert np.isfinite(a).all()
-    assert np.ptp(a, axis=0).all()
-    assert (a == b).all()

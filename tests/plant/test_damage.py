@@ -43,12 +43,6 @@ def test_a_case_is_there_from_its_frame_to_its_end(written):
     assert [row[1] for row in rows] == [float(k >= 20) for k in range(len(rows))]
 
 
-def test_one_repair_does_not_end_the_same_damage_again_declared(written):
-    scenario = written(CASE | {"end_s": 0.3}, CASE | {"at_s": 0.2})
-    rows = seen(scenario, "failures/damage/tail-off")
-    assert [row[0] for row in rows] == [float(k >= 10) for k in range(len(rows))]
-
-
 def test_in_flight_it_is_inflicted_and_repaired(written):
     sim = Simulation(written())
     for _ in range(5):
@@ -73,11 +67,6 @@ def test_in_flight_it_is_inflicted_and_repaired(written):
 def test_what_no_damage_is(written, fault, says):
     with pytest.raises(BadInput, match=says):
         written({"type": "damage", "at_s": 0.1} | fault)
-
-
-def test_an_aircraft_without_cases_has_none():
-    with pytest.raises(BadInput, match="beaver declares no damage, allowed: an aircraft that does"):
-        load({"faults": [CASE]})
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.instruments import (
     AX,
@@ -46,12 +45,6 @@ def test_noise_has_the_declared_deviation_is_white_and_cut_off():
     assert normal == pytest.approx(0.6827, abs=0.006)
 
 
-def test_signals_have_noise_of_their_own():
-    readings = samples(still(20_000), p={"noise_std_deg_s": 1.0}, alpha={"noise_std_deg": 1.0})
-    assert abs(np.corrcoef(readings[:, 0], readings[:, 3])[0, 1]) < 0.05
-    assert (readings[:, 1] == -0.2).all()
-
-
 def test_seeds_repeat_and_differ():
     noisy = {"V": {"noise_std_mps": 1.0}}
     first, again, other = (samples(still(50), seed=s, **noisy) for s in (7, 7, 8))
@@ -66,12 +59,6 @@ def test_slope_bias_and_resolution():
     assert readings[SIGNALS.index("p")] == pytest.approx(0.11)
     assert readings[SIGNALS.index("beta")] == pytest.approx(0.02 + np.radians(3.0))
     assert readings[SIGNALS.index("qdyn")] == 900.0
-
-
-def test_a_resolution_finer_than_any_reading_is_rounded_changes_no_reading():
-    plain = samples(still(1))[0]
-    fine = {"qdyn": {"quantum_pa": 5e-324}, "V": {"quantum_mps": 1e-300}, "p": {"quantum_deg_s": 1e-17}}
-    assert (samples(still(1), **fine)[0] == plain).all()
 
 
 def test_a_ramp_comes_out_late_by_delay_and_lag():
@@ -108,20 +95,6 @@ def test_lost_samples_are_as_many_as_declared_and_hold_the_last():
     assert (readings <= ramp[:, 2]).all()
 
 
-def test_the_first_sample_is_never_lost():
-    """There is none before it to hold."""
-    truth = still(3) + np.arange(3)[:, None]
-    for seed in range(20):
-        readings = samples(truth, seed=seed, p={"dropout_share": 0.9}, V={"dropout_share": 0.9})
-        assert readings[0] == pytest.approx(truth[0])
-
-
-def test_a_delay_longer_than_the_line_is_refused():
-    given = {"name": "x", "rate_hz": 1000, "substeps": 2, "sensors": {"p": {"delay_s": 1.0}}}
-    with pytest.raises(BadInput, match=r"sensors\.p\.delay_s"):
-        configure_design(Scenario.model_validate(given), TRAVEL_RAD)
-
-
 def forces_read(truth, seed=1, **sensors):
     """Readings of accelerometers (n, 3), and of the others beside them (n, 13), of truth (n, 16)."""
     scenario = Scenario.model_validate({"name": "x", "seed": seed, "rate_hz": 100, "sensors": sensors})
@@ -152,31 +125,6 @@ def test_accelerometers_have_the_errors_of_the_others():
     assert (others[:, 0] != 0.1).all()
 
 
-def test_accelerometers_draw_from_a_counter_of_their_own():
-    """The noise of the others is the same to the bit whether they are noisy, or read, or not."""
-    noisy = {"q": {"noise_std_deg_s": 1.0}, "phi": {"noise_std_deg": 1.0}}
-    alone = forces_read(in_flight(50), **noisy)[1]
-    beside = forces_read(in_flight(50), **noisy, az={"noise_std_mps2": 1.0, "dropout_share": 0.5})[1]
-    assert (alone == beside).all()
-    assert (samples(still(50), q={"noise_std_deg_s": 1.0}) == alone[:, : len(SIGNALS)]).all()
-    first, again, other = (
-        forces_read(in_flight(50), seed=s, az={"noise_std_mps2": 1.0})[0] for s in (7, 7, 8)
-    )
-    assert (first == again).all()
-    assert (first[:, 2] != other[:, 2]).all()
-
-
-def test_a_first_sample_is_the_first_whenever_it_is_taken():
-    """Accelerometers that are read from some instant on do not lag behind what they never saw."""
-    scenario = Scenario.model_validate({"name": "x", "sensors": {"az": {"bandwidth_rad_s": 5.0}}})
-    instruments = configure_design(scenario, TRAVEL_RAD)["instruments"][0]
-    for row in in_flight(10):
-        read_all(instruments, row)
-    last = in_flight(1)[0]
-    read_forces(instruments, last)
-    assert last[AX + 2] == -9.8
-
-
 def headings(truth_deg, **psi):
     """What a heading reads, deg, along these."""
     row = np.concatenate([still(1)[0], np.zeros(N_SENSORS - len(SIGNALS))])
@@ -188,12 +136,6 @@ def headings(truth_deg, **psi):
 def apart_deg(one, other):
     """The short way round."""
     return (np.asarray(one) - other + 180.0) % 360.0 - 180.0
-
-
-def test_the_slope_of_a_heading_does_not_leap_at_north():
-    true = np.array([-2.0, -0.1, 0.1, 2.0, 90.0, 179.0, 270.0])
-    read = headings(true, scale_error=0.01)
-    assert apart_deg(read, true) == pytest.approx([-0.02, -0.001, 0.001, 0.02, 0.9, 1.79, -0.9])
 
 
 @pytest.mark.parametrize("psi", [{"bandwidth_rad_s": 20.0}, {"delay_s": 0.037}])

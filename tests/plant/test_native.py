@@ -1,6 +1,5 @@
 """Compiled property access gives what Python gives, to the bit."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -44,18 +43,6 @@ def test_writes_agree_to_the_bit(beaver):
     assert [beaver.read(name) for name in WRITTEN] == values.tolist()
 
 
-@needs_native
-def test_usable_inside_another_kernel(beaver):
-    @numba.njit
-    def first_plus_second(getter, pointers, out):
-        channels.read_nodes(getter, pointers, out)
-        return out[0] + out[1]
-
-    bank = NodeBank([beaver.node(name) for name in READ[:2]], owner=beaver)
-    total = first_plus_second(addresses.address(addresses.GETTER), bank.pointers, np.empty(2))
-    assert total == beaver.read(READ[0]) + beaver.read(READ[1])
-
-
 def test_the_plain_path_gives_the_same(beaver, monkeypatch):
     native_bank, out = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     native_bank.read(out)
@@ -67,17 +54,6 @@ def test_the_plain_path_gives_the_same(beaver, monkeypatch):
     assert not plain_bank.pointers.any(), "without native access nobody may follow an address"
     NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver).write(np.array([0.1, 0.2, 0.3, 0.4]))
     assert [beaver.read(name) for name in WRITTEN] == [0.1, 0.2, 0.3, 0.4]
-
-
-def test_a_bank_keeps_its_aircraft_alive(trim_point):
-    from beaver_ftc.plant.adapter import Plant
-
-    plant = Plant(rate_hz=100)
-    plant.start(trim_point)
-    bank, out = NodeBank([plant.node("velocities/vt-fps")], owner=plant), np.empty(1)
-    del plant
-    bank.read(out)
-    assert out[0] * 0.3048 == pytest.approx(45)
 
 
 WRONG = {
@@ -98,44 +74,10 @@ def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wro
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 
-def test_a_change_of_the_code_that_follows_addresses_asks_again(monkeypatch):
-    asked = []
-    monkeypatch.setattr(addresses, "passes", lambda name, build, *_: asked.append(build))
-    for digest in ("one", "other"):
-        monkeypatch.setattr(addresses, "digest_of_files", lambda *_, digest=digest: digest)
-        addresses._is_proved_in_a_child(addresses.LAYOUT)
-    assert asked[0] != asked[1]
-
-
-@pytest.mark.parametrize("name", ["node_pointer", "executive_base", "executive_pointer"])
-def test_no_word_beyond_an_object_is_read(name):
-    """The last word of an object fits, one byte more does not; whatever the other words are."""
-    import jsbsim
-
-    size = (jsbsim.FGPropertyNode if name == "node_pointer" else jsbsim.FGFDMExec).__basicsize__
-    others = addresses.LAYOUT._replace(node_pointer=0, executive_base=0, executive_pointer=0)
-    fits = [addresses._sizes_fit(others._replace(**{name: offset})) for offset in (size - 8, size - 7)]
-    assert fits == [True, False]
-
-
 @needs_native
 def test_a_missing_function_is_recognised(monkeypatch):
     monkeypatch.setattr(addresses, "GETTER", "_ZNK9NoSuchName")
     assert not addresses._sizes_fit(addresses.LAYOUT)
-
-
-FLIGHT = """
-import hashlib, sys
-from beaver_ftc.plant import addresses
-addresses.LAYOUT = addresses.LAYOUT._replace(**LAYOUT)
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.schema import load
-loop = Loop(load({"name": "run", "duration_s": 2.0, "substeps": 2, "sensors": "consumer-grade"}))
-rows = hashlib.sha256()
-for chunk in loop.chunks():
-    rows.update(chunk.tobytes())
-print(loop.cockpit.native, rows.hexdigest())
-"""
 
 
 ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}

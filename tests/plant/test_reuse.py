@@ -1,14 +1,10 @@
 """An aircraft flown again is as freshly loaded, to the bit, whatever was flown in it before."""
 
-import os
-
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import needs
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions
 from beaver_ftc.plant.conditions import ready
@@ -166,44 +162,12 @@ def test_every_property_of_jsbsim_is_as_in_a_fresh_one(monkeypatch):
     assert differing(readable(again), readable(fresh)) == set()
 
 
-def test_one_aircraft_is_loaded_for_flights_one_after_the_other_and_two_side_by_side():
-    scenario = scenario_of({"faults": []})
-    first = Loop(scenario)
-    beside = Loop(scenario)
-    assert beside.plant is not first.plant
-    plant = first.plant
-    first.release()
-    after = Loop(scenario)
-    assert after.plant is plant
-    after.release()
-    beside.release()
-
-
-def test_an_aircraft_that_somebody_prepared_is_not_flown_again():
-    loop = Loop(scenario_of({"faults": []}), prepare=lambda plant: plant.fdm.set_property_value("x/y", 1.0))
-    loop.release()
-    other = Loop(scenario_of({"faults": []}))
-    assert other.plant is not loop.plant
-    other.release()
-
-
 def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
     aircraft = scenario_of({"faults": []}).airframe
     plant = conditions.borrowed(100.0, 1, aircraft)
     conditions.give_back(plant)
     monkeypatch.setattr(conditions, "_last_written_ns", lambda model, second: (1,))
     assert conditions.borrowed(100.0, 1, aircraft) is not plant
-
-
-@pytest.mark.parametrize("file", ["mine.xml", "Systems/a.xml", "Systems/b.xml"])
-def test_every_file_of_a_model_is_looked_at(tmp_path, file):
-    (tmp_path / "Systems").mkdir()
-    for name in ("mine.xml", "Systems/a.xml", "Systems/b.xml"):
-        (tmp_path / name).write_text("<x/>")
-    before = conditions._last_written_ns(tmp_path / "mine.xml", 1)
-    os.utime(tmp_path / file, ns=(1, 1))
-    assert conditions._last_written_ns(tmp_path / "mine.xml", 1) == before  # within the same second
-    assert conditions._last_written_ns(tmp_path / "mine.xml", 2) != before
 
 
 def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
@@ -215,15 +179,6 @@ def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
     plant, again = ready(scenario)
     conditions.give_back(plant)
     assert first == again
-
-
-def test_what_cannot_be_trimmed_leaves_the_aircraft_to_others():
-    plant = conditions.borrowed(100.0, 1, scenario_of({"faults": []}).airframe)
-    conditions.give_back(plant)
-    for _ in range(3):
-        with pytest.raises(BadInput, match="airspeed"):
-            ready(scenario_of({"faults": [], "initial": {"airspeed_mps": 9.0}}))
-    assert conditions.borrowed(100.0, 1, plant.aircraft) is plant
 
 
 @needs.service("derive")

@@ -238,8 +238,3 @@ def test_what_the_jsbsim_package_has_neither_writes_nor_listens(name, tmp_path, 
         with socket.socket() as listening:
             assert listening.connect_ex(("127.0.0.1", port)) != 0
     assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
-def test_the_trainer_as_it_is_flies(machine):
-    """The fixture by itself is sound: what is refused above is the deed."""
-    assert CliRunner().invoke(app, ["validate", str(machine.scenario)]).exit_code == 0

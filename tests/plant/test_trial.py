@@ -2,7 +2,6 @@
 are caught."""
 
 import shutil
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -102,45 +101,6 @@ def test_an_error_that_a_model_raises_in_flight_ends_the_flight_alone(tmp_path, 
         bf.fly(bf.load(scenario))
 
 
-@pytest.mark.parametrize(
-    ("status", "said", "why"),
-    [(-9, "", "JSBSim does not start it within 2 s of processor"),
-     (-6, "terminate\n  what():  std::bad_alloc\n", "JSBSim needs more than 1 GB of memory for it"),
-     (-11, "", "it ends JSBSim by signal 11"), (-6, "a\n what():  broken\n\n", "it ends JSBSim by signal 6: broken"),  # noqa: E501
-     (1, "one\n\n two \n", "JSBSim ends with status 1: two"), (0, "a warning", None)],
-)  # fmt: skip
-def test_how_the_process_of_the_trial_ends_is_said(monkeypatch, status, said, why):
-    ended = SimpleNamespace(returncode=status, stdout=b"", stderr=said.encode())
-    asked = []
-    monkeypatch.setattr(trial.subprocess, "run", lambda command, **how: asked.append((command, how)) or ended)
-    assert trial.failure(Path("mine/m.xml")) == why
-    ((command, how),) = asked
-    assert command[1] == "-P"  # nothing is imported from the working directory
-    assert command[-1] == str(Path("mine/m.xml"))
-    assert how["timeout"] == trial.LONGEST_S
-
-
-def test_the_process_of_the_trial_has_little_memory_and_time_and_leaves_no_core(monkeypatch):
-    """A gibibyte; two seconds, then a signal, and one later the end. What the system refuses is left."""
-    limits = {}
-
-    def setrlimit(which, wanted):
-        if which == "cpu":
-            raise ValueError("not here")
-        limits[which] = wanted
-
-    names = {"RLIMIT_AS": "memory", "RLIMIT_CPU": "cpu", "RLIMIT_CORE": "core"}
-    resource = SimpleNamespace(**names, setrlimit=setrlimit)
-    monkeypatch.setitem(sys.modules, "resource", resource)
-    trial._limit()
-    assert limits == {"memory": (2**30, 2**30), "core": (0, 0)}
-    resource.setrlimit = limits.__setitem__
-    trial._limit()
-    assert limits["cpu"] == (2, 3)
-    monkeypatch.setitem(sys.modules, "resource", None)  # as where there is none
-    trial._limit()
-
-
 def test_a_model_that_waits_is_refused(monkeypatch):
     def late(command, **how):
         raise trial.subprocess.TimeoutExpired(command, 30.0)
@@ -165,13 +125,3 @@ def test_a_model_that_takes_long_to_load_is_refused_before_it_runs(monkeypatch):
     says = r"JSBSim takes 0.75 s of processor to load it, more than 0.7 s"
     with pytest.raises(adapter.SimulationFailed, match=says):
         trial.probe(Path("m.xml"))
-
-
-def test_only_models_of_ours_are_read_and_run_by_compiled_code(tmp_path):
-    """An error that another's raises in a frame would end the process there."""
-    ours = adapter.load_aircraft().jsbsim
-    assert adapter._is_ours(ours)
-    assert not adapter._is_ours(tmp_path / "beaver.xml")
-    link = tmp_path / "aircraft"
-    link.symlink_to(tmp_path)
-    assert not adapter._is_ours(link / "beaver.xml")

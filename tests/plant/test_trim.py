@@ -1,11 +1,10 @@
 """Trim: on the truth's own accelerations, to 1e-9, or a clear refusal."""
 
-from math import inf, radians
+from math import radians
 
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.plant import trim as trim_module
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 
@@ -35,17 +34,6 @@ def test_all_six_accelerations_vanish(airspeed_mps, altitude_m, flap_rad):
         flap_rad,
         0,
     )
-
-
-def test_what_is_left_of_them_is_told_in_si(monkeypatch):
-    """Of the first guess, which is taken for the trim."""
-    monkeypatch.setattr(trim_module, "TOLERANCE", inf)
-    monkeypatch.setattr(trim_module, "_approach", lambda look, x: x)
-    plant = Plant(rate_hz=100)
-    point = trim(45.0, 1828.8, plant)
-    left = accelerations(point, plant)
-    assert max(abs(a) for a in left[:3]) > 1e-3
-    assert left == pytest.approx(point.residual, rel=1e-4, abs=1e-12)
 
 
 def test_longitudinal_trim_is_the_published_one():
@@ -87,14 +75,6 @@ def test_outside_the_envelope_is_said():
     assert trim(45, 1000).envelope_valid
     assert not trim(60, 1000).envelope_valid
     assert not trim(30, 1500).envelope_valid, "too slow at that height: alpha beyond attached flow"
-
-
-def test_the_travel_is_as_it_was_after_a_trim(beaver):
-    trim(45, 1828.8, plant=beaver)
-    assert beaver.read("actuators/elevator/position-max-rad") == 0.49
-    with pytest.raises(BadInput):
-        trim(20, 0, plant=beaver)
-    assert beaver.read("actuators/elevator/position-min-rad") == -0.49
 
 
 @pytest.mark.parametrize(

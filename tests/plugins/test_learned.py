@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.compare.trial import benchmark_folder
 from flying import loss, scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "learned-detector"
@@ -46,16 +44,6 @@ def test_a_level_is_the_order_statistic_that_keeps_the_rate(learned, n, alpha, r
     assert learned[1].conformal_level(values, alpha) == rank
 
 
-def test_the_level_keeps_its_rate_over_many_draws(learned):
-    """Of exchangeable draws, whatever their distribution."""
-    rng = np.random.default_rng(4)
-    draws = rng.exponential(size=(4000, 20)) ** 2
-    over = [last > learned[1].conformal_level(first, 0.1) for *first, last in draws]
-    assert np.mean(over) == pytest.approx(0.1, abs=0.015)
-    with pytest.raises(ValueError, match=r"8 healthy flights for 0\.1, needed: 9"):
-        learned[1].conformal_level(np.ones(8), 0.1)
-
-
 def test_a_network_trained_on_few_flights_finds_what_it_has_seen(learned):
     """A few seconds of training; its products are scikit-learn's own probabilities."""
     package, train = learned
@@ -69,10 +57,3 @@ def test_a_network_trained_on_few_flights_finds_what_it_has_seen(learned):
     named = [fly(each, detector=Trained()) for each in flights(3, True)]
     assert [flight.isolated for flight in named].count("aileron") <= 1
     assert sum(flight.detection_time_s is not None for flight in named) >= 2
-
-
-def test_its_flights_are_none_of_those_that_are_compared():
-    own = [load_sweep(path).file.seed for path in EXAMPLE.glob("*.yaml")]
-    others = [load_sweep(path).file.seed for path in benchmark_folder().glob("*/*.yaml")]
-    assert len(own) == 2
-    assert not set(own) & set(others)

@@ -104,27 +104,3 @@ def test_without_the_airframe_a_surface_is_blamed_for_what_it_answers():
     without = listened(*flight, airframe=False).found[:N]
     assert abs(with_it - THETA).max() < 0.2
     assert abs(without - THETA).max() > 0.4
-
-
-def test_what_the_law_already_reckons_with_is_no_news():
-    """Of losses that are believed the observer misses nothing; they are found all the same."""
-    given, signals, _ = flown()
-    airframe = np.zeros((FRAMES, 3))
-    for (axis, signal), per in TURNED.items():
-        airframe[:, axis] += per * signals[:, signal]
-    record = listened(given, signals, missed_by_observer(airframe), believed=1.0 + THETA)
-    assert record.found[:N] == pytest.approx(THETA, abs=0.1)
-
-
-def test_noise_never_leads_it_away():
-    """With noise many times what is assumed with, theta stays about its limits and A finite."""
-    given, signals, missed = flown(5)
-    noisy = missed + np.random.default_rng(2).normal(0.0, 0.05, missed.shape)
-    record = listened(given, signals, noisy, forgets=False)
-    assert record.found[:N].min() >= -1.2
-    assert record.found[:N].max() <= 0.2
-    assert np.abs(record.found[N:]).max() < 300.0
-
-
-def test_few_surfaces_need_no_room():
-    assert estimator_dtype(4).itemsize < 300 < estimator_dtype(6).itemsize

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels as ch
 from flying import Memory, flown, loss, scenario
 
@@ -110,19 +109,3 @@ class Gain:
 def test_the_schedule_rises_with_dynamic_pressure_where_noise_limits_it():
     yaw = Gain(45.0).at()[2]
     assert (np.diff(yaw) > 0.0).all()
-
-
-def test_the_schedule_does_not_depend_on_where_the_flight_starts():
-    np.testing.assert_allclose(Gain(40.0).at(), Gain(50.0).at(), rtol=0.05)
-
-
-def test_other_laws_carry_no_schedule():
-    frames = configure_design(scenario(control=OLD), np.array([[-0.5] * 4, [0.5] * 4]))
-    assert not frames[0]["control"]["rejecting"]["config"]["Kp_at"].any()
-
-
-def test_the_same_flight_twice():
-    one, other = (Memory(), Memory())
-    for memory in (one, other):
-        fly(scenario(duration_s=5, control=NEW, **REAL), memory)
-    np.testing.assert_array_equal(one.rows, other.rows)

@@ -1,46 +1,10 @@
 """What a surface cannot have done: directions in which its fault, whatever its course, shows nothing."""
 
-from statistics import NormalDist
-
-import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.studies.matrix.fault_matrix import declared
 from flying import SINES, scenario
-
-AIRCRAFT = load()
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
-PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
-FLOW = np.array([0.05, 0.0, 45.0, 1200.0, 0.1])  # alpha, beta, airspeed, pressure, dpt
-G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
-
-
-@pytest.mark.parametrize(
-    ("changes", "instants", "counts"),
-    [
-        ({}, 1, True), ({"authority": "statistical"}, 1, True), ({}, 0, True), ({}, 2, False),
-        ({"pairs": True}, 1, False), ({"authority": "worst-case"}, 1, False),
-        ({"fault_class": "published"}, 1, False),
-    ],
-)  # fmt: skip
-def test_views_are_there_only_where_something_is_concluded_from_them(changes, instants, counts):
-    """Of two faults one may move what the other does not; within a frame of instants a column turns."""
-    config = FdiConfig.model_validate({"fault_class": "all", "statistical": {}, **changes})
-    assert config.compares_across(instants) == counts
-
-
-@pytest.mark.parametrize("substeps", [1, 2])
-def test_a_flight_has_them_or_not(substeps):
-    loop = Loop(scenario(duration_s=1, substeps=substeps, **declared("light")))
-    detector = loop.frames["fdi"]["statistical"][0]
-    assert detector["n_views"] == (13 if substeps == 1 else 0)
-    # one share of the false alarms each, of a tone as of a step: exp(-l^2 / 2) beyond a level l of two parts
-    share = NormalDist().cdf(-detector["test"]["alarm_level"]) if substeps == 1 else 1.0
-    assert np.exp(-(detector["tone_test_config"]["alarm_level"] ** 2) / 2.0) == pytest.approx(share, rel=1e-6)
-    loop.release()
 
 
 def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():

@@ -11,17 +11,6 @@ from hypothesis import strategies as st
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, compare_attitude, configure_attitude
 from beaver_ftc.diagnosis.detection.likelihood import N_FILTER_BLOCKS, BlockCapacity, block_dtype
-from beaver_ftc.diagnosis.monitors.redundancy import (
-    ALPHA_TEST,
-    BETA_TEST,
-    SENSOR_MONITOR_RECORD,
-    SPEED_TEST,
-    THETA,
-    TURN_TEST,
-)
-from beaver_ftc.diagnosis.monitors.sensor_monitor import clear_gyros
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant.instruments import N_SENSORS
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 
@@ -100,17 +89,6 @@ def test_a_loss_is_named_in_turbulence_with_sensors_in_doubt(surface):
     assert bf.fly(scenario(LOSS | {"actuator": surface})).metrics["isolation"]["fault"] == surface
 
 
-def test_without_the_comparison_it_is_not_named():
-    loop = Loop(scenario(LOSS | {"actuator": "rudder"}))
-    loop.frames["fdi"]["statistical"]["attitude"]["enabled"] = 0
-    for _ in loop.chunks():
-        pass
-    landed = loop.land()
-    loop.release()
-    assert landed.detection_time_s is not None
-    assert landed.isolated is None
-
-
 BROKEN = [(gyro, size) for gyro in "pqr" for size in (0.5, 2.0)] + [("alpha", 2.0), ("beta", 2.0)]
 
 
@@ -122,23 +100,3 @@ def test_a_broken_sensor_is_named_and_is_no_surface(sensor, magnitude):
     assert not {"elevator", "rudder", "aileron", "flap"} & {*isolation["names"]}
     assert isolation["fault"] == f"sensor {sensor}"
     assert isolation["delay_s"] < 5.0
-
-
-@pytest.mark.parametrize(
-    ("alarm", "pitch", "turn", "cleared"),
-    [
-        (ALPHA_TEST, 0.1, 0.001, [0, 1, 2]), (BETA_TEST, 0.1, 0.001, [0, 1, 2]),
-        (ALPHA_TEST, 0.1, 0.03, [0, 2]),  # the pitch gyro says that it turns
-        (ALPHA_TEST, 1.4, 0.001, []),  # near the vertical the attitude shows no turn
-        (SPEED_TEST, 0.1, 0.001, []),  # m/s, no angle
-    ],
-)  # fmt: skip
-def test_a_gyro_is_cleared_of_a_test_of_the_flow_if_its_axis_does_not_turn(alarm, pitch, turn, cleared):
-    monitor, y = np.zeros(1, SENSOR_MONITOR_RECORD), np.zeros(N_SENSORS)
-    y[THETA] = pitch
-    monitor["memory"]["turn_max"], monitor["output"]["alarm_test"] = 0.002, alarm
-    tests = monitor["redundancy"]["test"][0]
-    tests["residual"][alarm], tests["B"][alarm], tests["r"] = 0.05, 0.02, 0.05
-    tests["residual"][TURN_TEST + 1] = turn
-    clear_gyros(monitor.view(np.recarray)[0], y)
-    assert np.flatnonzero(monitor["memory"]["cleared"][0]).tolist() == cleared

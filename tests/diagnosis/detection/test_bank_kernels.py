@@ -4,32 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds import poles_for_delays
-from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.schema import Scenario
-from telling import apart
-
-
-def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
-    rng, frames, fdi = np.random.default_rng(1), 20, new_fdi()
-    x = rng.normal(size=(frames + 1, 3))
-    believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
-    noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
-    for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta[k], noise[k]
-        fdi["bound"]["n_gyro"] = noise[k + 1]
-        on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
-    innovation = np.diff(x, axis=0) / DT - believed
-    assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
-    assert fdi["bound"]["nu_max"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
-    for m, decay in enumerate(np.exp(-POLES * DT)):
-        w = weights(decay, frames)
-        assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        expected = DT * w @ eta + (1.0 - decay) * w @ noise[:-1]
-        assert fdi["bank"]["memory"]["e"][m] == pytest.approx(expected)
-        whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
-        assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
+from beaver_ftc.diagnosis.detection import filters
 
 
 def with_shares(*shares):
@@ -50,34 +25,6 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
     assert on(filters.bank_axis, with_shares(*LEAVES)) == 1
     assert [filters.nearest_filter(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
     assert on(filters.bank_share, with_shares(*LEAVES)) == pytest.approx(1.5)
-
-
-def test_the_closest_approach_of_every_filter_is_kept():
-    fdi = with_shares(*LEAVES)
-    alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["output"]["peak"][:3], alarm["ratio"] = (
-        (0.6, 0.0, 0.0),
-        0.4,
-    )
-    filters.keep_bank_peak(fdi["bank"])
-    statistical.keep_score_peak(alarm)
-    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert alarm["peak"] == 0.4
-    silent = new_fdi()
-    filters.keep_bank_peak(silent["bank"])
-    assert not silent["bank"]["output"]["peak"].any()
-    assert on(filters.bank_share, silent) == 0.0
-
-
-def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
-    fdi = new_fdi()
-    fdi["isolation"]["config"]["n_estimators"] = 2
-    fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
-    G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    on(filters.set_directions, fdi, G)
-    assert fdi["isolation"]["estimator"]["parity_direction"][0] == pytest.approx([-0.8, 0.0, -0.6])
-    assert fdi["isolation"]["estimator"]["parity_direction"][0] @ G[:, 2] == pytest.approx(0.0)
-    assert not fdi["isolation"]["estimator"]["parity_direction"][1].any()
 
 
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
@@ -136,68 +83,3 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     assert explained(-1e-9)
     assert not explained(1e-9)
     assert explained(1e-9, ignored_axes=True)
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_across_its_direction_a_shared_parameter_confines_it_too(side):
-    fdi, fie = reach_of(0.0, 0.0, 0.0)
-    fie["reach_lo"][:, :3], fie["reach_hi"][:, :3] = -9.0, 9.0
-    fie["reach_lo"][:, 3], fie["reach_hi"][:, 3] = -0.2, 0.3
-    fdi["bank"]["output"]["threshold"][:3] = 0.1
-    limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
-    for beyond, within in ((-1e-9, True), (1e-9, False)):
-        fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie[
-            "parity_direction"
-        ]  # a unit vector
-        assert bool(on(filters.is_reachable, fdi, fie, True)) == within
-        assert on(filters.is_reachable, fdi, fie, False)
-
-
-def test_a_filter_without_a_bound_has_no_share_of_it():
-    """Nothing is declared: it may alarm, but is nearer to its bound than no other."""
-    fdi = with_shares(*LEAVES)
-    fdi["bank"]["output"]["threshold"][0] = 0.0
-    with np.errstate(divide="ignore"):
-        assert on(filters.bank_share, fdi) == pytest.approx(1.5)
-        assert [filters.nearest_filter(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.keep_bank_peak(fdi["bank"])
-    assert fdi["bank"]["output"]["peak"][:3] == pytest.approx([0.0, 1.5, 1.2])
-    assert on(filters.bank_axis, fdi) == 0
-
-
-def test_of_filters_that_are_equally_near_the_published_one_is_named():
-    assert filters.nearest_filter(new_fdi()["bank"], 0) == 0
-    assert filters.nearest_filter(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
-    assert filters.nearest_filter(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
-
-
-@pytest.mark.parametrize("size", [9.0, 0.3])
-def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
-    fdi, G = new_fdi(), np.zeros((3, 4))
-    fie = estimator(fdi)
-    G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    on(filters.set_directions, fdi, G)
-    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8])
-    on(filters.set_directions, fdi, np.zeros((3, 4)))
-    assert fie["parity_direction"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"
-
-
-@pytest.mark.parametrize("noisy", [False, True])
-@pytest.mark.parametrize("several", [False, True])
-def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several):
-    """The first by itself where no bank is wanted, whatever the gyros do; of noise one a delay."""
-    noise = {"sensors": {"p": {"noise_std_deg_s": 0.04}, "q": {"noise_std_deg_s": 0.09}}} if noisy else {}
-    asked = {"detection_pole_per_s": 2.5, "pole_bank_per_s": [11.0, 0.7], "bounds": noise}
-    asked |= {"sharpen": {"pole_bank": several}}
-    scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
-    config = scenario.fdi
-    fdi["bank"]["config"]["a"] = 0.0
-    filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
-    bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = poles_for_delays(SensorErrors(config.bounds.sensors), bound)
-    assert bool(for_noise) is noisy
-    poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
-    apart(poles=poles)
-    assert fdi["bank"]["config"]["n_filters"] == len(poles)
-    assert fdi["bank"]["config"]["a"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
-    assert not fdi["bank"]["config"]["a"][len(poles) :].any()

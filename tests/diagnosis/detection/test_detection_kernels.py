@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from kernels import DT, fill, new_fdi, on
 
-from beaver_ftc.diagnosis import conclusion, model_prediction
 from beaver_ftc.diagnosis.detection import filters as detection_filters
 from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
@@ -13,8 +12,6 @@ from beaver_ftc.diagnosis.detection.filters import (
     N_BASIS,
 )
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
@@ -39,13 +36,6 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
     assert detection_filters.beyond_bound(residual, 0.3) == pytest.approx(left)
-
-
-def test_the_output_is_the_weights_on_the_basis():
-    rng = np.random.default_rng(1)
-    record = new_network(weights=rng.normal(size=(3, N_BASIS)))
-    detection_filters.evaluate_network(record, 0.1, -0.05)
-    assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["Phi"])
 
 
 @pytest.mark.parametrize("leaking", [False, True])
@@ -97,140 +87,8 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     assert on(detection_filters.alarm_axis, fdi, authority) == (-1 if axis is None else axis)
 
 
-def test_the_first_alarm_stays():
-    fdi = new_fdi()
-    on(conclusion.latch_alarm, fdi, 2, 7.0)
-    on(conclusion.latch_alarm, fdi, 0, 8.0)
-    found = fdi["verdict"]
-    assert (found["detected"], found["axis"], found["detected_at_s"]) == (1, 2, 7.0)
-
-
-@pytest.mark.parametrize("detected", [0, 1])
-def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
-    rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
-    decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
-    record = fdi["fdae"]
-    record["config"]["a"], fdi["verdict"]["detected"] = decay, detected
-    record["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
-    (
-        record["network"]["config"]["gain"],
-        record["network"]["memory"]["Phi"],
-        record["network"]["config"]["w_max"],
-    ) = 1.0, 1.0, 100.0
-    x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
-    eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
-    for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["n_old"] = eta[k], noise[k]
-        fdi["bound"]["n_gyro"], record["output"]["residual"] = noise[k + 1], 99.0
-        on(detection_filters.advance_fdae, fdi, x[k], believed[k], False)
-    w = decay ** np.arange(frames)[::-1, None]
-    shares = w * ((1.0 - decay) * x + DT * (believed + output))
-    assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
-    sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert record["memory"]["e"] == pytest.approx(sums[0] + sums[1])
-    assert record["memory"]["m"] == pytest.approx(sums[1])
-    assert record["output"]["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
-    assert record["network"]["memory"]["weights"].any() == detected
-
-
-def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
-    fdi, out = new_fdi(), np.zeros(3)
-    record = fdi["fdae"]
-    record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
-    record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["m"], fdi["bound"]["n_gyro"] = 0.1, 0.2
-    on(detection_filters.fdae_unmodelled, fdi, out)
-    assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
-
-
-def new_prediction(share):
-    record = np.zeros(1, model_prediction.prediction_dtype(4)).view(np.recarray)[0]
-    record["w"] = share
-    return record
-
-
 def instants(count, seed=5):
     """(f, G, u, eta_bar, per_rad) of so many instants."""
     rng = np.random.default_rng(seed)
     sizes = (3,), (3, 4), (4,), (3,), (3, 4)
     return [tuple(rng.normal(size=size) for size in sizes) for _ in range(count)]
-
-
-@pytest.mark.parametrize("count", [1, 4])
-@pytest.mark.parametrize("has_eG", [0, 1])
-def test_means_over_a_frame_are_of_its_instants(count, has_eG):
-    fdi, record = new_fdi(), new_prediction(1.0 / count)
-    fdi["bound"]["has_eG"], fdi["config"]["diagnoses_all_types"] = (
-        has_eG,
-        1,
-    )
-    fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
-    record["sums"]["F"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
-    record["sums"]["eta_bar"] = 99.0
-    (
-        record["sums"]["eGu"],
-        record["sums"]["eG"],
-    ) = (99.0, 99.0) if has_eG else (0.0, 0.0)
-    fdi["bound"]["n_gyro"] = 0.1, 0.2, 0.3
-    measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
-    measured["x"] = 1.0, 2.0, 3.0
-    seen = instants(count)
-    for k, (f, G, u, eta_bar, per_rad) in enumerate(seen):
-        record["f"], record["G"], record["u"] = f, G, u
-        fdi["bound"]["eta_now"], fdi["bound"]["declared_errors"]["eG"] = (
-            eta_bar,
-            np.abs(per_rad),
-        )
-        if k == 0:
-            model_prediction.begin_sums(
-                record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"], measured
-            )
-        else:
-            model_prediction.add_to_sums(
-                record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"]
-            )
-    model_prediction.fill_means(record, fdi["bound"])
-    Gu = np.array([G * u for _, G, u, _, _ in seen])
-    mean = record["means"]
-    assert record["x_before"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["bound"]["n_old"] == pytest.approx([0.1, 0.2, 0.3])
-    assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
-    assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
-    assert mean["F"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))
-    assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
-    own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
-    at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["eG"] == pytest.approx(own if has_eG else 0.0)
-    assert fdi["bound"]["eGu"] == pytest.approx(at_command if has_eG else 0.0)
-    spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
-    assert mean["e_Gu"] == pytest.approx(spread)
-    own_axis = np.array([G[(0, 1, 2, 1), range(4)] for _, G, *_ in seen])
-    assert mean["G_min"] == pytest.approx(own_axis.min(axis=0))
-    assert mean["G_max"] == pytest.approx(own_axis.max(axis=0))
-    deflections = np.array([u for _, _, u, *_ in seen])
-    assert mean["u_min"] == pytest.approx(deflections.min(axis=0))
-    assert mean["u_max"] == pytest.approx(deflections.max(axis=0))
-
-
-def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
-    record = new_prediction(1.0)
-    record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
-    record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
-    model_prediction.move_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
-    assert record["u_old"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
-    assert record["u"] == pytest.approx(record["commanded"])
-    assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
-
-
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps):
-    """Of numbers asked for that all differ: pole, gain, leak and limit, at 40 Hz."""
-    control = {"network_gain_per_s2": 91.0, "network_leak_per_s": 0.7, "network_weight_limit_rad_s2": 3.3}
-    asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
-    record = new_fdi()["fdae"]
-    detection_filters.configure_fdae(record, Declared.of(Scenario.model_validate({"name": "x", **asked})))
-    assert np.unique(record["config"]["pole_per_s"]).tolist() == [2.2]
-    assert np.unique(record["config"]["a"]) == pytest.approx([np.exp(-2.2 / 40.0)])
-    network = record["network"]
-    names = "gain", "leak", "w_max"
-    assert [float(network["config"][name]) for name in names] == [91.0, 0.7, 3.3]

@@ -1,13 +1,8 @@
 """What the accelerometers tell in flight: whose fault it is, and that it is no vane's."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.diagnosis.detection import forces
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.studies.matrix.fault_matrix import declared
 from flying import SINES, scenario
@@ -65,30 +60,3 @@ def test_a_vane_that_fails_is_no_surface(sensor, course):
     flight = fly(flown({"sensor": sensor, **course}))
     assert flight.isolated not in FAULTS
     assert flight.isolated != "aileron"
-
-
-def test_how_fast_a_flow_angle_may_drift_is_by_gyros_attitude_and_accelerometers():
-    """Of the incidence with slopes of the path and of the normal accelerometer; of sideslip in full."""
-    steady = {
-        "phi": 0.011,
-        "theta": 0.013,
-        "p": 0.001,
-        "q": 0.002,
-        "r": 0.004,
-        "ax": 0.3,
-        "ay": 0.5,
-        "az": 0.7,
-    }
-    slopes = {"p": 0.01, "q": 0.02, "r": 0.04, "ay": 0.08, "az": 0.16}
-    errors = {
-        name: SimpleNamespace(steady=value, slope=slopes.get(name, 9.0)) for name, value in steady.items()
-    }
-    gyros = 0.007 + 0.2 * 0.07
-    side = 9.7 * 0.024 + 0.5 + 0.3 * 0.3 + EARTH_M_S2
-    normal = 0.3 * 9.7 * 0.024 + 0.7 + 0.3 * 0.3 + 9.7 * 0.16 + EARTH_M_S2
-    for component, acceleration in (
-        (forces.SIDE_INDEX, side),
-        (forces.NORMAL_INDEX, normal),
-    ):
-        found = forces._drift_bound(errors, 9.7, 45.0, component)
-        assert found == pytest.approx(EARTH_RATE_RAD_S + gyros + acceleration / 45.0)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from kernels import holder, new_fdi
+from kernels import new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
+from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
-from beaver_ftc.design.model import fill_table, slipstream_slopes
-from beaver_ftc.diagnosis.detection import forces, parity, statistical
+from beaver_ftc.design.model import fill_table
+from beaver_ftc.diagnosis.detection import forces
 from beaver_ftc.diagnosis.detection.forces import (
     NORMAL_INDEX,
     SIDE_INDEX,
@@ -17,16 +17,14 @@ from beaver_ftc.diagnosis.detection.forces import (
     update_both_forces,
 )
 from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
     VANE_VIEW,
     configure_parity_views,
     configure_tones,
 )
-from beaver_ftc.diagnosis.state import NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.diagnosis.state import NORMAL_FORCE, SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
-from telling import apart
 
 AIRCRAFT = load()
 ELEVATOR, FLAP = 1, 3
@@ -34,8 +32,6 @@ X, U = np.array([0.05, -0.03, 0.04]), np.array([0.06, -0.08, 0.05, 0.1])
 Y = np.array([0.11, 0.07, 46.0, 1150.0, 2.1])
 ALONG_Y = np.arange(15.0).reshape(3, 5)
 DT, GRAVITY = 0.01, 9.80665
-TILTED = np.radians(1.0) * GRAVITY / Y[2]
-ROLL_VIEW = 1
 ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, UP_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW, SIDE_VIEW = range(5, 13)
 
 
@@ -159,17 +155,6 @@ def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
     assert abs(inertial - inertial_too) < 0.05 * abs(plain - other)
 
 
-def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
-    fdi = felt()
-    record = fdi["statistical"]["forces"]
-    for _ in range(11):
-        update_both_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
-    for f, place in ((SIDE_INDEX, 1), (NORMAL_INDEX, 0)):
-        force = record["component"][f]
-        assert force["angle"] == pytest.approx(Y[place] + 10 * DT * record["angle_rate"][f])
-        assert force["e_drift"] == pytest.approx(11 * DT * force["vane"][1])
-
-
 def test_noise_of_the_readings_is_jitter_of_the_forces():
     """Against the spread of e over readings that are drawn."""
     sensors = {
@@ -190,200 +175,6 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     without = record["component"]["var"][:, 0] - record["component"]["var"][:, 1]
     slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
-
-
-def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
-    """Its slope by a difference, times the declared noise."""
-    fdi = felt(Bounds(sensors={"qdyn": {"noise_std_pa": 4.0}}))
-    record, innovation = fdi["statistical"]["forces"], []
-    for more in (0.5, -0.5, 0.0):
-        update_both_forces(
-            record, fdi["statistical"]["gust"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT
-        )
-        innovation.append(record["component"]["innovation"].copy())
-    slopes = innovation[0] - innovation[1]
-    assert record["component"]["var"] == pytest.approx(np.outer((4.0 * slopes) ** 2, [1, 1]), rel=1e-6)
-
-
-def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
-    """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
-    sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)
-    for q_ratio in (1.0, 2.0):
-        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, q_ratio, 1.0)
-        record, drawn = fdi["statistical"]["forces"], []
-        for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
-            update_both_forces(
-                record, fdi["statistical"]["gust"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT
-            )
-            drawn.append(record["component"]["innovation"].copy())
-        for inertial in range(2):
-            jitter = record["component"]["var"][:, inertial]
-            assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
-    more = record["component"]["Q_e"] - felt()["statistical"]["forces"]["component"]["Q_e"]
-    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_INDEX, NORMAL_INDEX)]
-    assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
-
-
-def test_bias_and_slope_of_accelerometers_are_tolerated():
-    """As one more constant, 1 / c of the bias, and as a share of the whole."""
-    sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
-    record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
-    update_both_forces(record, felt()["statistical"]["gust"], measured(), U, DT)
-    for f, bias, scale in ((SIDE_INDEX, 0.2, 0.0), (NORMAL_INDEX, 0.3, 0.01)):
-        force, before = record["component"][f], none["component"][f]
-        n = int(force["n_Z"])
-        assert n == before["n_Z"] + 1
-        assert force["tol"][n - 2] == pytest.approx(bias)
-        assert force["regressor"][n - 2] == pytest.approx(1.0 / AIRCRAFT.geometry.chord_m)
-        assert force["tol"][n - 1] == pytest.approx(forces.MASS_TOLERANCE + scale)
-        assert force["tol"][: n - 2] == pytest.approx(before["tol"][: n - 2])
-    whole = per_coefficient() * coefficient("CZ")
-    assert record["component"][NORMAL_INDEX]["regressor"][
-        int(record["component"][NORMAL_INDEX]["n_Z"]) - 1
-    ] == pytest.approx(whole)
-
-
-def test_without_accelerometers_no_force_is_weighed(viewed):
-    statistical, G = viewed["statistical"], np.ones((3, 4))
-    statistical["vaneless"]["output"]["gusty"] = 1
-    views = statistical["views"]
-    views["peak"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
-    forces.drop_forces(*(statistical[name] for name in ("forces", "gust", "vaneless")))
-    assert not statistical["gust"]["output"]["uses_accelerometers"]
-    assert not statistical["vaneless"]["output"]["gusty"]
-    for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
-        assert Across.shown(statistical, views[v]) == 0.0
-    assert Across.shown(statistical, views[0]) == 50.0
-    for block in statistical["block"]:
-        block["R_y"] = 1e-8
-    Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
-    assert not views["peak"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
-
-
-def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
-    """Their forces still count, and ask for the vane to be cleared, once the rates alone have alarmed."""
-    statistical = viewed["statistical"]
-    air, views = statistical["gust"], statistical["views"]
-    air["output"]["gusty"] = 1
-    configure_parity_views(statistical, AIRCRAFT)
-    views["direction"][ELEVATOR_VIEW], views["peak"][ELEVATOR_VIEW] = (
-        (0.0, 0.3, 0.0, 0.0, -0.95),
-        9.0,
-    )
-    air["output"]["acc_mean"] = 0.1, 0.2, 0.3
-    views["block"]["hypothesis"]["score"][0, 0] = 7.0
-    for read in (1, 0):
-        air["output"]["uses_accelerometers"] = read
-        views["peak"][UP_VIEW] = 50.0
-        assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
-        views["peak"][UP_VIEW] = 0.0
-        assert Across.subtracts_gust(statistical, views[0]) == bool(read)
-        assert Across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
-        assert Across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
-        assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
-    views["peak"][UP_VIEW] = 50.0
-    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
-
-
-def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
-    statistical, rng = viewed["statistical"], np.random.default_rng(6)
-    air, view, component = (
-        statistical["gust"],
-        statistical["views"][RUDDER_VIEW],
-        statistical["forces"]["component"],
-    )
-    (
-        air["output"]["gusty"],
-        air["output"]["rate_damping"],
-        air["output"]["C"],
-        air["output"]["uses_accelerometers"],
-    ) = (
-        1,
-        rng.normal(size=(3, 3)),
-        np.eye(3),
-        0,
-    )
-    air["memory"]["Q"], air["memory"]["share"] = (
-        (1e-5, 2e-5, 3e-5),
-        0.0,
-    )
-    Across.turn(viewed, view, rng.normal(size=(3, 4)))
-    Across.blur(view, statistical, 45.0)
-    m = view["direction"]
-    by_both = np.abs(m[:3] @ air["output"]["rate_damping"]) + np.abs(m[3:] @ component["L"])
-    still = float(view["block"]["Q_d"][0, 0])
-    air["memory"]["Q"] = 0.0
-    Across.blur(view, statistical, 45.0)
-    gusts = still - float(view["block"]["Q_d"][0, 0])
-    assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
-
-
-def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
-    statistical = viewed["statistical"]
-    statistical["forces"]["gust_noise"] = 0.1, 0.2, 0.3
-    for v, gust_noise in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
-        view = statistical["views"][v]
-        view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
-        Across.blur(view, statistical, 45.0)
-        own = 0.8 * np.sqrt(statistical["forces"]["component"][NORMAL_INDEX]["var"][0])
-        assert view["block"]["Q_x"][0] == pytest.approx((own + 0.6 * 0.2 * gust_noise) ** 2)
-
-
-def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
-    record = felt()["statistical"]["forces"]
-    for f, name, place, axis in (
-        (SIDE_INDEX, "CY", 1, 2),
-        (NORMAL_INDEX, "CZ", 0, 1),
-    ):
-        off = Y + 1e-5 * np.eye(5)[place]
-        slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
-        assert record["component"][f]["vane"] == pytest.approx([-ALONG_Y[axis, place], -slope], rel=1e-4)
-
-
-def test_constant_errors_are_tolerated_term_by_term():
-    given = Bounds(coefficients=0.05, sensors={"alpha": {"bias_deg": 0.5}, "qdyn": {"bias_pa": 23.0}})
-    force = felt(given)["statistical"]["forces"]["component"][NORMAL_INDEX]
-    terms = forces.terms_of_force(AIRCRAFT, NORMAL_INDEX)
-    shares = force["tol"][: len(terms)] / np.abs([t.value for t in terms])
-    assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
-    slope = abs(force["vane"][1]) / per_coefficient()
-    of_constant = 0.07 * abs(terms[0].value) + np.radians(0.5) * slope
-    assert terms[0].is_constant
-    assert force["tol"][0] == pytest.approx(of_constant)
-    assert force["tol"][len(terms)] == forces.MASS_TOLERANCE
-    assert force["n_Z"] == len(terms) + 1
-
-
-@pytest.mark.parametrize(("air", "tolerance"), [("none", 0.05), ("moderate", 0.2)])
-def test_the_rate_of_sideslip_is_known_within_a_twentieth_and_in_moving_air_a_fifth(air, tolerance):
-    """Of its term, beside the tolerance of the coefficients."""
-    given = Bounds(coefficients=0.07, turbulence=air)
-    force = felt(given)["statistical"]["forces"]["component"][SIDE_INDEX]
-    of_rate = len(forces.terms_of_force(AIRCRAFT, SIDE_INDEX))
-    assert force["tol"][of_rate] == pytest.approx(0.07 + tolerance)
-
-
-@pytest.mark.parametrize(
-    ("bounds", "side", "up"),
-    [
-        ({}, 0.0, 0.0),
-        ({"r": {"bias_deg_s": 0.1}}, np.radians(0.1), np.radians(0.1)),
-        ({"phi": {"bias_deg": 1.0}}, TILTED, 0.3 * TILTED),
-        ({"ay": {"bias_mps2": 0.46}}, 0.01, 0.0),
-        ({"az": {"bias_mps2": -0.46}}, 0.0, 0.01),
-        ({"ax": {"bias_mps2": 0.46}}, 0.003, 0.003),
-        ({"az": {"scale_error": 0.02}}, 0.0, 0.02 * GRAVITY / 46.0),
-    ],
-)  # fmt: skip
-def test_the_angle_followed_drifts_by_gyros_and_by_gravity_s_share(bounds, side, up):
-    """Within a second by three tenths more or less: as the standard deviation of a walk."""
-    off, sound = (felt(b)["statistical"]["forces"]["component"] for b in (Bounds(sensors=bounds), Bounds()))
-    drift, still = off["drift"], sound["drift"]
-    assert still == pytest.approx(7.292115e-5 + 0.03 / 46.0)  # the earth turns at this rate [WGS84]
-    assert drift - still == pytest.approx([side, up], abs=1e-12)
-    gained = off["Q_e"] - sound["Q_e"]
-    angle_walk = gained / sound["vane"][:, 1] ** 2
-    assert angle_walk == pytest.approx(0.09 * (drift**2 - still**2), rel=1e-6, abs=1e-15)
 
 
 def test_in_turbulence_gusts_turn_the_flow():
@@ -420,45 +211,6 @@ def viewed():
     return fdi
 
 
-def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
-    statistical, view = viewed["statistical"], viewed["statistical"]["views"][ELEVATOR_VIEW]
-    view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
-    Across.blur(view, statistical, 45.0)
-    before = float(view["eta"][0])
-    statistical["forces"]["component"]["e_lag"][NORMAL_INDEX] = 0.5
-    Across.blur(view, statistical, 45.0)
-    assert view["eta"][0] == pytest.approx(before + 0.8 * 0.5)
-
-
-def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
-    statistical = viewed["statistical"]
-    component = statistical["forces"]["component"]
-    then, seen = component["f_hat"].copy(), measured()
-    seen["y"][1] += 0.01
-    update_both_forces(statistical["forces"], statistical["gust"], seen, U, DT)
-    changed = np.abs(component["f_hat"] - then)
-    assert changed[SIDE_INDEX] > 0.01
-    assert component["e_lag"] == pytest.approx(forces.MAX_FORCE_LAG_S * changed / DT)
-
-
-def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
-    seen = [
-        (
-            int(v["nulled"]),
-            *v["plane_pair"],
-            v["by_inertia"],
-            v["vane_free"],
-        )
-        for v in viewed["statistical"]["views"][5:13]
-    ]
-    assert seen == [
-        (1, PITCH, NORMAL_FORCE, 0, 0), (3, PITCH, NORMAL_FORCE, 0, 0),
-        (VANE_VIEW, PITCH, NORMAL_FORCE, 0, 1),
-        (AXIS_VIEW, PITCH, NORMAL_FORCE, 1, 1), (0, ROLL, SIDE_FORCE, 0, 0), (2, YAW, SIDE_FORCE, 0, 0),
-        (VANE_VIEW, YAW, SIDE_FORCE, 0, 1), (AXIS_VIEW, YAW, SIDE_FORCE, 1, 1),
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize("v", [ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW])
 def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, v):
     view, G = viewed["statistical"]["views"][v], np.random.default_rng(7).normal(0.0, 3.0, (3, 4))
@@ -478,252 +230,6 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
         )
 
 
-def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
-    """Of roll, yaw and side force: neither the vane's error nor a rolling gust moves what is looked at, and
-    what errors of the vane's column let show is the most that its corners do."""
-    statistical, rng = viewed["statistical"], np.random.default_rng(3)
-    statistical["gust"]["output"]["gusty"] = 1
-    configure_parity_views(statistical, AIRCRAFT)
-    view, moving = statistical["views"][BETA_VIEW], statistical["gust"]
-    moving = moving["output"]
-    moving["rate_damping"], moving["C"] = (
-        rng.normal(size=(3, 3)),
-        np.linalg.qr(rng.normal(size=(3, 3)))[0],
-    )
-    force = statistical["forces"]["component"][SIDE_INDEX]
-    column = np.array([force["vane_roll"], *force["vane"]])
-    share = Across.turn(viewed, view, np.zeros((3, 4)))
-    mix = view["direction"][[ROLL, YAW, SIDE_FORCE]]
-    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
-    assert mix @ column == pytest.approx(0.0, abs=1e-12)
-    gust = (moving["rate_damping"] @ moving["C"])[:, 0]
-    assert view["direction"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
-    assert view["direction"][PITCH] == view["direction"][NORMAL_FORCE] == 0.0
-    assert view["col"][[ROLL, YAW, SIDE_FORCE]] == pytest.approx(column / np.linalg.norm(column))
-    corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
-    assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
-    n = int(view["block"]["n_Z"])
-    Across.regress(viewed, view, np.zeros(3), share)
-    view["confirmer"] = 0
-    Across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
-    seen = np.array([0.4, -0.3, force["innovation"]])
-    assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
-        share * seen @ column / np.linalg.norm(column)
-    )
-
-
-def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
-    statistical = viewed["statistical"]
-    statistical["gust"]["output"]["gusty"] = 1
-    configure_parity_views(statistical, AIRCRAFT)
-    view = statistical["views"][BETA_VIEW]
-    view["direction"] = 0.6, 0.0, 0.8, 0.0, 0.0
-    statistical["gust"]["output"]["rate_damping"] = 0.0
-    assert Across.turn(viewed, view, np.zeros((3, 4))) == 0.0
-    assert view["direction"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
-
-
-def test_in_still_air_there_is_no_gust_to_look_past(viewed):
-    assert not viewed["statistical"]["views"]["across_gust"].any()
-
-
-def test_a_force_counts_once_the_vane_is_cleared(viewed):
-    """At the alarm level, of what clears the vane at the naming level; rates need no clearing."""
-    statistical = viewed["statistical"]
-    views = statistical["views"]
-    views["peak"][ELEVATOR_VIEW], views["direction"][ELEVATOR_VIEW] = (
-        9.0,
-        (0.0, 0.3, 0.0, 0.0, -0.95),
-    )
-    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
-    for clearing in (ALPHA_VIEW, UP_VIEW):
-        views["peak"][[ALPHA_VIEW, UP_VIEW]] = 0.0
-        views["peak"][clearing] = 5.0
-        assert Across.shown(statistical, views[ELEVATOR_VIEW]) == pytest.approx(6.0)
-    views["peak"][UP_VIEW] = 50.0
-    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
-    (
-        views["peak"][[ALPHA_VIEW, UP_VIEW]],
-        views["peak"][[BETA_VIEW, SIDE_VIEW]],
-    ) = 0.0, 50.0
-    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0, "another vane"
-    views["block"]["hypothesis"]["score"][0, 0] = 7.0
-    assert Across.shown(statistical, views[0]) == 7.0
-
-
-def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
-    views = viewed["statistical"]["views"]
-    viewed["statistical"]["test"]["margin"] = 18.0
-    for v, mix, alarms in (
-        (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), True), (FLAP_VIEW, (0.0, 0.95, 0.0, 0.0, 0.3), False),
-        (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
-        (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
-    ):  # fmt: skip
-        views["direction"][v], views["peak"][:] = mix, 9.0
-        assert (Across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
-
-
-@pytest.mark.parametrize(("v", "mix", "axis"), [
-    (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), PITCH), (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), ROLL),
-])  # fmt: skip
-def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed, v, mix, axis):
-    """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads, first at 0 s."""
-    chances, row = viewed["statistical"], np.full(5, 7.0)
-    views, tests, alarm = chances["views"][: chances["n_views"]], chances["test"], chances["alarm"]
-    views["direction"] = 0.0
-    views["direction"][v], views["peak"], tests["margin"] = mix, 9.0, 18.0
-    alarm["detected_at_s"], tests["n_scores"] = -1.0, 4
-    for t in (0.0, 2.5):
-        statistical.update_alarm(alarm, tests, chances["block"], views, chances["forces"], chances["gust"], t)
-    assert (alarm["ratio"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 0.0)
-    statistical.write_scores(tests, chances["block"], views, chances["forces"], chances["gust"], row)
-    assert row.tolist() == [7.0, 0.0, *(1.5 if i == axis else 0.0 for i in (ROLL, PITCH, YAW))]
-
-
-def test_what_clears_a_vane_excludes_nobody(viewed):
-    statistical = viewed["statistical"]
-    views = statistical["views"]
-    for v in (ALPHA_VIEW, UP_VIEW):
-        views["peak"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
-    assert not any(Across.excludes(viewed, s) for s in range(4))
-
-
-def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known():
-    """A diagnosis begun in a slip that swings: the first force has the rate of its own run."""
-    fdi = felt()
-    statistical, swinging = fdi["statistical"], measured()
-    statistical["test"]["alarm_level"], statistical["test"]["forget"] = 6.0, 0.99
-    configure_parity_views(statistical, AIRCRAFT)
-    configure_tones(statistical["tone_test_config"], 1e-8, 45.0, 15.0, DT)
-    swinging["force"][1] += 20.0
-    for looks in (1, 2):
-        update_both_forces(statistical["forces"], statistical["gust"], swinging, U, DT)
-        assert statistical["forces"]["n_seen"] == looks
-        Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
-        active = [v for v in statistical["views"] if parity.uses_force(v) and parity.view_score(v) > 0.0]
-        assert bool(active) == (looks == 2)
-
-
-def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
-    statistical, G = viewed["statistical"], np.ones((3, 4))
-    statistical["views"]["peak"][UP_VIEW] = 8.0
-    for block in statistical["block"]:
-        block["R_y"] = 1e-8
-    Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
-    assert statistical["views"]["peak"][UP_VIEW] == pytest.approx(
-        8.0 * (1.0 - 0.01 / parity.PEAK_MEMORY_RATIO)
-    )
-
-
-def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):
-    """Of the rate's block, then of the force, then how far the followed angle has drifted, or the column."""
-    statistical, rng = viewed["statistical"], np.random.default_rng(9)
-    pitch, force = statistical["block"][0], statistical["forces"]["component"][NORMAL_INDEX]
-    pitch["n"], pitch["axes"][0] = 1, PITCH
-    pitch["n_Z"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
-    view, n = statistical["views"][ELEVATOR_VIEW], int(force["n_Z"])
-    view["direction"], view["col"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
-    Across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
-    found = view["block"]["regressor"][: 4 + n, 0]
-    along = 0.1 * (-0.8 * 2.0 - 0.6 * force["innovation"])
-    expected = [*(0.6 * pitch["regressor"][:3, 0]), *(-0.8 * force["regressor"][:n]), along]
-    assert found == pytest.approx(np.array(expected))
-    alone = statistical["views"][UP_VIEW]
-    Across.regress(viewed, alone, np.zeros(3), 0.0)
-    assert alone["block"]["regressor"][3 : 3 + n, 0] == pytest.approx(force["regressor"][:n])
-    assert alone["block"]["regressor"][3 + n, 0] == pytest.approx(force["e_drift"])
-
-
-def test_a_loss_signs_with_the_force_it_takes(viewed):
-    view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
-    view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
-    Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][NORMAL_INDEX]["Gu"][ELEVATOR]
-    assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
-        [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
-    )
-
-
-@pytest.mark.parametrize("v", [ELEVATOR_VIEW, UP_VIEW, RUDDER_VIEW])
-def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
-    statistical, rng = viewed["statistical"], np.random.default_rng(6)
-    (
-        statistical["noise"]["Q"],
-        statistical["noise"]["eta"],
-        statistical["noise"]["q"],
-    ) = (
-        (1e-6, 4e-6, 9e-6),
-        0.02,
-        2.0,
-    )
-    air, view, component = statistical["gust"], statistical["views"][v], statistical["forces"]["component"]
-    air["output"]["gusty"], air["output"]["rate_damping"], air["output"]["C"] = (
-        1,
-        rng.normal(size=(3, 3)),
-        np.eye(3),
-    )
-    air["memory"]["Q"] = 1e-5, 2e-5, 3e-5
-    component["var"], component["eta_u"] = (
-        ((2e-6, 1e-7), (3e-5, 2e-5)),
-        (0.001, 0.002),
-    )
-    component["Q_e"], statistical["forces"]["q_ratio"] = (
-        (1e-4, 2e-4),
-        1.2,
-    )
-    for name in (
-        "gusty",
-        "rate_damping",
-        "C",
-        "Q",
-    ):
-        holder(statistical["vaneless"], name)[name] = holder(air, name)[name]
-    (
-        air["memory"]["share"],
-        statistical["vaneless"]["memory"]["share"],
-    ) = (
-        (1.0, 0.25, 0.09),
-        (1.0, 0.36, 0.16),
-    )
-    seen = statistical["vaneless" if view["vane_free"] else "gust"]["memory"]["share"]
-    Across.turn(viewed, view, rng.normal(size=(3, 4)))
-    Across.blur(view, statistical, 45.0)
-    m, block = view["direction"], view["block"]
-    rate_gust_sensitivity, force_gust_sensitivity = (
-        np.abs(m[:3] @ air["output"]["rate_damping"]),
-        1.2 * np.abs(m[3:] @ component["L"]),
-    )
-    gusts = 45.0 * np.sum(
-        (np.sqrt(seen) * rate_gust_sensitivity + force_gust_sensitivity) ** 2 * air["memory"]["Q"]
-    )
-    sizes = np.sqrt(
-        [
-            *statistical["noise"]["Q"],
-            *component["var"][:, int(view["by_inertia"])],
-        ]
-    )
-    assert block["Q_x"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
-    bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
-    assert view["eta"][0] == pytest.approx(bound)
-    of_forces = m[3:] ** 2 @ component["Q_e"]
-    drift_intensity = 1.2**2 * view["by_inertia"] * of_forces
-    assert block["Q_d"][0, 0] == pytest.approx(gusts + drift_intensity + 2.0 * max(bound, 1e-3) ** 2)
-
-
-@pytest.mark.parametrize("q_ratio", [1.0, 2.5])
-def test_noise_and_slopes_of_forces_go_with_the_pressure(q_ratio):
-    """A dive at more than its trim's pressure: as if trimmed there."""
-    sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
-    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, q_ratio, 1.0)
-    record = fdi["statistical"]["forces"]
-    update_both_forces(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
-    slopes = q_ratio * record["component"]["vane"][:, 1]
-    noise = np.radians([0.02, 0.03])
-    assert record["q_ratio"] == pytest.approx(q_ratio)
-    assert record["component"]["var"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
-    assert record["component"]["e_drift"] == pytest.approx(DT * slopes)
-
-
 def test_without_vanes_the_flow_is_what_the_forces_say():
     """A vane that is off by little: forces give back where the flow is."""
     fdi = felt()
@@ -741,125 +247,3 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     forces.fill_vaneless_y(record, turning, np.append(off, np.zeros(record["y_free"].size - 5)))
     damped = record["component"]["L"] @ turning / record["component"]["vane"][:, 1]
     assert still - record["y_free"][:2] == pytest.approx(damped[::-1])
-
-
-@pytest.mark.parametrize("v", [ELEVATOR_VIEW, ALPHA_VIEW])
-def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
-    """Of surfaces by the vanes; of what clears a vane without them."""
-    statistical = viewed["statistical"]
-    (
-        statistical["gust"]["output"]["acc_mean"],
-        statistical["vaneless"]["output"]["acc_mean"],
-    ) = (
-        (0.1, 0.2, 0.3),
-        (0.4, 0.5, 0.6),
-    )
-    seen = 0.5 if v == ALPHA_VIEW else 0.2
-    view = statistical["views"][v]
-    assert Across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
-    force = statistical["forces"]["component"][NORMAL_INDEX]["innovation"]
-    assert Across.part(viewed, view, np.ones(3), NORMAL_FORCE) == force
-    assert Across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
-
-
-def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
-    for moving in (0, 1):
-        viewed["statistical"]["gust"]["output"]["gusty"] = moving
-        configure_parity_views(viewed["statistical"], AIRCRAFT)
-        confirming_force_component = viewed["statistical"]["views"]["confirmer"][:5].tolist()
-        assert confirming_force_component == [
-            moving * NORMAL_FORCE,
-            0,
-            moving * SIDE_FORCE,
-            moving * SIDE_FORCE,
-            0,
-        ]
-
-
-def without_force(coefficient, surface):
-    """The aircraft without what this surface does to this force."""
-    own = getattr(AIRCRAFT.file.forces, coefficient)
-    rest = tuple(term for term in own if term.surface != surface)
-    assert len(rest) < len(own)
-    changed = AIRCRAFT.file.forces.model_copy(update={coefficient: rest})
-    return Aircraft(AIRCRAFT.file.model_copy(update={"forces": changed}), AIRCRAFT.folder)
-
-
-UP_VIEWS = [
-    (ELEVATOR, (PITCH, NORMAL_FORCE)),
-    (FLAP, (PITCH, NORMAL_FORCE)),
-    (VANE_VIEW, (PITCH, NORMAL_FORCE)),
-    (AXIS_VIEW, (PITCH, NORMAL_FORCE)),
-]
-SIDE_VIEWS = [
-    (0, (ROLL, SIDE_FORCE)),
-    (2, (YAW, SIDE_FORCE)),
-    (VANE_VIEW, (YAW, SIDE_FORCE)),
-    (AXIS_VIEW, (YAW, SIDE_FORCE)),
-]
-
-
-@pytest.mark.parametrize(
-    ("aircraft", "expected", "asked"),
-    [
-        (AIRCRAFT, UP_VIEWS + SIDE_VIEWS, True),
-        (without_force("CZ", "flap"), SIDE_VIEWS, False),
-        (without_force("CY", "aileron"), UP_VIEWS, False),
-    ],
-)
-def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(aircraft, expected, asked):
-    """And no vane is asked in moving air: none looks at both planes."""
-    fdi = felt()
-    statistical = fdi["statistical"]
-    statistical["gust"]["output"]["gusty"] = 1
-    configure_parity_views(statistical, aircraft)
-    views = statistical["views"][: statistical["n_views"]]
-    found = [(int(view["nulled"]), tuple(view["plane_pair"].tolist())) for view in views[5:]]
-    assert found == expected
-    asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
-    assert [bool(view["confirmer"]) for view in views[:5]] == asking
-    assert aircraft.forces_separate_surfaces
-
-
-NOISY = {
-    "alpha": {"noise_std_deg": 0.11}, "beta": {"noise_std_deg": 0.17}, "V": {"noise_std_mps": 0.4},
-    "qdyn": {"noise_std_pa": 9.0}, "p": {"noise_std_deg_s": 0.5}, "q": {"noise_std_deg_s": 0.7},
-    "r": {"noise_std_deg_s": 0.9},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("f", "name", "vane"),
-    [(SIDE_INDEX, "CY", "beta"), (NORMAL_INDEX, "CZ", "alpha")],
-)
-@pytest.mark.parametrize("engine", [0, 1])
-def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
-    """Variance per metre: that of each reading, by differences, the airspeed's through the slipstream too;
-    the slipstream's own, of pressure and power; and all of it without the vane."""
-    sizes = [next(iter(each.values())) for each in NOISY.values()]
-    apart(noise=sizes)
-    told = {
-        "engine": engine,
-        "kw0": 7.0,
-        "kw1": 31.0,
-    }
-    found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f]["var_trim"]
-    sd = dict(zip(NOISY, sizes, strict=True))
-    sd |= {axis: np.radians(sd[axis]) for axis in ("alpha", "beta", "p", "q", "r")}
-
-    def slope(step, x=X, y=Y):
-        ahead, behind = (coefficient(name, **{"x": x + s * step[0], "y": y + s * step[1]}) for s in (1, -1))
-        return per_coefficient() * (ahead - behind) / 2.0
-
-    still, e = np.zeros(3), 1e-5
-    by_airspeed, by_pressure, per_kw = slipstream_slopes(Y, 31.0) if engine else (0.0, 0.0, 0.0)
-    moved = {
-        "alpha": (still, e * np.eye(5)[0]), "beta": (still, e * np.eye(5)[1]),
-        "V": (still, e * (np.eye(5)[2] + by_airspeed * np.eye(5)[4])),
-        **{axis: (e * np.eye(3)[i], np.zeros(5)) for i, axis in enumerate("pqr")},
-    }  # fmt: skip
-    parts = {reading: (slope(step) / e * sd[reading]) ** 2 for reading, step in moved.items()}
-    slipstream = slope((still, e * np.eye(5)[4])) / e
-    others = slipstream**2 * ((by_pressure * sd["qdyn"]) ** 2 + (per_kw * 7.0 / 4.0) ** 2)
-    whole = sum(parts.values()) + others
-    assert found == pytest.approx([whole, whole - parts[vane]], rel=1e-3)

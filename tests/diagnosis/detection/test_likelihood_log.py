@@ -4,7 +4,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.plant.channels import likelihoods
-from beaver_ftc.results.views import views
 from flying import flown, loss
 
 TACTICAL = {"sensors": "tactical-grade", "fdi": {"statistical": {}, "bounds": {"sensors": "tactical-grade"}}}
@@ -19,11 +18,3 @@ def test_the_elevator_leaves_the_alarm_level_and_nothing_else_did_before():
     assert log["elevator_loss_likelihood_share"][-1] > 1.0
     assert np.flatnonzero(shares.max(axis=1) > 1.0)[0] == round(100 * flight.statistical["time_s"])
     assert flight.statistical["closest_approach"] >= shares[before].max()
-
-
-def test_there_is_a_view_of_them_where_there_are_any():
-    _, plain = flown(duration_s=0.1)
-    _, statistical = flown(duration_s=0.1, **TACTICAL)
-    assert "likelihood" not in [view.name for view in views(plain.columns)]
-    (view,) = [view for view in views(statistical.columns) if view.name == "likelihood"]
-    assert set(view.columns) == set(likelihoods(load()))

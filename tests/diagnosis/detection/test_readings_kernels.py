@@ -6,10 +6,7 @@ from innovations import Detector, misread
 from statistics_of import Statistical
 
 from beaver_ftc.design.model import KW_TO_DPT, response
-from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.likelihood import N_INPUT_READINGS
-from beaver_ftc.scenario.declared import SensorErrors
-from beaver_ftc.scenario.diagnosis import Bounds
 
 BIASES = {
     "alpha": {"bias_deg": 0.5},
@@ -78,19 +75,6 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
     for block in alone.blocks:
         axes = block["axes"][: block["n"]]
         assert block["Q_x"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
-
-
-def test_without_errors_of_the_air_data_nothing_is_read():
-    alone = Detector(100.0, bounds={"coefficients": 0.05})
-    assert alone.detector["noise"]["noisy"] == 0
-    assert Detector(100.0).detector["test"]["regress"] == 0
-    gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
-    record = alone.detector
-    declared_errors = alone.fdi["bound"]["declared_errors"]
-    before = record["block"]["n_Z"].copy()
-    statistical.configure_readings(record, SensorErrors(gyros), declared_errors)
-    assert list(record["block"]["n_Z"]) == list(before)
-    assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 
 
 def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():

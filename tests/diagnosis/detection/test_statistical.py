@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from innovations import LEVEL_FLIGHT, Detector, misread, surfaces_at_work
-from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_TERMS
@@ -11,8 +10,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, KW_TO_DPT, design_record, evaluate, regressors, response
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.detection import statistical
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS, PITCH_BLOCK
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.detection.likelihood import PITCH_BLOCK
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import SIGNALS
 from beaver_ftc.studies.engine.statistics import poisson
@@ -27,18 +25,6 @@ SETTINGS = {
     "light turbulence": {**TACTICAL, "turbulence": "light"},
     "severe turbulence, poor gyros": {"sensors": "consumer-grade", "turbulence": "severe"},
 }
-
-
-@pytest.mark.parametrize("turbulence", ["none", "light"])
-@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
-def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
-    alone = Detector(rate_hz, bounds={"turbulence": turbulence})
-    hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_h"]]]
-    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
-    tail = norm.sf(alone.detector["test"]["alarm_level"])
-    assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
-    margin = np.sqrt(2 * alone.detector["test"]["margin"])
-    assert norm.sf(margin) * tests * rate_hz == pytest.approx(1e-4, rel=1e-6)
 
 
 @pytest.mark.parametrize("per_h", [3600.0, 36000.0])
@@ -86,40 +72,6 @@ def test_bounded_uncertainty_takes_about_half_the_level_at_most(sensors, eta_bar
     assert 0.1 < _share(rate_hz, omega, eta_bar, sensors=sensors) < 0.6
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
-@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 500.0])
-def test_and_not_the_whole_where_it_goes_at_the_pace_of_the_commands(sensors, rate_hz):
-    """At 3 rad/s it resembles what a lost surface would do for as long as the windows are."""
-    assert _share(rate_hz, 3.0, 0.02, sensors=sensors) < 0.75
-
-
-def test_uncertainty_that_stays_put_is_no_fault_in_moving_air_either():
-    """There the drift of one view returns, and what is constant leaves a trace: half the level is left for
-    what swings along with a fault, and a constant is worth the root of two as much."""
-    for omega in (0.0, 0.3, 1.5, 4.0):
-        assert _share(100.0, omega, 0.02, 15.0, **TACTICAL, turbulence="light") < 0.72
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
-@pytest.mark.parametrize("coupling", [0.0, 0.25])
-def test_with_no_uncertainty_declared_the_detector_still_has_numbers(sensors, coupling):
-    """Nothing may drift then, and gyros may be exact: no division by nothing."""
-    bounds = {
-        "constant_rad_s2": NO_COUPLING,
-        "inertia_coupling": dict.fromkeys(AXES, coupling),
-        "sensors": sensors,
-    }
-    alone = Detector(100.0, bounds=bounds)
-    frames = 3000
-    Gu, cubic = surfaces_at_work(frames, 100.0, np.random.default_rng(1))
-    faulty = np.zeros((frames, 3))
-    faulty[2000:] = -0.3 * Gu[2000:, :, 1]
-    scores = alone.watch(faulty, Gu, cubic)
-    assert scores[:2000].max() == 0.0
-    assert scores[2000:].max() > 1.0
-    assert np.isfinite(scores).all()
-
-
 def _moment_scale(design):
     """Angular accelerations of Cl, Cm and Cn at the flight condition, (3, 3)."""
     S, b, c, qdyn = design["S"], design["b"], design["c"], LEVEL_FLIGHT[1][3]
@@ -163,20 +115,6 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
         explained = _moment_scale(design) @ np.bincount(axis, parts, 3)
         wrong = np.abs(truth - _rates(design, seen[:3], told, u))
         assert (wrong <= 1.05 * explained + 3e-4).all(), (wrong, explained)
-
-
-def test_tolerances_of_coefficients_and_inertia_add_up():
-    bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
-    aircraft, design = load(), design_record()[0]
-    tolerance = bound_kernels.coefficient_bounds(
-        declared_in(bounds, aircraft), design, MASS, *LEVEL_FLIGHT[1:]
-    )
-    inertia = bound_kernels.coefficient_bounds(
-        declared_in(Bounds.model_validate({"inertia": 0.05}), aircraft), design, MASS, *LEVEL_FLIGHT[1:]
-    )
-    i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)
-    assert (tolerance - inertia)[i] == pytest.approx(0.1 * size)
-    assert inertia[i] >= 0.05 / 1.05 * size
 
 
 def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():

@@ -7,18 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import DT, new_fdi
-from statistics_of import Across
 
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
-    N_TONES,
     TONE_MEMORY_S,
     TONES_RAD_S,
-    VANE_VIEW,
 )
-from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 EVERY = 2  # sums of 0.04 s at DT
@@ -69,37 +63,6 @@ def resonance(samples):
     return np.exp(np.multiply.outer(1j * TONES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
 
 
-def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_test_config, rng):
-    samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_test_config, samples, regressors, uses_regressors=True)
-    found = view["tones"]
-    assert found["N"] == pytest.approx(resonance(2.0 * samples))
-    for j in range(3):
-        assert found["R"][j] == pytest.approx(resonance(2.0 * regressors[:, j]))
-    faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
-    assert found["D"] == pytest.approx(EVERY * faded)
-    assert not found["R"][3:].any()
-
-
-def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_test_config):
-    listen(view, tone_test_config, [50.0])
-    assert (view["tones"]["score"], view["tones"]["D"]) == (0.0, 0.0)
-    listen(view, tone_test_config, [50.0])
-    assert view["tones"]["score"] > 0.0
-    assert (view["tones"]["n_new"], view["tones"]["sum_g"]) == (
-        0,
-        0.0,
-    )
-
-
-def test_what_is_not_heard_lets_the_rest_fade(view, tone_test_config, rng):
-    samples = rng.normal(size=20)
-    listen(view, tone_test_config, samples)
-    then = np.abs(view["tones"]["N"])
-    listen(view, tone_test_config, np.full(10, 1e6), heard=False)
-    assert np.abs(view["tones"]["N"]) == pytest.approx(then * exp(-10 * DT / TONE_MEMORY_S))
-
-
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
 def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
@@ -121,20 +84,6 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
-def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_test_config):
-    bounds = [0.05, 0.02, 0.0, 0.09] * 8
-    for bound in bounds:
-        view["eta"] = bound
-        listen(view, tone_test_config, np.zeros(EVERY))
-    angle = TONES_RAD_S * DT
-    passed = parity.tone_gain(0.3, 0.8, 1.0, np.exp(1j * angle), DT)
-    age_s = EVERY * DT * np.arange(len(bounds))[::-1]
-    faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
-    beat = np.abs(np.exp(np.multiply.outer(2j * TONES_RAD_S, age_s)) @ faded)
-    mean = parity.max_tone_mean(TONES_RAD_S, PACE)
-    assert view["tones"]["eta"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
-
-
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
 def test_what_a_bound_that_changes_lets_be_heard_is_within_the_room(bounds, angle):
     """By trying every phase: sum of bound |cos|, beside its size and what beats at twice the frequency. Its
@@ -146,20 +95,6 @@ def test_what_a_bound_that_changes_lets_be_heard_is_within_the_room(bounds, angl
     beats = [abs(np.exp(1j * n * k) @ bounds) for n in (2, 4, 6, 8)]
     room = 2.0 / pi * (bounds.sum() + 2.0 / 3.0 * beats[0] + max(beats) / 3.0)
     assert most <= room * (1.0 + 1e-9) + 1e-12
-
-
-@pytest.mark.parametrize(
-    ("x", "steep"),
-    [(0.01, True), (0.5, True), (1.2, True), (1.5, True), (1.6, False), (2.0, False), (6.0, False)],
-)
-def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, steep):
-    """A square wave whose edges take as long as its pace needs; beyond, a triangle that never gets to one."""
-    phase = (np.arange(20000) + 0.5) * 2.0 * pi / 20000
-    triangle = np.arcsin(np.cos(phase))  # of slope one
-    wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
-    assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        parity.max_tone_mean(np.array([x]), 1.0)[0], rel=1e-6
-    )
 
 
 @settings(deadline=None)
@@ -176,23 +111,6 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 
-@given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
-def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
-    record = new_fdi()["statistical"]["views"][0]["tones"]
-    record["R"][0, 4], size = complex(*parts), np.hypot(*parts)
-    parity.bound_coefficients(record, np.array([0.3]), 1)
-    assert 0.3 * size * (1.0 - 1e-12) <= record["e_R"][4] <= 0.3 * 1.0825 * size + 1e-300
-    assert record["e_R"][5] == 0.0
-
-
-def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
-    record = view["tones"]
-    record["R"][:] = 9.0 + 9.0j
-    record["R"][:2], record["e_R"] = -3.0, 7.0
-    parity.bound_coefficients(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["e_R"] == pytest.approx(np.full(N_TONES, 0.9))
-
-
 def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_test_config, rng):
     """Of the largest of all frequencies, however far apart their parts are: each alone is within that."""
     noise = rng.normal(size=(4000, 300))
@@ -205,21 +123,6 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
     assert (np.mean(loud / root > 1.0, axis=0) > 0.4).all(), "and not much quieter"
 
 
-def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_test_config):
-    record = view["tones"]
-    record["D"], record["N"][3], record["N"][7] = 100.0, 60.0 + 80.0j, 12.0
-    record["e_R"][3], tone_test_config["v_share"] = 10.0, 0.6
-    parity.score_tones(record, tone_test_config, 6.0)
-    root = sqrt(100.0 * tone_test_config["v_share"][3])
-    assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["eta"][3] = 200.0
-    parity.score_tones(record, tone_test_config, 6.0)
-    assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
-    record["N"][:] = 0.0
-    parity.score_tones(record, tone_test_config, 6.0)
-    assert record["score"] == 0.0
-
-
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
 def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequency_rad_s):
     view["eta"] = 0.0
@@ -229,82 +132,3 @@ def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequen
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation
     assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
-
-
-def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_test_config):
-    def flow(**changed):
-        y = np.zeros(5)
-        y[AIRSPEED] = V
-        for place, value in changed.items():
-            y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
-        return parity.within_limits(tone_test_config, y)
-
-    assert flow()
-    assert flow(V=23.0)
-    assert flow(V=89.0)
-    assert flow(alpha=-0.49)
-    assert flow(beta=0.49)
-    for wild in (
-        {"V": 22.0},
-        {"V": 91.0},
-        {"alpha": 0.51},
-        {"alpha": -0.51},
-        {"beta": 0.51},
-        {"beta": -0.51},
-    ):
-        assert not flow(**wild)
-
-
-def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
-    view["block"]["n_h"], view["block"]["hypothesis"]["score"] = 2, 3.0
-    view["tones"]["score"] = 2.0
-    assert parity.view_score(view) == 3.0
-    view["tones"]["score"] = 4.0
-    assert parity.view_score(view) == 4.0
-
-
-@pytest.mark.parametrize(
-    ("surface", "plane", "mix", "inertial", "expected"),
-    [
-        (AXIS_VIEW, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
-        (AXIS_VIEW, (YAW, SIDE_FORCE), {SIDE_FORCE: 1.0}, 1, 0.0),
-        (0, (0, SIDE_FORCE), {SIDE_FORCE: -0.95, 0: 0.3}, 0, 9.0),
-        (0, (0, SIDE_FORCE), {SIDE_FORCE: 0.85, 0: 0.5}, 0, 0.0),
-        (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (VANE_VIEW, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
-    ],
-)
-def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
-    statistical = new_fdi()["statistical"]
-    (
-        statistical["test"]["alarm_level"],
-        statistical["test"]["margin"],
-        statistical["n_views"],
-    ) = (
-        5.0,
-        12.5,
-        2,
-    )
-    statistical["gust"]["output"]["uses_accelerometers"] = statistical["forces"]["in_use"] = 1
-    view, clearing = statistical["views"][:2]
-    clearing["vane_free"], clearing["plane_pair"], clearing["peak"] = (
-        1,
-        (YAW, SIDE_FORCE),
-        50.0,
-    )
-    view["confirmer"], view["peak"] = SIDE_FORCE, 9.0
-    (
-        view["nulled"],
-        view["plane_pair"],
-        view["by_inertia"],
-        view["tones"]["score"],
-    ) = (
-        surface,
-        plane,
-        inertial,
-        4.0,
-    )
-    view["block"]["n_h"], view["block"]["hypothesis"]["score"] = 1, 9.0
-    for i, share in mix.items():
-        view["direction"][i] = share
-    assert Across.alarm(statistical, view) == expected

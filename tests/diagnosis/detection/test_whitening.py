@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from innovations import PlainKalman, block_of, drawn, filter_all
+from innovations import PlainKalman, block_of, filter_all
 from scipy.linalg import solve_discrete_are
 
-from beaver_ftc.diagnosis.detection import likelihood
 from samples import samples
 
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
@@ -69,39 +68,6 @@ def test_after_a_million_frames_it_is_where_the_riccati_equation_says(case, rate
     assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(K, rel=1e-5, abs=1e-9)
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.5])
-@pytest.mark.parametrize("case", CASES)
-def test_innovations_of_the_model_come_out_white_and_of_the_covariance_said(case, jitter):
-    drift, noise, keep = CASES[case]
-    block, dt, frames = block_of(drift, noise, jitter, keep=keep), 0.01, 200_000
-    white = _whitened(block, drawn(block, frames, dt, np.random.default_rng(5), start=1.0), dt)[1000:]
-    n = len(drift)
-    unit = white @ np.linalg.cholesky(block["S_inv"][:n, :n])
-    assert unit.T @ unit / len(unit) == pytest.approx(np.eye(n), abs=5 * np.sqrt(2 / frames))
-    for lag in (1, 2, 5, 20, 100, 500):
-        across = unit[lag:].T @ unit[:-lag] / len(unit)
-        assert across == pytest.approx(np.zeros((n, n)), abs=5 / np.sqrt(frames))
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_from_the_first_frame_on_the_covariance_is_as_said(case):
-    """Over many flights, frame by frame: also while the filter is still finding out about the drift."""
-    drift, noise, keep = CASES[case]
-    dt, frames, flights, n = 0.01, 8, 4000, len(drift)
-    rng, squares = np.random.default_rng(2), np.zeros((frames, n, n))
-    for _ in range(flights):
-        block = block_of(drift, noise, keep=keep)
-        g = _whitened(block, drawn(block, frames, dt, rng, start=1.0), dt)
-        squares += g[:, :, None] * g[:, None, :]
-    block = block_of(drift, noise, keep=keep)
-    for k in range(frames):
-        likelihood.advance_covariance(block, dt)
-        whole = np.linalg.cholesky(block["S_inv"][:n, :n])
-        assert whole.T @ (squares[k] / flights) @ whole == pytest.approx(
-            np.eye(n), abs=6 * np.sqrt(2 / flights)
-        )
-
-
 @pytest.mark.parametrize("case", WALKS)
 def test_what_is_constant_leaves_no_trace(case):
     drift, noise, keep = CASES[case]
@@ -112,14 +78,3 @@ def test_what_is_constant_leaves_no_trace(case):
     trace = np.abs(beside - without).max(axis=1)
     assert trace[0] > 0.01
     assert trace[1500:].max() < 1e-9 * trace[0]
-
-
-@pytest.mark.parametrize("case", WALKS)
-def test_gyros_without_noise_are_believed_at_once(case):
-    """The drift is then the last innovation, and the next one tells only how it changed."""
-    drift, _, _ = CASES[case]
-    block, n, dt = block_of(drift, 0.0), len(drift), 0.01
-    nu = drawn(block, 5000, dt, np.random.default_rng(3), start=1.0)
-    white = _whitened(block, nu, dt)
-    assert white[1:] == pytest.approx(dt * np.diff(nu, axis=0), abs=1e-12)
-    assert np.linalg.inv(block["S_inv"][:n, :n]) == pytest.approx(dt**3 * drift, rel=1e-6)

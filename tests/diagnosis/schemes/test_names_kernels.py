@@ -2,8 +2,6 @@
 
 from itertools import groupby
 
-import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi
@@ -15,13 +13,7 @@ from beaver_ftc.diagnosis.conclusion import (
     reset_conclusion,
     update_interval,
 )
-from beaver_ftc.diagnosis.schemes import (
-    fdi_dtype,
-    prepare_takeover,
-    record_isolated_surfaces,
-)
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
-from telling import bits, fill
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 
@@ -83,50 +75,3 @@ def test_every_spell_of_a_type_is_kept_unless_the_name_ends_with_it(frames):
     names = conclusion["gone"][: min(len(of_names), MAX_WITHDRAWN)][:-1]
     assert [(n["to_s"], n["fault_type"]) for n in names] == of_names[: len(names)]
     assert all(one["reason"] == TYPES_REFUTED + one["to_s"] % 2 for one in (*kept, *names))
-
-
-@pytest.mark.parametrize(
-    ("pair", "alarmed", "beside", "named"),
-    [(0, 0, 0, [ELEVATOR]), (1, 0, 0, [AILERON, RUDDER]), (1, 1, 0, []), (1, 1, 1, [AILERON, RUDDER])],
-)
-def test_which_surfaces_are_named(pair, alarmed, beside, named):
-    """The one isolated, those of a pair, and none where an instrument has been found instead."""
-    fdi = nameless()
-    (
-        fdi["verdict"]["isolated_estimator"],
-        fdi["types"]["surface"]["status"]["is_isolated"][[AILERON, RUDDER]],
-    ) = (
-        ELEVATOR,
-        1,
-    )
-    fdi["types"]["pair"]["enabled"] = pair
-    (
-        fdi["sensor_monitor"]["config"]["enabled"],
-        fdi["sensor_monitor"]["output"]["alarmed"],
-        fdi["sensor_monitor"]["output"]["keeps_surface"],
-    ) = (
-        1,
-        alarmed,
-        beside,
-    )
-    record_isolated_surfaces(fdi, 2.5)
-    since = np.full(4, -1.0)
-    since[named] = 2.5
-    assert fdi["verdict"]["from_s"].tolist() == since.tolist()
-
-
-@pytest.mark.parametrize(("filters", "in_flight"), [(2, True), (3, False)])
-def test_of_a_diagnosis_before_only_how_close_it_came_goes_on_and_by_the_same_filters(filters, in_flight):
-    fdi, before = (fill(np.zeros(1, fdi_dtype(3))[0], seed=seed) for seed in (0, 1))
-    fdi["bank"]["config"]["n_filters"], before["bank"]["config"]["n_filters"] = filters, 2
-    expected = fdi.copy()
-    expected["statistical"]["alarm"]["peak"] = before["statistical"]["alarm"]["peak"]
-    if filters == 2:
-        expected["bank"]["output"]["peak"] = before["bank"]["output"]["peak"]
-    for gust in ("gust", "vaneless"):
-        expected["statistical"][gust]["config"]["starts_in_flight"] = in_flight
-    expected["sensor_monitor"]["memory"]["substep"] = 0
-    given = bits(before)
-    prepare_takeover(fdi, before, in_flight)
-    assert bits(fdi) == bits(expected)
-    assert bits(before) == given

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.bounds import bound_dtype
-from beaver_ftc.diagnosis.detection.filters import FDAE_RECORD
 from beaver_ftc.diagnosis.isolation import isolation_dtype
 from beaver_ftc.diagnosis.schemes import published as published_scheme
 
@@ -47,47 +46,6 @@ def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, defle
         assert np.linalg.norm(new.memory.basis[i]) == pytest.approx(1.0)
 
 
-@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0.1, 3.0))
-def test_the_network_learns_along_its_basis_within_its_limit(signal, limit):
-    new = at(network(gain=50.0, limit=limit), alpha=0.2)
-    weights = np.linspace(-limit, limit, new.memory.weights.size).reshape(new.memory.weights.shape)
-    new.memory.weights[:] = weights
-    published_scheme.train_state_network(new, np.array(signal), 0.02)
-    expected = weights + 0.02 * 50.0 * new.memory.basis * np.array(signal)[:, None]
-    np.testing.assert_allclose(new.memory.weights, np.clip(expected, -limit, limit))
-    at(new, alpha=0.2)
-    np.testing.assert_allclose(new.output, (new.memory.weights * new.memory.basis).sum(axis=1), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("dead_zone", "detected", "residual", "learns"),
-    [(1, 1, 0.02, True), (1, 1, 0.009, False), (1, 0, 0.02, False), (0, 0, 0.009, True)],
-)
-def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
-    dead_zone, detected, residual, learns
-):
-    published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
-    published.config.waits = dead_zone
-    published_scheme.configure_network(published.network, 60.0, 20.0, TRAVEL)
-    at(published.network)
-    fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
-    fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
-    published_scheme.train_if_due(published, fdae, detected, DT)
-    expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
-    np.testing.assert_allclose(
-        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES))
-    )
-
-
-@pytest.mark.parametrize(
-    ("residual", "axis"), [((0.02, 0.03, 0.0), 0), ((0.0, -0.03, 0.02), 1), ((0, 0, 0), None)]
-)
-def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
-    fdae = np.zeros(1, FDAE_RECORD).view(np.recarray)[0]
-    fdae.output.residual[:], fdae.output.threshold[:] = residual, 0.01
-    assert published_scheme.fdae_axis(fdae) == (-1 if axis is None else axis)
-
-
 @given(
     st.floats(-1.0, 0.0),
     st.floats(0.0, 5000.0),
@@ -121,8 +79,3 @@ def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_mis
         isolation.advance_estimator(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
-
-
-def test_a_pole_beyond_the_frame_rate_keeps_nothing():
-    assert published_scheme.euler_decay(10.0, 0.01) == pytest.approx(0.9)
-    assert published_scheme.euler_decay(200.0, 0.01) == 0.0

@@ -5,12 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.schemes import fdi_dtype
-from beaver_ftc.diagnosis.schemes import published as published_scheme
-from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plugins import DETECTORS, options_of, settings
-from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.scenario.schema import load_text
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
 
@@ -84,55 +79,6 @@ def test_without_the_dead_zone_the_network_learns_of_healthy_flight():
     assert np.abs(log["q_network_rad_s2"]).max() > 1e-3
 
 
-CHOSEN = {
-    "network_gain": 70.0, "network_limit_rad_s2": 8.0, "adaptation_gain": 900.0, "initial_theta": -0.15,
-    "constant_threshold_rad_s": 0.004,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("options", "projects", "adaptive", "waits", "left_out"),
-    [
-        ({}, True, True, 1, None), ({"projection": 0}, False, True, 1, None),
-        ({"leave_out": 3}, True, True, 1, 2), ({"adaptive_threshold": 0}, True, False, 1, None),
-        ({"dead_zone": 0, "leave_out": 1}, True, True, 0, 0),
-    ],
-)  # fmt: skip
-def test_every_option_is_in_the_record_of_its_part(options, projects, adaptive, waits, left_out):
-    """At 50 Hz, of surfaces that lead the axes in no order, with stops that are not symmetric."""
-    config = {"scheme": "zhang2005", "detection_pole_per_s": 4.0, "isolation_pole_per_s": 6.0,
-              "options": CHOSEN | options}  # fmt: skip
-    fdi, before = (np.zeros(1, fdi_dtype(4))[0] for _ in range(2))
-    travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
-    for record in (fdi, before):
-        record["layout"]["main"] = (2, 0, 1)
-        record["bank"]["config"]["a"][:3] = 0.5, 0.6, 0.7
-        record["isolation"]["config"]["mu_kind"] = 1
-    given = load_scenario({"name": "x", "rate_hz": 50, "fdi": config})
-    published_scheme.reconfigure_published(fdi, given, travel)
-    found = fdi["published"]["network"]["config"]
-    assert (found["gain"], found["w_max"]) == (70.0, 8.0 if projects else np.inf)
-    middle = [(low + high) / 2.0 for low, high in travel.T[[2, 0, 1]]]
-    assert found["c0"].tolist() == [
-        [angle, -0.3, low] for angle, low in zip((-0.4, -0.1, -0.4), travel[0, [2, 0, 1]], strict=True)
-    ]
-    spacing = [[0.1, 0.3, at - low] for at, low in zip(middle, travel[0, [2, 0, 1]], strict=True)]
-    spacing[1][0] = 0.6 / 8.0
-    assert found["dc"] == pytest.approx(np.array(spacing))
-    assert fdi["published"]["config"]["waits"] == waits
-    assert fdi["published"]["config"]["mu0"] == (0.0 if adaptive else 0.004)
-    assert fdi["fdae"]["config"]["a"] == pytest.approx(1.0 - 4.0 / 50.0)
-    assert fdi["bank"]["config"]["a"][:3] == pytest.approx([1.0 - 4.0 / 50.0, 0.6, 0.7])
-    isolating = fdi["isolation"]["config"]
-    assert isolating["a"] == pytest.approx(np.full_like(isolating["a"], 1.0 - 6.0 / 50.0))
-    assert (isolating["gradient"], isolating["gain"]) == (1, 900.0)
-    assert isolating["free"] == (not projects)
-    assert isolating["mu_kind"] == (1 if adaptive else CONSTANT_THRESHOLD) != 0
-    estimators = fdi["isolation"]["estimator"]
-    assert (estimators["theta"] == -0.15).all()
-    assert np.flatnonzero(estimators["excluded"]).tolist() == ([] if left_out is None else [left_out])
-
-
 def mistake(fdi):
     with pytest.raises(Exception, match=r".*") as caught:
         load_text(f"name: x\nfdi: {fdi}\n", source="s.yaml")
@@ -155,21 +101,6 @@ def test_what_it_has_not_is_refused_in_a_line(fdi, says):
     line = mistake(f"{{scheme: zhang2005, {fdi}}}")
     assert line.startswith("s.yaml:2: fdi." + says)
     assert "\n" not in line
-
-
-def test_ours_takes_no_options():
-    assert mistake("{options: {a: 1}}").startswith(
-        "s.yaml:2: fdi.options.a: adaptive-estimators has no options, allowed: {}"
-    )
-
-
-def test_every_option_has_a_range_a_meaning_and_an_origin():
-    rows = options_of(DETECTORS, "zhang2005")
-    for row in rows.values():
-        assert row.get("low", 0) <= row["default"] <= row["high"]
-        assert row["says"]
-        assert row["origin"]
-    assert settings(DETECTORS, "zhang2005", {"network_gain": 5.0})["network_gain"] == 5.0
 
 
 def test_it_takes_over_in_flight_from_a_scheme_with_more():

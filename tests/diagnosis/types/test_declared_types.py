@@ -85,17 +85,6 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     assert fault_finding_dict(plant.fdi, SURFACES)["isolated"] == "aileron"
 
 
-def test_blocks_see_what_frames_do_not():
-    """With noisy gyros a frame leaves the rudder several degrees of room, a block a small part of it."""
-    plant = fly(4, True, "bias", 2, 30, 0.9, 600)
-    known, estimator = (
-        plant.fdi["types"]["surface"][2],
-        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position"][2]],
-    )
-    of_a_frame = 2 * plant.fdi["bound"]["nu_max"][2] / abs(estimator["effect"]["regressor"][2])
-    assert known["last"]["hi"] - known["last"]["lo"] < 0.5 * of_a_frame
-
-
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():
     """What a change in flight would make of it, too."""
     scenario = Scenario.model_validate({"name": "x", "fdi": {"fault_class": "all", "pairs": True}})

@@ -177,13 +177,3 @@ def test_amplitude_and_frequency_of_an_oscillation():
     assert said["isolation_type"] == "oscillatory"
     assert said["estimate"] == pytest.approx(0.035, rel=0.05)
     assert said["frequency_rad_s"] == pytest.approx(5.5, rel=0.02)
-
-
-def test_what_cannot_be_told_apart_stays_a_candidate():
-    """Trailing, jammed at neutral, or all effectiveness lost: no measurement of rates can tell."""
-    case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
-    plant, _ = fly(case, "float", 0, 30, 0.0, UNCERTAINTIES["random"], frames=900)
-    said = fault_finding_dict(plant.fdi, SURFACES)
-    assert said["isolated"] == "aileron"
-    assert said["isolation_type"] is None
-    assert set(said["candidates"]) >= {"float", "stuck", "loss_of_effectiveness"}

@@ -8,8 +8,7 @@ from beaver_ftc.diagnosis.schemes import fdi_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
-from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, DEDUCED_HEALTHY
-from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, SLOW, STUCK, UP, VARYING_LOSS
+from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from telling import apart, fill
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -49,70 +48,11 @@ def said(*kinds):
     return [TYPE_NAMES[kind] for kind in kinds]
 
 
-def test_without_an_alarm_nothing_is_found():
-    found = verdict.fault_finding_dict(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
-    assert (found["isolated"], found["candidates"], found["faults"]) == (None, (), ())
-
-
 def test_what_is_open_is_each_type_of_each_surface_that_is_possible():
     found = verdict.fault_finding_dict(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
     expected = [f"aileron:{kind}" for kind in said(*sorted((STUCK, BIAS)))] + said(CONSTANT_LOSS)
     assert found["candidates"] == (*expected[:-1], f"rudder:{expected[-1]}")
     assert found["isolated"] is None
-
-
-def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unanticipated():
-    assert verdict.fault_finding_dict(new({AILERON: []}), SURFACES)["candidates"] == (
-        "aileron",
-        "unanticipated",
-    )
-    assert verdict.fault_finding_dict(new(), SURFACES)["candidates"] == ("unanticipated",)
-    both = verdict.fault_finding_dict(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
-    assert both == ("aileron", f"rudder:{TYPE_NAMES[STUCK]}")
-
-
-@pytest.mark.parametrize(
-    ("named", "standing", "excluded", "possible"),
-    [
-        (0, 0, 0, True), (0, 0, 1, False), (0, DEDUCED_HEALTHY, 0, False),
-        (1, DEDUCED_HEALTHY, 1, True), (0, DEDUCED_FAULTY, 1, True), (1, 0, 1, True),
-    ],
-)  # fmt: skip
-def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
-    fdi = new({RUDDER: [STUCK]})
-    (
-        fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
-        fdi["types"]["surface"]["status"]["basis"][RUDDER],
-    ) = named, standing
-    fdi["types"]["surface"]["not_at_position"][RUDDER] = excluded
-    assert (
-        f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_finding_dict(fdi, SURFACES)["candidates"]
-    ) == possible
-
-
-@pytest.mark.parametrize(
-    ("constant", "evidence", "has_eG", "kept"),
-    [
-        (BIAS, 30, 0, {VARYING_LOSS, SLOW}), (BIAS, 50, 0, set()), (BIAS, 51, 0, set()),
-        (STUCK, 30, 0, {VARYING_LOSS, SLOW}), (STUCK, 50, 0, {SLOW}), (FLOAT, 51, 0, {SLOW}),
-        (UP, 90, 0, {SLOW}),
-        (None, 90, 0, {VARYING_LOSS, SLOW}), (BIAS, 90, 1, {VARYING_LOSS, SLOW}),
-    ],
-)  # fmt: skip
-def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
-    constant, evidence, has_eG, kept
-):
-    """But where a surface stands still, a slow one may stand until it is excluded."""
-    constants = set() if constant is None else {constant}
-    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, half_frames=40)
-    (
-        fdi["types"]["surface"]["evidence"]["n_anomalous"][RUDDER],
-        fdi["types"]["surface"]["evidence"]["n_rest"][RUDDER],
-    ) = evidence, 10
-    fdi["types"]["config"]["has_eG"] = has_eG
-    types = verdict._type_names(fdi, RUDDER)
-    assert set(types) == set(said(*constants, *kept))
-    assert len(types) == len(set(types))
 
 
 def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
@@ -152,56 +92,6 @@ def several(named=(), alarmed=(0, 0), left=None):
         )
     fdi["types"]["pair"]["group_alarm"] = alarmed
     return verdict.fault_finding_dict(fdi, SURFACES)
-
-
-def test_of_several_faults_the_first_named_is_told_first():
-    found = several(named=[(RUDDER, 9.0), (ELEVATOR, 7.0)], alarmed=(1, 1))
-    assert (found["isolated"], found["isolation_time_s"]) == ("elevator", 7.0)
-    assert [fault["isolated"] for fault in found["faults"]] == ["elevator", "rudder"]
-    assert several(named=[(RUDDER, 9.0), (ELEVATOR, 9.0)])["isolated"] == "elevator"
-
-
-def test_each_of_several_faults_has_instants_of_its_own():
-    """When it was named, and when its type; none of a type that is open."""
-    fdi = new(pairs=1)
-    surface = fdi["types"]["surface"]
-    for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
-        surface["status"]["is_isolated"][s], surface["status"]["isolated_at_s"][s] = 1, named_at_s
-        surface["status"]["fault_type"][s], surface["status"]["typed_at_s"][s] = kind, type_at_s
-    apart(instants=[9.0, 11.5, 7.0])
-    elevator, rudder = verdict.fault_finding_dict(fdi, SURFACES)["faults"]
-    keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
-    assert [elevator[key] for key in keys] == ["elevator", 7.0, None, None]
-    assert [rudder[key] for key in keys] == ["rudder", 9.0, "stuck", 11.5]
-
-
-def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
-    alarmed = [0, 0]
-    alarmed[PITCH_GROUP] = 1
-    found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
-    assert found["isolated"] is None
-    (plane,) = found["faults"]
-    assert found["candidates"] == plane["candidates"] == (f"elevator:{TYPE_NAMES[BIAS]}", "elevator+flap")
-    beside = several(named=[(RUDDER, 9.0)], alarmed=(1, 1), left={ELEVATOR: [BIAS]})
-    assert [fault["isolated"] for fault in beside["faults"]] == ["rudder", None]
-    assert several(named=[(FLAP, 9.0)], alarmed=alarmed)["faults"][1:] == ()
-
-
-def test_where_no_plane_is_alarmed_both_stay_open():
-    found = several(left={ELEVATOR: [BIAS], RUDDER: [STUCK]})
-    assert found["candidates"] == (
-        f"elevator:{TYPE_NAMES[BIAS]}", "elevator+flap", f"rudder:{TYPE_NAMES[STUCK]}", "aileron+rudder",
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", [STUCK, UP])
-def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
-    fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
-    every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
-    assert set(verdict._type_names(fdi, ELEVATOR)) == every
-    assert set(verdict._type_names(fdi, RUDDER)) == set(said(kind))
-    assert set(verdict._type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
-    assert set(verdict._type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])

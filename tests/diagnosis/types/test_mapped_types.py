@@ -77,13 +77,3 @@ def test_the_surface_at_fault_is_never_excluded(surface, course):
         plant = flown(course, surface, seed, uncertainty)
         assert plant.detected_at_s >= plant.dt * BEGINS
         assert not plant.position_excluded(surface)
-
-
-def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
-    """Ablation: without what a surface at fault adds, and with the whole travel for the alarm as well."""
-    assert not any(flown("jumps", seed=seed).position_excluded(ELEVATOR) for seed in range(4))
-    assert any(flown("jumps", seed=seed, one_free=0).position_excluded(ELEVATOR) for seed in range(4))
-    for whole, found in ((0, True), (1, False)):
-        changes = {"uncertainty": "hide", "two_free": whole}
-        hidden = [flown("bias", seed=seed, **changes) for seed in range(4)]
-        assert all(np.isfinite(plant.detected_at_s) == found for plant in hidden)

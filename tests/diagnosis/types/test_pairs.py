@@ -1,19 +1,14 @@
 """Pairs of faults on the plant where the theory holds exactly, against an uncertainty that fights them."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 from design_plant import UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.pairs import locate_lateral
 from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
-from beaver_ftc.scenario.schema import Scenario
 from flying import flown
 from samples import samples
 
@@ -86,51 +81,6 @@ def test_both_are_named_and_a_search_for_one_finds_neither():
     }
     alone = fly(4, UNCERTAINTIES["random"], faults, pairs=False)
     assert fault_finding_dict(alone.fdi, SURFACES)["isolated"] == "unanticipated"
-
-
-def test_pairs_belong_to_the_class_of_all_faults():
-    with pytest.raises(ValidationError) as refused:
-        Scenario.model_validate({"name": "x", "fdi": {"pairs": True}})
-    ((key, why),) = refused.value.errors()[0]["ctx"]["conflicts"]
-    assert key == ("pairs",)
-    assert "allowed: true with fault_class: all" in why
-
-
-angles = st.floats(-0.2, 0.2)
-
-
-@given(angles, angles, st.lists(st.floats(0, 0.5), min_size=6, max_size=6))
-def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, sizes):
-    """nu = Z_a a + Z_r r + e for every admitted e: the corners of e are the ends of what is possible."""
-    plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", pairs=True)
-    fdi = plant.fdi
-    Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
-    frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
-    for column, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][fdi["layout"]["position"][s]]["effect"]
-        effect["regressor"][[0, 2]], effect["e"][[0, 2]] = Z[:, column], spread[:, column]
-        fdi["types"]["surface"][s]["last"]["u"] = 0.02
-    fdi["bound"]["nu_max"][[0, 2]] = frame
-    fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    locate_lateral(
-        fdi["types"],
-        fdi["layout"],
-        fdi["isolation"]["estimator"],
-        fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["nu_max"],
-    )
-    e = frame + spread.sum(axis=1)
-    signs = product((-1, 1), repeat=2)
-    corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
-    for column, s in enumerate((AILERON, RUDDER)):
-        surface, ends = fdi["types"]["surface"][s], corners[:, column]
-        assert surface["last"]["lo"] == pytest.approx(
-            max(surface["actuator"]["stop_lo"], 0.02 + ends.min()), abs=1e-9
-        )
-        assert surface["last"]["hi"] == pytest.approx(
-            min(surface["actuator"]["stop_hi"], 0.02 + ends.max()), abs=1e-9
-        )
-        assert surface["last"]["anomalous"] == (ends.min() > 0 or ends.max() < 0)
 
 
 @pytest.mark.parametrize("thresholds", ["published", "interval"])

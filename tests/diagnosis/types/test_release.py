@@ -76,33 +76,6 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
         )
 
 
-@pytest.mark.parametrize("kind", ["stuck", "float"])
-def test_a_surface_that_comes_back_otherwise_than_its_actuator_could_was_not_held(kind):
-    """Half as fast as a servo: that is no return."""
-    case = {"seed": 3, "rate_hz": 100.0, "airspeed_mps": 45.0}
-    crawling = lambda plant, a, c: a + 0.1 * (plant.moved(a, c) - a)  # noqa: E731
-    for back, excluded in ((None, False), (crawling, True)):
-        fault = Repaired(kind, 1, 30, 80, 0.1, 0.01, back)
-        plant = fly(case, 1, fault, UNCERTAINTIES["random"], frames=300)
-        assert bool(plant.fdi["types"]["surface"][1]["sets"]["excluded"][fault.code]) == excluded
-
-
-def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
-    """No return lasts: what is off for good is excluded as a jam within a few time constants of the servo."""
-    case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
-    plant = DesignPlant(
-        surface=0,
-        position=lambda k, u: u + 0.03 * (k >= 30),
-        fault_class="all",
-        actuators="servo",
-        **case,
-    ).fly(100, UNCERTAINTIES["random"])
-    excluded = plant.fdi["types"]["surface"][0]["sets"]["excluded"]
-    assert excluded[fault_kinds.STUCK]
-    assert excluded[fault_kinds.FLOAT]
-    assert not excluded[fault_kinds.BIAS]
-
-
 class Masked(DesignPlant):
     """The command undoes a swing of the surface while it lasts, and then stays where that left it."""
 

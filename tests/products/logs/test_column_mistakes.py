@@ -1,7 +1,5 @@
 """A log with one mistake mended: every column of a sample follows its name."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -59,28 +57,3 @@ def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
         np.testing.assert_array_equal(column(rates, vehicle, name), column(samples, vehicle, source))
     np.testing.assert_array_equal(turned.commands, samples.commands[:, [2, 1, 0]])
     assert len(found) == 3 + 3 + 5 * 5  # pairs of commands and of rates; a sign and two units either way
-
-
-def test_commands_of_unknown_effect_are_exchanged_with_none(log):
-    vehicle, samples = log
-    every, fewer = (
-        [one.correction_text for one in corrected_logs(samples, vehicle, unknown)]
-        for unknown in ((), {"elevator"})
-    )
-    assert [text for text in every if text not in fewer] == [
-        "the commands of left_aileron and elevator exchanged",
-        "the commands of elevator and right_aileron exchanged",
-    ]
-    assert [text for text in every if text in fewer] == fewer
-
-
-@pytest.mark.parametrize("confirmed", [(), ("q_rad_s",), ("p_rad_s", "r_rad_s")])
-def test_a_rate_that_the_attitude_confirms_is_what_it_is(log, confirmed):
-    vehicle, samples = log
-    of_angles = replace(samples, confirmed_rates=frozenset(confirmed))
-    every, fewer = (
-        [one.correction_text for one in corrected_logs(flight, vehicle)] for flight in (samples, of_angles)
-    )
-    assert fewer == [text for text in every if not any(name in text for name in confirmed)]
-    pairs = {0: 0, 1: 2, 2: 3}[len(confirmed)]  # of three rates, those with a confirmed one
-    assert len(every) - len(fewer) == pairs + 5 * len(confirmed)  # a sign and two units either way

@@ -1,7 +1,5 @@
 """Delays of a flight: what each makes of the commands, how they are weighed, and what all say together."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -27,11 +25,6 @@ def test_commands_that_act_sooner_or_later(delay_s, share, later):
     np.testing.assert_allclose(
         found, (1 - share) * samples.commands + share * samples.commands[at], atol=1e-15
     )
-
-
-def test_no_delay_changes_nothing():
-    samples = small.flight(MODEL, 12)
-    assert filtering._with_command_delay(samples, 0.0) is samples
 
 
 def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
@@ -64,11 +57,3 @@ def test_what_all_delays_say_together(changed):
     assert not changed(
         {"posterior": in_short(together[0]), "state": together[1][-1], "scale": together[2][::30]}
     )
-
-
-def test_what_cannot_be_predicted_changes_no_number_to_none():
-    samples = small.flight(MODEL, 60)
-    rates = samples.rates.copy()
-    rates[30] = np.nan
-    found = filtering.bank_posterior(replace(samples, rates=rates), MODEL, build_bank(MODEL))
-    assert all(np.isfinite(part).all() for part in found)

@@ -105,12 +105,3 @@ def test_what_is_just_allowed_of_delays_and_covariances(tmp_path):
     for wrong in ({"delays_s": [-0.06]}, {"delays_s": [0.0501]}):
         with pytest.raises(BadInput, match="up to a sample"):
             load_model(written(tmp_path, (("settings",), wrong)))
-
-
-@pytest.mark.parametrize(("key", "values"), [("spread", [0.1, -0.2, 0.3]), ("gain_sd", [0.3, -0.4])])
-def test_a_negative_deviation_of_what_was_fitted_is_refused(tmp_path, key, values):
-    with pytest.raises(
-        BadInput, match="fitted: gain_sd or spread has a negative number, allowed: at least 0"
-    ):
-        load_model(written(tmp_path, (("fitted", key), values)))
-    assert load_model(written(tmp_path, (("fitted", key), [0.0] * len(values)))).rate_hz == 20.0

@@ -78,54 +78,6 @@ def test_verdicts_as_columns():
     assert columns["credible"] == [1] * 12
 
 
-@pytest.mark.parametrize("fdi", [{"is_ours": False}, {"pairs": True}])
-def test_verdicts_of_pairs_or_of_another_scheme_bound_nothing(fdi):
-    columns = columns_of(**fdi)
-    for name in SURFACES:
-        assert (columns[f"{name}_low"], columns[f"{name}_high"]) == ([0.0] * 12, [1.0] * 12)
-    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.1, 0.9, 1])
-
-
-def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
-    """By trying each theta, at 3 samples a second: 1 + theta of what explains this frame and the two before;
-    0 and 1 where nothing does. The first sample ends no frame, whatever stands there."""
-    planted = np.array([3.0, -0.5, -0.42, -0.61, -0.95, -0.55])
-    bound = np.array(
-        [[0.1] * 3, [0.05, 0.07, 0.2], [0.06, 0.1, 0.1], [0.08, 0.07, 0.2], [0.1] * 3, [0.09] * 3]
-    )
-    effect = np.zeros((6, 3, 2))
-    effect[:, :, 0], effect[:, 1, 1] = [[0.5, -0.6, 0.1]], [0.4, -0.4, 0.8, 0.9, -0.5, 0.7]
-    nu = planted[:, None] * effect[:, :, 0]
-    shown, samples = [], [np.arange(6.0 * n).reshape(6, n) for n in (3, 5, 2, 3)]
-
-    def step(*sample):
-        shown.append(sample)
-        return f"verdict {len(shown)}"
-
-    diagnosis = SimpleNamespace(
-        step=step, innovation=lambda: tuple(of[len(shown) - 1] for of in (nu, bound, effect))
-    )
-    found = stepped.replay_samples(diagnosis, samples, 3.0)
-    assert found.verdicts == [f"verdict {k}" for k in range(1, 7)]
-    for k, sample in enumerate(shown):
-        assert [part.tolist() for part in sample] == [of[k].tolist() for of in samples]
-    assert found.command_gain_bounds.tolist() == [1.0, 1.0]
-    thetas, bounded = np.linspace(-1.0, 0.0, 2001), 0
-    for k in range(6):
-        for s in range(2):
-            explains = np.ones(len(thetas), bool)
-            for j in range(max(k - 2, 1), k + 1):
-                left = np.abs(nu[j] - thetas[:, None] * effect[j, :, s]) - bound[j]
-                explains &= (left <= 1e-9).all(axis=1)
-            ends = 1.0 + thetas[explains][[0, -1]] if explains.any() else (0.0, 1.0)
-            bounded += 0.0 < ends[0] < ends[1] < 1.0
-            assert (
-                found.alone_low[k, s],
-                found.alone_high[k, s],
-            ) == pytest.approx(ends, abs=1e-3)
-    assert bounded > 2
-
-
 def scenario(**sensors):
     return SimpleNamespace(name="one", sensors=Sensors.model_validate(sensors))
 
@@ -147,15 +99,6 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
     }  # fmt: skip
 
 
-def test_what_is_withdrawn_is_not_what_is_named():
-    """The name that stands at the end, since it has stood there."""
-    assert of._last_isolation(T_S[:4], SAID[:4]) == (1.5, "rudder")
-    assert of._last_isolation(T_S[:5], SAID[:5]) == (1.5, "rudder")
-    assert of._last_isolation(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
-    again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
-    assert of._last_isolation(T_S[:5], again) == (1.5, "elevator")
-
-
 def test_a_replay_that_finds_nothing(tmp_path):
     found = of._replay_verdict(
         tmp_path / "log.parquet", scenario(), {"t_s": T_S[:2] + 1.0}, [Verdict(), Verdict()]
@@ -167,36 +110,6 @@ def test_a_replay_that_finds_nothing(tmp_path):
         None,
     )
     assert (found["duration_s"], found["rows_that_differ"]) == (0.5, 0)
-
-
-def test_errors_of_the_flow_sensors_are_left_out():
-    """Those of the gyros are in the measured rates."""
-    flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
-    assert of._lacking_inputs(flawed) == ["the declared errors of alpha: the log has the true value"]
-
-
-FOUND = {
-    "flight": "one", "detection_s": 5.126, "isolation_s": 6.5, "isolated": "rudder", "as_flown": True,
-    "left_out": [],
-}  # fmt: skip
-
-
-def test_a_replay_in_words():
-    assert of.as_text(FOUND) == "one: detected at 5.13 s, rudder isolated at 6.50 s; as flown"
-    other = FOUND | {"isolated": None, "as_flown": False, "left_out": ["this", "that"]}
-    assert of.as_text(other).splitlines() == [
-        "one: detected at 5.13 s; not as flown", "  left out: this", "  left out: that",
-    ]  # fmt: skip
-    nothing = FOUND | {"detection_s": None, "isolated": None, "as_flown": None}
-    assert of.as_text(nothing) == "one: nothing detected; nothing beside it to compare with"
-
-
-def test_a_log_of_ours_stands_beside_its_scenario(tmp_path):
-    path = tmp_path / "log.parquet"
-    assert not of.is_log_of_run(path)
-    (tmp_path / "scenario.yaml").write_text("")
-    assert of.is_log_of_run(path)
-    assert not of.is_log_of_run(tmp_path / "other.parquet")
 
 
 def test_columns_that_a_log_must_have(tmp_path):

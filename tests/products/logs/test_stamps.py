@@ -102,20 +102,6 @@ def test_a_time_in_another_unit_is_told(wing, tmp_path):
         load_flights_for_fit([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
 
 
-def test_each_side_of_a_gap_is_sampled_as_if_alone(wing, tmp_path):
-    columns = fast(1e4)
-    whole = load_flights_for_fit([synthetic.write_csv(tmp_path / "whole.csv", columns)], wing)[0]
-    halves = [slice(0, ROWS // 2), slice(ROWS // 2, None)]
-    parts = [
-        load_flights_for_fit([synthetic.write_csv(tmp_path / f"{i}.csv", columns, half)], wing)[0]
-        for i, half in enumerate(halves)
-    ]
-    np.testing.assert_array_equal(whole.t_s, np.concatenate([part.t_s for part in parts]))
-    np.testing.assert_allclose(whole.rates, np.vstack([part.rates for part in parts]), atol=1e-12)
-    np.testing.assert_array_equal(whole.stretch_number, np.repeat([0, 1], [len(part.t_s) for part in parts]))
-    assert len(whole.t_s) < ROWS
-
-
 DAMAGED = 51  # the row, counted from 1, whose stamp is off
 
 
@@ -182,29 +168,6 @@ def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
     assert said in (tmp_path / "out" / "flight" / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("t_s", "kept", "says"),
-    [
-        ([1, 2, 3, 4], [0, 1, 2, 3], ""),
-        ([1, 2, 2, 3], [0, 1, 3], ""),  # a stamp twice: the first, and no word
-        ([1, 2, 9e9, 3, 4], [0, 1, 3, 4], "x: row 3: its stamp is out of order, the row is left out"),
-        ([7, 1, 2, 7], [1, 2, 3], "x: row 1: its stamp is out of order, the row is left out"),
-        ([1, 2, 3, 2.5, 4], [0, 1, 2, 4], "x: row 4: its stamp is out of order, the row is left out"),
-        ([1, 2, np.nan, 3], [0, 1, 3], "x: row 3: its stamp is out of order, the row is left out"),
-        (
-            [1, 2, 3, 4, 1, 2, 3],
-            [0, 1, 2, 3],
-            "x: row 5: its stamp is out of order, the row is left out, as are 2 more of 7",
-        ),
-        ([np.nan, np.nan], [], "x: row 1: its stamp is out of order, the row is left out, as is 1 more of 2"),
-    ],
-)
-def test_which_rows_are_in_order(t_s, kept, says):
-    found, note = rows_with_increasing_time("x", np.array(t_s, dtype=float))
-    assert found.tolist() == kept
-    assert note == says
-
-
 def test_no_row_more_than_needed_is_left_out():
     """Against all subsequences of short logs."""
     rng = np.random.default_rng(2)
@@ -215,10 +178,3 @@ def test_no_row_more_than_needed_is_left_out():
         masks = ((np.arange(256)[:, None] >> np.arange(8)) & 1).astype(bool)
         longest = max(mask.sum() for mask in masks if (np.diff(t_s[mask]) > 0).all())
         assert len(kept) == longest
-
-
-def test_the_text_of_a_verdict_has_its_notes(wing, wing_model, tmp_path):
-    samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "one.csv", synthetic.fly(20.0))], wing)[0]
-    found = verdict_document(samples, wing_model, diagnose(samples, wing_model))
-    assert found["notes"] == []
-    assert "a remark" in as_text(found | {"notes": ["a remark"]})

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
     detector_names,
     diagnose_with_detector,
     loop_detector_context,
     loop_detector_inputs,
-    rows_of_verdicts,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
@@ -77,18 +75,6 @@ def test_every_detector_gives_rows(flown, wing_model):
         assert (
             (rows.effectiveness_low <= rows.effectiveness) & (rows.effectiveness <= rows.effectiveness_high)
         ).all()
-
-
-def test_verdicts_become_rows(flown, wing_model):
-    said = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
-    unknown = Verdict(True, None, "unanticipated", statistic=3.0)
-    rows = rows_of_verdicts(
-        [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
-    )
-    assert rows.faulty.tolist() == [0, 1, 1, 0]
-    assert rows.isolated_surfaces.tolist() == ["", "left", "unknown", ""]
-    assert rows.effectiveness[1].tolist() == [1.0, pytest.approx(0.6)]
-    assert rows.effectiveness_low.tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 
 
 def test_an_unknown_detector(flown, wing_model):

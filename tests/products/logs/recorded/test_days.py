@@ -5,35 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.model import FilterSettings
-from beaver_ftc_logs.recorded import benchmark, other_days
+from beaver_ftc_logs.recorded import other_days
 from beaver_ftc_logs.recorded.other_days import (
-    DayChanges,
     apply_day_changes,
-    one_change_days,
-    random_days,
     unchanged_day,
 )
 from kept import in_short
 from products.logs import small
 
 MODEL = small.model()
-LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
-MIXER = np.array([[0.5, 0.5], [0.5, -0.5]])
 PAST = np.array(MODEL.past_coefficients)
 NOISE = np.array(MODEL.residual_covariance)
-
-
-def test_the_days_on_which_one_thing_changes(changed):
-    assert not changed([vars(day) for day in one_change_days(MIXER, ["roll", "pitch"])])
-
-
-def test_drawn_days(changed):
-    assert not changed([vars(day) for day in random_days(2, range(7, 9))])
-    assert [list(seeds) for seeds in (other_days.TUNING_SEEDS, other_days.TEST_SEEDS)] == [
-        [0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15],
-    ]  # fmt: skip
 
 
 CHANGES = {
@@ -134,83 +116,3 @@ def test_commands_that_act_later_were_logged_earlier(length):
     at = np.clip(np.arange(6) + length, 0, 5)
     np.testing.assert_allclose(found[:, 0], at)
     np.testing.assert_allclose(found[:, 1], np.interp(at, np.arange(6), values[:, 1]))
-
-
-ROW = dict(zip((*benchmark.LABEL_TITLES, "beside"), (0.9, 0.8, 0.7, 0.1, 0.6, 0.5), strict=True))
-
-
-def test_mean_and_worst_of_days():
-    """The worst is the least, of the error the largest."""
-    rows = [ROW, {key: value + 0.05 for key, value in ROW.items()}]
-    found = other_days._summarize_days("drawn", rows)
-    assert found["kind"] == "drawn"
-    assert found["mean"] == {key: pytest.approx(value + 0.025) for key, value in ROW.items()}
-    assert found["worst"] == ROW | {"mean_error": pytest.approx(0.15)}
-
-
-@pytest.fixture(scope="module")
-def data():
-    flight = small.flight(MODEL, 1000, lost=LOST)
-    return benchmark.DataSet("set", MODEL.vehicle, (), (flight,))
-
-
-def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
-    """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
-    quick = FilterSettings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
-    monkeypatch.setattr(benchmark, "whole_settings", lambda usable_flights, data: quick)
-    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)])
-    monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
-    document = other_days._test_data_set(data)
-    assert not changed(document)
-    assert [(row["kind"], row["day"]) for row in document["rows"]] == [
-        ("one change", "as it was"), ("drawn, settings chosen on these", "drawn 0"),
-        ("drawn, not looked at", "drawn 8"),
-    ]  # fmt: skip
-    monkeypatch.setattr(benchmark, "detector_names", lambda: ["bank-of-filters", "sliding-least-squares"])
-    monkeypatch.setattr(benchmark, "diagnose_by_freeze_rule", lambda *given: None)
-    given = replace(data, recordings=data.flights)
-    ours, beside = benchmark._compare_methods(given)["rows"]
-    as_it_was = document["rows"][0]
-    for key in benchmark.LABEL_TITLES:
-        assert as_it_was[key] == pytest.approx(ours[key])
-    assert as_it_was["beside"] == pytest.approx(beside["classes"])
-
-
-def test_only_labelled_data_sets_have_other_days(monkeypatch, tmp_path, data):
-    bare = replace(data, flights=(replace(data.flights[0], labels=np.full((1000, 2), np.nan)),))
-    monkeypatch.setattr(other_days, "_test_data_set", lambda one: one.name)
-    monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare, data])
-    assert other_days.run_other_days(tmp_path) == {"sets": ["set"]}
-    mixed = replace(data, name="mixed", flights=(*data.flights, *bare.flights))
-    late = replace(data, name="late", flights=(*bare.flights, *data.flights))
-    monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [late, mixed])
-    assert other_days.run_other_days(tmp_path) == {"sets": ["mixed"]}
-    monkeypatch.setattr(benchmark, "load_data_sets", lambda folder: [bare])
-    with pytest.raises(BadInput, match="holds no labelled flight, allowed: one with labels"):
-        other_days.run_other_days(tmp_path)
-
-
-def test_a_day_that_nothing_changes_is_its_defaults():
-    same = unchanged_day(3)
-    assert [
-        values.tolist()
-        for values in (same.trim_shift_commands, same.neutral_shift_commands, same.surface_gains)
-    ] == [
-        [0.0] * 3,
-        [0.0] * 3,
-        [1.0] * 3,
-    ]
-    bare = DayChanges("x", same.trim_shift_commands, same.neutral_shift_commands, same.surface_gains)
-    assert (
-        bare.common_gain,
-        bare.command_delay_s,
-        bare.motion_scale,
-        bare.noise_ratio,
-        bare.trim_drift_sd_commands,
-    ) == (
-        1.0,
-        0.0,
-        1.0,
-        1.0,
-        0.0,
-    )

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.recorded.other_days import one_change_days, random_days
+from beaver_ftc_logs.recorded.other_days import random_days
 from beaver_ftc_logs.samples import Samples
-
-PAST, NOISE = 0.5 * np.eye(3), 1e-4 * np.eye(3)
 
 
 @pytest.fixture
@@ -20,12 +18,6 @@ def samples():
     rates = 0.1 * rng.standard_normal((n, 3))
     run = np.zeros(n, dtype=np.int64)
     return Samples("one", t_s, rates, commands, np.empty((n, 0)), labels, run, 0.1, {}, (), t_s)
-
-
-def test_drawn_days_are_the_same_each_time_and_differ():
-    assert random_days(2, range(3))[1].common_gain == random_days(2, range(1, 2))[0].common_gain
-    assert len({day.common_gain for day in random_days(2, range(16))}) == 16
-    assert len(one_change_days(np.array([[0.5, 0.5], [0.5, -0.5]]), ["roll", "pitch"])) == 21
 
 
 def test_drawn_days_differ_as_much_as_is_said():

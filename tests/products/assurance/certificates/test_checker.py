@@ -3,7 +3,7 @@ conditions by a statement that breaks this one alone."""
 
 import copy
 from hashlib import sha256
-from math import erfc, exp, pi, radians, sqrt
+from math import erfc, exp, radians, sqrt
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +13,7 @@ import yaml
 
 from beaver_ftc_assurance.certificates import check_certificate as checker
 from beaver_ftc_assurance.certificates.check_certificate import Declared, Frames, Refused
-from telling import apart, numbers
+from telling import numbers
 
 ROWS, DT, EARTH = 13, 0.02, 0.3
 DECLARED_BY_LETTER = {
@@ -134,12 +134,6 @@ def test_a_frame_is_a_row_or_a_block_of_rows(instants, block):
     assert found.is_unexplained.tolist() == expected.tolist()
     if length == 1:
         assert 0 < expected.sum() < count - 1
-
-
-@pytest.mark.parametrize("block", [(0, 2, 11), (3, -1, 11), (3, 2, 10), (3, 11, 11), (3, 2, 14)])
-def test_blocks_are_whole_and_within_the_log(block):
-    with pytest.raises(Refused, match="the block has other rows"):
-        frames_of(made_log(), block=block)
 
 
 D = [0.7, -0.2, 0.5]
@@ -282,117 +276,7 @@ def refused_with(says, call):
     assert str(refused.value).startswith(says)
 
 
-@pytest.mark.parametrize(("profile", "thresholds", "allowed"), [
-    ("abrupt", "adaptive", True), ("incipient", "published", True), ("incipient", "adaptive", False),
-])  # fmt: skip
-def test_one_constant_parameter_is_what_a_profile_or_published_thresholds_declare(
-    profile, thresholds, allowed
-):
-    log = made_log()
-    fdi = SCENARIO["fdi"] | {"fault_profile": profile, "thresholds": thresholds}
-    says = "" if allowed else "the scenario does not declare a constant parameter"
-    its = declared(scenario=SCENARIO | {"fdi": fdi})
-    refused_with(says, lambda: checker.sides_of_terms(of_terms(log, theta="constant"), frames_of(log), its))
-
-
-@pytest.mark.parametrize(("what", "theta", "says"), [
-    (None, "any", "an alarm is raised by frames, not by blocks"),
-    ("flap", "constant", "a frame before the alarm may be healthy"), ("flap stuck", "any", ""),
-])  # fmt: skip
-def test_blocks_say_nothing_of_an_alarm_nor_of_a_constant(what, theta, says):
-    log = made_log()
-    said = of_terms(log, what=what, theta=theta, first=2, frame=2, block=(3, 2, 11)) | {"frame": 10}
-    frames = frames_of(log, block=(3, 2, 11))
-    refused_with(says, lambda: checker.sides_of_terms(said, frames, declared()))
-    early = said | {"frame": 9}  # the block ends with row 10
-    if not says:
-        refused_with("a frame after the event", lambda: checker.sides_of_terms(early, frames, declared()))
-
-
-def test_no_filter_is_older_than_the_diagnosis_that_runs_it():
-    """Restarted with row 6; by blocks nothing is filtered longer than a block."""
-    log = made_log()
-    for since, says in ((6, ""), (5, "the frames of a term are not in order")):
-        said = of_terms(log, **PAST | {"since": since})
-        refused_with(says, lambda said=said: checker.sides_of_terms(
-            said, frames_of(log), declared(start_row=6)))  # fmt: skip
-
-
-def test_where_the_log_does_not_say_what_a_fault_does_nothing_is_proved():
-    for name in ("slope", "offset_rad_s2", "spread_rad_s2"):
-        gap = made_log()
-        gap[f"fie_flap_q_{name}"][8] = np.nan
-        said = of_terms(gap, **PAST | {"first": 8})
-        with pytest.raises(Refused, match="the log has no effect of this fault in these rows"):
-            checker.sides_of_terms(said, frames_of(gap), declared())
-    for what, column in (
-        ("flap", "fie_flap_theta_low"),
-        ("flap", "fie_flap_p_slope"),
-        ("flap stuck", "flap_travel_low_rad"),
-        ("flap stuck", "fie_flap_position_p_slope"),
-    ):
-        less = {name: of for name, of in made_log().items() if name != column}
-        with pytest.raises(Refused, match=f"the log has no columns of {what}: it was not written with this"):
-            checker.effect_of_fault(what, frames_of(less))
-    with pytest.raises(Refused, match="neither this checker nor the log says what creep is"):
-        checker.effect_of_fault("flap creep", frames_of(made_log()))
-
-
-@pytest.mark.parametrize("travel", [(-0.4, 0.5), (0.1, 0.5), (-0.5, -0.2)])
-def test_what_a_fault_does_is_the_logs_effect_of_a_position_or_of_its_own(travel):
-    """-G u and G of the position of the flap: of p - u, p what the type says."""
-    log = made_log() | {"flap_travel_low_rad": np.full(ROWS, travel[0])}
-    log |= {"flap_travel_high_rad": np.full(ROWS, travel[1])}
-    own, at = ({name: np.column_stack([log[f"{of}_{axis}_{name}"] for axis in "pqr"])
-                for name in ("offset_rad_s2", "slope", "spread_rad_s2")}
-               for of in ("fie_flap", "fie_flap_position"))  # fmt: skip
-    gone, G, none = at["offset_rad_s2"], at["slope"], np.zeros((ROWS, 3))
-    rest = min(max(0.0, travel[0]), travel[1])
-    for what, offset, slope, low, high, is_constant in (
-        ("flap", own["offset_rad_s2"], own["slope"], LOW, HIGH, False),
-        ("flap stuck", gone, G, *travel, True), ("flap float", gone + rest * G, none, 0.0, 0.0, True),
-        ("flap loss_of_effectiveness", none, -gone, -1.0, 0.0, True),
-        ("flap loss_of_effectiveness that varies", none, -gone, -1.0, 0.0, False),
-        ("flap bias", gone, G, *travel, False), ("flap oscillatory", none, G, *travel, False),
-    ):  # fmt: skip
-        found = checker.effect_of_fault(what, frames_of(log))
-        spread = (at if " " in what else own)["spread_rad_s2"]
-        for value, expected in ((found.offset, offset), (found.slope, slope), (found.spread, spread)):
-            np.testing.assert_allclose(value, expected, err_msg=what)
-        assert (found.theta_low, found.theta_high, found.theta_is_constant) == (low, high, is_constant)
-
-
-def test_what_a_fault_has_done_before_is_at_least_what_the_log_adds_up_to():
-    """Of frames 7 and 8 at 5 per s; of frames of which the log has nothing it may be any number."""
-    log, a = made_log(), exp(-5.0 * DT)
-    d, size = np.array(D), np.abs(D)
-    least = 0.0
-    for k in (7, 8):
-        h, Z, r = (sum(by[i] * log[f"fie_flap_{'pqr'[i]}_{name}"][k] for i in range(3))
-                   for by, name in ((d, "offset_rad_s2"), (d, "slope"), (size, "spread_rad_s2")))  # fmt: skip
-        least = a * least + DT * (max(0.0, h + LOW * Z, h + HIGH * Z) + r)
-    assert least > 0.0
-    for share, says in ((1.0001, ""), (0.9999, "the effect before the written frames is too small")):
-        said = of_terms(log, **PAST | {"fault": share * least})
-        refused_with(says, lambda said=said: checker.sides_of_terms(said, frames_of(log), declared()))
-    log["fie_flap_p_offset_rad_s2"][:9] = np.nan
-    said = of_terms(log, **PAST | {"fault": 0.0})
-    checker.sides_of_terms(said, frames_of(log), declared())
-
-
 # --- Courses
-
-
-def position(log, k, i, side, sign, of_swing=False):
-    """Bound on the position that frame k gives by axis i, rad, and the command; upwards if sign is 1."""
-    of = Row(log)
-    nu = (of.of("{}_measured_rad_s", k, i) - of.of("{}_measured_rad_s", k - 1, i)) / DT
-    nu -= of.of("{}_design_rad_s2", k, i)
-    offset, slope, spread = (of.of(f"fie_flap_position_{{}}_{name}", k, i)
-                             for name in ("offset_rad_s2", "slope", "spread_rad_s2"))  # fmt: skip
-    offset = 0.0 if of_swing else offset
-    most = of.of("{}_eta_bar_rad_s2", k, i) + (of.noise(k, i) + of.noise(k - 1, i)) / DT + spread
-    return sign * (nu - offset) / slope - side * most / abs(slope), -sign * offset / slope
 
 
 def bound(log, frames, i, side, sign, of_swing=False):
@@ -416,8 +300,6 @@ def course_log():
 
 
 Q, R = 1, 2
-STOPS = {1: TRAVEL, -1: (-TRAVEL[1], -TRAVEL[0])}
-PACE = radians(80.0) / 2
 
 
 def course(kind, sign, **fields):
@@ -429,89 +311,6 @@ def course(kind, sign, **fields):
         above = 6 if kind == "rate_limit" else 9
         bounds.append(bound(log, range(above, above + 1), R, -1, sign))
     return log, {"what": f"flap {kind}", "theta": "course", "bounds": bounds, **fields}
-
-
-def pairs_of(log, said, instants=1):
-    return checker.course_pairs(said, frames_of(log, instants), declared(instants))
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_what_a_course_compares_is_what_single_frames_say_of_the_position(sign):
-    """Of each type, pair by pair, from the innovation of each frame along one axis."""
-    stops = [STOPS[sign][0] + 0.01, STOPS[sign][1] - 0.02]
-    log, said = course("bias", sign, stops=stops)
-    (least, command), (most, commanded) = position(log, 6, Q, 1, sign), position(log, 9, R, -1, sign)
-    apart(bounds=[least, command, most, commanded, *stops])
-    offsets = [(least - command, most - commanded), (least, stops[0]), (stops[1], most)]
-    np.testing.assert_allclose(pairs_of(log, said), offsets)
-    log, said = course("bias that grows", sign, stops=stops)
-    np.testing.assert_allclose(pairs_of(log, said), [(least - command, 0.0), *offsets, (9, 6)])
-    way = "up" if sign > 0 else "down"
-    log, said = course(f"hardover {way}", sign, stops=[STOPS[sign][1]], pace_rad_s=PACE)
-    for instants, passed in ((1, 3), (2, 2)):
-        went = least + PACE * DT * passed
-        found = pairs_of(log, said, instants)
-        np.testing.assert_allclose(found, [(STOPS[sign][1], most), (9, 6), (went, most)])
-    log, said = course("oscillatory", sign, slowest_rad_s=25.0)
-    off = [position(log, k, Q, 1, sign, True)[0] for k in (6, 7, 8)]
-    np.testing.assert_allclose(pairs_of(log, said), [(2, pi / 25.0 / DT), (min(off), 0.0), (sum(off), 0.0)])
-    ordered = [0.03, 0.07, 0.05]
-    log, said = course("rate_limit", sign, ordered=ordered, near=0.09, step=0.011)
-    reached, top = [position(log, k, Q, 1, sign)[0] for k in (6, 7, 8)], position(log, 6, R, -1, sign)[0]
-    _, still = course("rate_limit", sign, ordered=ordered, near=0.09)
-    assert pairs_of(log, still)[2] == (pytest.approx(reached[2]), pytest.approx(top))
-    ahead = np.subtract(reached, ordered)
-    expected = [(min(ahead), 0.0), (sum(ahead), 0.0), (reached[2], top - 0.011), (reached[2], 0.09), (1, 0)]
-    np.testing.assert_allclose(pairs_of(log, said), expected)
-
-
-def wrong_courses():
-    """Statements that break one condition each, and the words of it."""
-    log, bias = course("bias", 1, stops=[*TRAVEL])
-    below, above = bias["bounds"]
-    _, up = course("hardover up", 1, stops=[TRAVEL[1]], pace_rad_s=PACE)
-    _, swing = course("oscillatory", 1, slowest_rad_s=25.0)
-    _, near = course("rate_limit", 1, ordered=[0.0, 0.1, 0.2], near=0.2)
-    other = bound(log, range(8, 9), Q, 1, 1)
-    yield bias | {"what": "flap stuck"}, "this is no type with a course"
-    yield bias | {"bounds": [below, bound(log, range(9, 10), R, -1, -1)]}, "a surface deflects one way"
-    yield bias | {"bounds": [below, above, other]}, "the frames do not follow one another"
-    yield bias | {"bounds": [above]}, "the frames do not follow one another"
-    yield bias | {"bounds": [below]}, "one frame bounds the deflection from above"
-    two = [below, above, bound(log, range(10, 11), R, -1, 1)]
-    yield bias | {"bounds": two}, "one frame bounds the deflection from above"
-    yield (
-        swing | {"bounds": [*swing["bounds"], bound(log, range(9, 10), R, -1, 1, True)]},
-        "one frame bounds the deflection from above",
-    )
-    for stops in ([TRAVEL[0]], [TRAVEL[0] - 1e-9, TRAVEL[1]], [TRAVEL[0], TRAVEL[1] + 1e-9]):
-        yield bias | {"stops": stops}, "stops"
-    yield up | {"what": "flap hardover down"}, "the surface runs the other way"
-    yield up | {"stops": [TRAVEL[1] + 1e-9]}, "the stop is not that of the log"
-    yield up | {"pace_rad_s": PACE * (1 + 1e-9)}, "pace_rad_s is not half the rate limit"
-    yield swing | {"slowest_rad_s": 24.0}, "slowest_rad_s is not that of the scenario"
-    yield near | {"bounds": [near["bounds"][0], bound(log, range(7, 8), R, -1, 1)]}, "approach is no known"
-    yield near | {"ordered": [0.0, 0.1]}, "ordered: frames are missing"
-    yield near | {"near": 0.19}, "near is nearer than the order itself"
-    yield bias | {"bounds": [bound(log, range(2, 3), Q, 1, 1), above]}, "health explains a frame"
-    late = dict(above, first=ROWS, frame=ROWS)
-    yield bias | {"bounds": [below, late]}, "health explains a frame"
-    for name in "hZr":
-        shifted = below | {name: [1.001 * below[name][0]]}
-        yield bias | {"bounds": [shifted, above]}, "h, Z or r is not that of the log"
-
-
-def test_a_course_is_refused_in_words_where_one_thing_is_wrong():
-    log, cases = course_log(), [*wrong_courses()]
-    assert len(cases) == 22
-    for said, says in cases:
-        refused_with(says, lambda said=said: pairs_of(log, said))
-
-
-def test_an_actuator_without_a_rate_limit_runs_away_at_60_deg_a_second():
-    log, said = course("hardover up", 1, stops=[TRAVEL[1]], pace_rad_s=pi / 6)
-    still = SCENARIO | {"actuators": {"flap": {"rate_limit_deg_s": 0.0}}}
-    checker.course_pairs(said, frames_of(log), declared(scenario=still))
 
 
 # --- Chance
@@ -553,95 +352,7 @@ CHANCE: dict[str, Any] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("changes", "fdi", "says"), [
-    ({}, {}, ""), ({}, {"statistical": None}, "the scenario declares no statistical detector"),
-    ({"what": "flap"}, {}, "the scenario declares no statistical detector"),
-    ({"frame": 5}, {}, "frames are missing"), ({"frames": [{}]}, {}, "frames are missing"),
-    ({"likelihood": "flap_share"}, {}, "likelihood: this is no share of the level"),
-    ({}, {"statistical": {"false_alarms_per_h": 1e-5}}, "level: the declared rate allows no smaller one"),
-])  # fmt: skip
-def test_a_statement_of_chance_is_one_that_the_scenario_allows(changes, fdi, says):
-    its = declared(scenario=SCENARIO | {"fdi": SCENARIO["fdi"] | fdi})
-    refused_with(says, lambda: checker.check_level(CHANCE | changes, its))
-
-
-@pytest.mark.parametrize("name", ["slope", "offset_rad_s2", "spread_rad_s2"])
-@pytest.mark.parametrize(("row", "axis", "refused"), [
-    (5, 0, False), (6, 0, True), (8, 2, True), (9, 0, False), (7, 1, False),
-])  # fmt: skip
-def test_an_exclusion_by_the_alarm_is_of_a_fault_that_moves_none_of_its_axes(name, row, axis, refused):
-    """Of an alarm on p and r from row 7 to 8: from the row before it on."""
-    log = made_log()
-    for i in range(3):
-        for of in ("slope", "offset_rad_s2", "spread_rad_s2"):
-            log[f"fie_flap_{'pqr'[i]}_{of}"] = np.zeros(ROWS)
-    log[f"fie_flap_{'pqr'[axis]}_{name}"][row] = -0.1
-    alarm = {"what": None, "likelihood": "x", "first": 7, "frame": 8, "axes": [0, 2]}
-    said, whole = {"what": "flap", "frame": 9}, {"statements": [alarm]}
-    says = "this fault moves the axes of the alarm" if refused else ""
-    refused_with(says, lambda: checker.check_exclusion_by_alarm(said, whole, frames_of(log)))
-
-
-@pytest.mark.parametrize(("alarm", "said", "says"), [
-    ({"what": "flap"}, {}, "there is no statistical alarm before"), ({"frame": 10}, {}, "the alarm came"),
-    ({}, {"what": None}, "the alarm came later"), ({"frame": 9}, {}, ""),
-])  # fmt: skip
-def test_an_exclusion_by_the_alarm_comes_with_one_of_chance_before(alarm, said, says):
-    log = made_log() | {f"fie_flap_{axis}_{of}": np.zeros(ROWS) for axis in "pqr"
-                        for of in ("slope", "offset_rad_s2", "spread_rad_s2")}  # fmt: skip
-    first = {"what": None, "likelihood": "x", "first": 7, "frame": 8, "axes": [0, 2]} | alarm
-    whole, said = {"statements": [first]}, {"what": "flap", "frame": 9} | said
-    refused_with(says, lambda: checker.check_exclusion_by_alarm(said, whole, frames_of(log)))
-    plain: dict[str, Any] = {"what": None, "terms": [], "frame": 8}
-    with pytest.raises(Refused, match="there is no statistical alarm before"):
-        checker.check_exclusion_by_alarm(said, {"statements": [plain, first]}, frames_of(log))
-
-
 # --- Instruments, events, the whole document
-
-LOOKS = {"what": None, "frame": 2, "test": "alpha", "looks": [[5.0, 3.0, 0.5], [1.5, 0.25, 0.75]]}
-WATCH = {"watch_share": np.array([9.0, 9.0, 2.7, 9.0]), "watch_test": np.array([0.0, 1.0, 7.0, 3.0])}
-
-
-@pytest.mark.parametrize(("changes", "log", "says"), [
-    ({}, {}, ""), ({"what": "flap"}, {}, "instruments raise an alarm, they exclude no surface"),
-    ({"test": "V"}, {}, "the log has another test in this row"),
-    ({"frame": 1}, {}, "the log has another test in this row"),
-    ({}, {"watch_test": None}, "the log has no test between instruments"),
-    ({}, {"watch_share": None}, "the log has no test between instruments"),
-    ({"looks": [[5.0, 3.0, 1.5], [1.5, 0.25, -0.25]]}, {}, "looks: a bound is below zero"),
-    ({"looks": [[5.0, 3.0, 0.0], [1.5, 0.25, 0.0]]}, {}, "the log's share is smaller"),
-    ({}, {"watch_share": np.full(4, 2.5)}, "the log's share is smaller"),
-    ({}, {"watch_share": np.full(4, 2.6)}, ""),
-    ({"missing": [3]}, {}, "the log says that another reading is missing, or none"),
-    ({"missing": [3]}, {"watch_missing": np.array([1.0, 2.0, 4.0, 3.0])}, "the log says that another readin"),
-    ({"missing": [3]}, {"watch_missing": np.array([1.0, 2.0, 3.0, 4.0])}, ""),
-])  # fmt: skip
-def test_looks_between_instruments_are_those_of_the_logs_row(changes, log, says):
-    seen = {name: of for name, of in (WATCH | log).items() if of is not None}
-    refused_with(says, lambda: checker.instrument_sides(LOOKS | changes, seen))
-    if not says:
-        expected = (1.0, 0.0) if "missing" in changes else (3.25, 1.25)
-        assert checker.instrument_sides(LOOKS | changes, seen) == expected
-
-
-@pytest.mark.parametrize(("column", "frame", "what", "says"), [
-    ("fie_flap_excluded", 9, "flap", ""), ("detected", ALARM, None, ""),
-    ("flap_stuck_excluded", 12, "flap stuck", ""),
-    ("fie_flap_excluded", 8, "flap", "fie_flap_excluded is not set in row 8"),
-    ("fie_flap_excluded", 10, "flap", "fie_flap_excluded is not set in row 10"),
-    ("detected", 13, None, "the log has no row 13"),
-    ("rudder_excluded", 9, "rudder", "the log has no column rudder_excluded: it was not written with this"),
-    ("detected", ALARM, "flap", "detected is another column than that of this event"),
-    ("fie_flap_excluded", 9, None, "fie_flap_excluded is another column than that of this event"),
-])  # fmt: skip
-def test_an_event_is_set_from_its_row_to_the_end(column, frame, what, says):
-    said = {"what": what, "column": column, "frame": frame}
-    refused_with(says, lambda: checker.check_event(said, made_log()))
-    taken_back = made_log()
-    taken_back[column if not says else "detected"][-1] = 0.0
-    if not says and frame != ROWS - 1:
-        refused_with(f"{column} is not set", lambda: checker.check_event(said, taken_back))
 
 
 @pytest.mark.parametrize(("value", "says"), [
@@ -703,53 +414,6 @@ def test_a_document_is_refused_in_words_where_one_thing_is_wrong(log, said, head
     seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)} | log
     found = [*refused_in(seen, said, **head)]
     assert [one[: len(says)] for one in found] == [says] * bool(says)
-
-
-def test_each_statement_that_does_not_hold_has_a_line():
-    seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)}
-    flap = {"what": "flap", "column": "fie_flap_excluded", "frame": 9, "as": "alarm"}
-    assert [*refused_in(seen, MISSING | {"missing": [2]}, MISSING, flap)] == [
-        "alarm: the log says that another reading is missing, or none",
-        "flap excluded: there is no statistical alarm before",
-    ]
-
-
-def test_what_is_declared_is_what_is_in_force_at_the_first_event():
-    """From row 6 on another noise is declared; the alarm, in row 4, is the second statement."""
-    later = dict.fromkeys("pqr", GYRO | {"noise_std_deg_s": 0.2})
-    text = yaml.safe_dump(yaml.safe_load(TEXT) | {"changes": [{"at_s": 0.12, "declared_sensors": later}]})
-    head = {"text": text, "scenario_sha256": sha256(text.encode()).hexdigest()}
-    seen = made_log() | {"watch_missing": np.full(ROWS, 3.0)}
-    flap = {"what": "flap", "column": "fie_flap_excluded", "frame": 9, "as": "alarm"}
-    both = [*refused_in(seen, flap, MISSING, **head)]
-    assert both == ["flap excluded: there is no statistical alarm before"]
-    alone = [*refused_in(seen, flap, **head)]
-    assert alone == ["the declared error of gyro p is not that of the scenario"]
-
-
-def test_what_a_certificate_states_in_sentences():
-    document = {"statements": [
-        {"what": None, "frame": 1, "terms": [], "theta": "any", "sides": [0.12345678, 0.0987654]},
-        {"what": None, "frame": 2, "test": "V", "looks": [], "sides": [12.0, 3.5]},
-        {"what": None, "frame": 2, "missing": [7], "sides": [1.0, 0.0]},
-        {"what": None, "frame": 3, "likelihood": "x", "sides": [[7.5, 0.9], [6.25, 0.8]]},
-        {"what": "flap", "frame": 3, "as": "alarm"},
-        {"what": "flap", "frame": 4, "theta": "constant", "terms": [], "sides": [2.0, 1.0]},
-        {"what": "flap bias that grows", "frame": 4, "theta": "course", "bounds": [], "sides": [[1], [0]]},
-        {"what": "flap creep", "frame": 5, "theta": "any", "terms": [], "sides": [3.0, 2.0]},
-    ]}  # fmt: skip
-    log = {"t_s": np.arange(6) / 8}
-    assert [*checker.sentences(document, log)] == [
-        "alarm at 0.125 s (row 1): 0.1235 rad/s is more than 0.09877 rad/s, the most that bounds allow",
-        "alarm at 0.250 s (row 2): 12 is more than 3.5, the most that bounds allow",
-        "alarm at 0.250 s (row 2): instrument 7 gave no reading",
-        "alarm at 0.375 s (row 3): evidence 7.5 is more than 6.25 at the declared rate of false alarms",
-        "flap excluded at 0.375 s (row 3): the statistical alarm came on axes that this fault does not move",
-        "flap excluded at 0.500 s (row 4): 2 is more than 1, the most that bounds allow",
-        "flap bias that grows excluded at 0.500 s (row 4): the surface moved as this type cannot",
-        "flap creep excluded at 0.625 s (row 5), creep being what the log defines: 3 rad/s is more than "
-        "2 rad/s, the most that bounds allow",
-    ]
 
 
 def test_a_level_is_that_of_a_test_in_each_frame_at_the_declared_rate():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc_assurance.certificates import chance, check_certificate
-from beaver_ftc_assurance.certificates.check_certificate import Refused, check_declared, check_statement_form
+from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form
 from telling import numbers
 
 EVENT = {"what": "flap", "column": "fie_flap_excluded", "frame": 44}
@@ -87,42 +87,6 @@ def test_fields_that_go_together(gone):
         check_statement_form(SUM | {"terms": [term]})
 
 
-DECLARED = check_certificate.Declared(
-    0.02, 3, {"p": (0.03, 0.01, 0.2), "q": (0.05, 0.02, 0.0), "r": (0.07, 0.0, 0.1)},
-    {"p": 0.11, "q": 0.12, "r": 0.13}, {"p": 0.5, "q": 0.0, "r": 0.6}, 0, {},
-)  # fmt: skip
-ABOUT = {
-    "dt_s": 0.02, "instants": 3, "omega_E": check_certificate.EARTH_RATE_RAD_S,
-    "declared": {
-        "c": {"p": 0.4}, "b": {"p": 0.11, "q": 0.12, "r": 0.2}, "g": {"p": 1.0, "q": 1.5, "r": 2.0},
-        "o": {"p": 0.03, "q": 0.05, "r": 0.07}, "B": {"p": 0.01}, "m": {"p": 0.2, "r": 0.1},
-    },
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("place", "value", "says"), [
-    ("declared.o.p", 0.0301, "the declared error of gyro p"), ("declared.m.r", 0.11, "error of gyro r"),
-    ("declared.B.p", 0.011, "error of gyro p"), ("declared.B.r", 0.01, "error of gyro r"),
-    ("declared.c.q", 0.1, "c on q: the scenario declares none"), ("declared.b.r", 0.129, "b on r is smaller"),
-    ("declared.g.q", 0.99, "g on q is not allowed"), ("omega_E", 0, "g on p is not allowed"),
-    ("omega_E", 7.3e-5, "omega_E is not the Earth's rate"), ("dt_s", 0.01, "dt_s is not the frame"),
-    ("instants", 2, "instants: not those"), ("declared.c.p", -0.1, "c is not allowed"),
-    ("declared.m.p", 1.0, "m is not allowed"), ("declared.g.x", 1.0, "g is not allowed"),
-])  # fmt: skip
-def test_what_a_scenario_does_not_declare_is_refused(place, value, says):
-    check_declared(ABOUT, DECLARED)
-    check_declared({"declared": ABOUT["declared"] | {"B": {}}}, DECLARED)  # a bias may be counted as noise
-    with pytest.raises(Refused, match=says):
-        check_declared(altered(ABOUT, place, value), DECLARED)
-
-
-def test_a_constant_error_is_no_larger_than_the_whole_one():
-    larger = copy.deepcopy(DECLARED)
-    larger.gyro_errors["p"] = (0.03, 0.04, 0.2)
-    with pytest.raises(Refused, match="gyro p: the constant error is larger than the whole error"):
-        check_declared(altered(ABOUT, "declared.B.p", 0.04), larger)
-
-
 def test_what_a_scenario_declares_from_a_row_on():
     """Noise cut off at 4 standard deviations, bias, half a step of the resolution: 0.1, 0.03, 0.02 of p."""
     gyro = {"noise_std_deg_s": 0.1, "bias_deg_s": -0.03, "quantum_deg_s": 0.04, "scale_error": -0.2}
@@ -172,15 +136,3 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     np.testing.assert_allclose(sums, [*ours.totals, ours.calm_prediction], rtol=1e-7)
     assert room == pytest.approx(min(ours.room_by_swings, ours.room_by_change_rate), rel=1e-6)
     assert (ours.room_by_change_rate < ours.room_by_swings) == (pace < 1.0)
-
-
-@pytest.mark.parametrize(
-    ("values", "found"),
-    [([np.nan, 0.25, 0.25], 0.25), ([-1.5], -1.5), ([0.25, 0.5], None), ([np.nan, np.inf], None), ([], None)],
-)
-def test_a_constant_of_the_log_is_one_number_in_the_rows_that_say_it(values, found):
-    if found is None:
-        with pytest.raises(Refused, match="a column that must be constant is not"):
-            check_certificate.constant_value(values)
-    else:
-        assert check_certificate.constant_value(values) == found

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
@@ -12,9 +11,7 @@ from pyarrow import csv, parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import readers, samples
-from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.readers import read_flight, read_parts
-from beaver_ftc_logs.vehicle import load_vehicle
+from beaver_ftc_logs.readers import read_parts
 from products.logs import synthetic
 
 _PEAK = """
@@ -46,23 +43,6 @@ def write(path, columns):
     return path
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_parts_hold_every_row_once_and_a_tenth_again(tmp_path, parted, monkeypatch, suffix):
-    monkeypatch.setattr("beaver_ftc_logs.readers.text._BLOCK_BYTES", 9000)
-    monkeypatch.setattr("beaver_ftc_logs.readers.table._BATCH_ROWS", 70)
-    path = write(tmp_path / f"long.{suffix}", synthetic.fly(240.0))
-    whole, parts = read_flight(path).columns["q_rad_s"], list(read_parts(path, columns=["q_rad_s"]))
-    assert [part.name for part in parts] == [f"long-part-{k}" for k in range(1, len(parts) + 1)]
-    assert len(parts) == 5
-    columns = [part.columns["q_rad_s"] for part in parts]
-    new = [0, *(50 for _ in columns[1:])]
-    np.testing.assert_array_equal(
-        np.concatenate([one.values[k:] for one, k in zip(columns, new, strict=True)]), whole.values
-    )
-    for one, other in pairwise(columns):
-        np.testing.assert_array_equal(one.t_s[-50:], other.t_s[:50])
-
-
 def test_what_is_wrong_is_said_by_its_row_in_the_file(tmp_path, parted, monkeypatch):
     monkeypatch.setattr("beaver_ftc_logs.readers.text._BLOCK_BYTES", 9000)
     path = write(tmp_path / "long.csv", synthetic.fly(240.0))
@@ -81,18 +61,6 @@ def test_what_is_wrong_is_said_by_its_row_in_the_file(tmp_path, parted, monkeypa
     assert [note for note in notes if note] == [
         "p_rad_s: 1 cell holds no number, the first in row 1501: 'ERR'"
     ]
-
-
-def test_parts_say_what_the_whole_says(tmp_path, parted, wing, wing_model):
-    columns = synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5)
-    path = write(tmp_path / "long.csv", columns)
-    whole = diagnose(samples.resample(read_flight(path), wing), wing_model)
-    for part in samples.stream_flights([path], wing):
-        rows = diagnose(part, wing_model)
-        settled = rows.t_s > rows.t_s[0] + 25.0
-        known = np.searchsorted(whole.t_s, rows.t_s[settled])
-        assert (rows.isolated_surfaces[settled] == whole.isolated_surfaces[known]).mean() > 0.97
-        assert np.abs(rows.effectiveness[settled] - whole.effectiveness[known]).mean() < 0.1
 
 
 def peak_mb_of_check(path, vehicle):
@@ -120,29 +88,3 @@ def test_memory_does_not_grow_with_the_log(tmp_path):
         peaks_mb.append(peak_mb)
         assert "gaps: 1, the longest of 1e+06 s" in says
     assert peaks_mb[1] < peaks_mb[0] + 60.0
-
-
-@pytest.fixture
-def parted_log(tmp_path, monkeypatch):
-    """A ULog of 2400 rows at 10 Hz in parts of 500 samples, whose vehicle file may say a lower rate."""
-    pytest.importorskip("pyulog")
-    monkeypatch.setattr(readers, "SAMPLES_PER_PART", 500)
-    columns = synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5)
-    return synthetic.write_ulog(tmp_path / "long.ulg", columns, "RATE")
-
-
-def wing_of_topic(tmp_path, further_keys=""):
-    (tmp_path / "wing.yaml").write_text(synthetic.vehicle("RATE") + further_keys)
-    return load_vehicle(tmp_path / "wing.yaml")
-
-
-def test_parts_of_a_ulog_say_what_the_whole_says(tmp_path, parted_log, wing_model):
-    vehicle = wing_of_topic(tmp_path)
-    whole = diagnose(samples.resample(samples.read_vehicle_columns(parted_log, vehicle), vehicle), wing_model)
-    parts = list(samples.stream_flights([parted_log], vehicle))
-    assert len(parts) == 5
-    for part in parts:
-        rows = diagnose(part, wing_model)
-        settled = rows.t_s > rows.t_s[0] + 25.0
-        known = np.searchsorted(whole.t_s, rows.t_s[settled])
-        assert (rows.isolated_surfaces[settled] == whole.isolated_surfaces[known]).mean() > 0.97

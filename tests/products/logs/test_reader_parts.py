@@ -1,7 +1,5 @@
 """What the readers make of small files: every column, event and refusal."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -64,15 +62,6 @@ def test_what_is_no_flight_of_alfa(tmp_path):
     (tmp_path / "file.csv").write_text("")
     with pytest.raises(BadInput, match="is a file, allowed: a folder of the ALFA"):
         alfa.read(tmp_path / "file.csv")
-
-
-@pytest.mark.parametrize("module", ["pyulog", "pymavlink"])
-def test_without_its_extra_a_log_says_what_to_install(tmp_path, monkeypatch, module):
-    monkeypatch.setitem(sys.modules, module, None)
-    path = tmp_path / ("a.ulg" if module == "pyulog" else "a.bin")
-    path.write_bytes(b"x")
-    with pytest.raises(BadInput, match=rf"needs {module}, allowed: pip install 'beaver-ftc\[flights\]'"):
-        read_flight(path)
 
 
 NAN = np.nan

@@ -13,19 +13,6 @@ from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_a_table_comes_back_as_it_was_written(tmp_path, suffix):
-    columns = synthetic.fly(10.0)
-    columns["left_effectiveness"][:5] = np.nan
-    write = {"csv": synthetic.write_csv, "parquet": synthetic.write_parquet}[suffix]
-    recording = read_flight(write(tmp_path / f"flight.{suffix}", columns))
-    assert recording.name == "flight"
-    for name, values in columns.items():
-        if name != "t_s":
-            np.testing.assert_array_equal(recording.columns[name].values, values)
-            np.testing.assert_array_equal(recording.columns[name].t_s, columns["t_s"])
-
-
 def test_an_alfa_folder(tmp_path):
     folder = synthetic.write_alfa(tmp_path / "carbonZ_left_aileron_failure", failure_s=40.0)
     recording = read_flight(folder)
@@ -75,14 +62,6 @@ def test_a_path_that_is_no_log(tmp_path, name, says):
         read_flight(tmp_path / name)
 
 
-def test_a_log_without_a_named_column(tmp_path, wing):
-    columns = synthetic.fly(20.0)
-    del columns["roll_command"]
-    path = synthetic.write_csv(tmp_path / "flight.csv", columns)
-    with pytest.raises(BadInput, match="no column roll_command, allowed: a log that has it"):
-        load_flights_for_fit([path], wing)
-
-
 def test_every_unusable_log_is_named(tmp_path, wing):
     with pytest.raises(BadInput) as error:
         load_flights_for_fit([tmp_path / "a.csv", tmp_path / "b.csv"], wing)
@@ -103,54 +82,6 @@ def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
     assert samples.held_age_s["p_rad_s"] == pytest.approx(0.025)
     late = np.sin(samples.t_s - 0.02)  # five stamps, 0 to 0.04 s old
     np.testing.assert_allclose(samples.rates[5:, 0], late[5:], atol=2e-3)
-
-
-def test_a_ulog_comes_back_as_it_was_written(tmp_path):
-    pytest.importorskip("pyulog")
-    columns = synthetic.fly(10.0)
-    recording = read_flight(synthetic.write_ulog(tmp_path / "flight.ulg", columns))
-    for name in ("p_rad_s", "roll_command"):
-        read = recording.columns[f"vehicle_rates.{name}"]
-        np.testing.assert_allclose(read.t_s, columns["t_s"], atol=1e-6)
-        np.testing.assert_array_equal(read.values, columns[name])
-
-
-def test_an_ardupilot_log_comes_back_as_it_was_written(tmp_path):
-    pytest.importorskip("pymavlink")
-    columns = synthetic.fly(10.0)
-    recording = read_flight(synthetic.write_ardupilot(tmp_path / "flight.log", columns))
-    read = recording.columns["RATE.roll_command"]
-    np.testing.assert_allclose(read.t_s, columns["t_s"], atol=1e-6)
-    np.testing.assert_array_equal(read.values, columns["roll_command"])
-
-
-@pytest.mark.parametrize(("name", "module"), [("a.ulg", "pyulog"), ("a.bin", "pymavlink")])
-def test_a_damaged_log_says_so(tmp_path, name, module):
-    pytest.importorskip(module)
-    (tmp_path / name).write_bytes(b"not a log of any kind")
-    with pytest.raises(BadInput, match=r"is no .* that can be read|holds no message"):
-        read_flight(tmp_path / name)
-
-
-def test_a_log_in_another_format_gives_the_same_samples(tmp_path, wing):
-    pytest.importorskip("pyulog")
-    columns = synthetic.fly(20.0)
-    text = synthetic.VEHICLE
-    for name in ("p_rad_s", "q_rad_s", "r_rad_s", "roll_command", "pitch_command"):
-        text = text.replace(f": {name}", f": vehicle_rates.{name}").replace(
-            f"[{name}", f"[vehicle_rates.{name}"
-        )
-    text = text.replace(", pitch_command]", ", vehicle_rates.pitch_command]")
-    for name in ("roll_command", "pitch_command"):
-        text = text.replace(f"{{{name}:", f"{{vehicle_rates.{name}:").replace(
-            f" {name}: ", f" vehicle_rates.{name}: "
-        )
-    (tmp_path / "px4.yaml").write_text(text)
-    path = synthetic.write_ulog(tmp_path / "flight.ulg", columns)
-    one = load_flights_for_fit([path], load_vehicle(tmp_path / "px4.yaml"))[0]
-    other = load_flights_for_fit([synthetic.write_csv(tmp_path / "flight.csv", columns)], wing)[0]
-    np.testing.assert_array_equal(one.commands, other.commands)
-    np.testing.assert_array_equal(one.rates, other.rates)
 
 
 @pytest.mark.parametrize("number", ["I", "C", "Instance"])

@@ -5,7 +5,6 @@ import pytest
 
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import Plant
 from beaver_ftc_aircraft.derive import first_use, fit
 from kept import in_short
@@ -29,33 +28,6 @@ def test_declared_is_the_files_error_beside_what_every_scenario_adds():
         for b, level in zip(samples.box, samples.level, strict=True)
     ]
     assert first_use._declared(mapped, samples) == pytest.approx(every + np.array(of_map))
-
-
-def test_the_worst_state_of_an_axis_is_said_with_what_is_declared_there():
-    plain = aircraft()
-    samples = states(plain, n=60, signals=())
-    assert list(first_use._lines(plain, samples)) == []
-    beside = np.zeros((60, 3))
-    beside[:, 1] = 0.02
-    off = moving(plain, samples, beside)
-    errors, declared = fit.errors_of(plain, off), first_use._declared(plain, off)
-    worst = int((errors - declared)[:, 1].argmax())
-    alpha, beta, V = off.y[worst, :3]
-    (line,) = first_use._lines(plain, off)
-    assert line == (
-        f"q: the terms are {errors[worst, 1]:.2g} rad/s2 off trainer.xml at {V:.3g} m/s, angle of attack "
-        f"{np.degrees(alpha):.1f}, sideslip {np.degrees(beta):.1f} deg; {declared[worst, 1]:.2g} is declared"
-        ", so alarms without a fault are possible; `beaver-ftc derive` measures what to declare"
-    )
-    nobody = off.at(np.zeros(60, bool))
-    assert list(first_use._lines(plain, nobody)) == []
-
-
-def test_nothing_is_promised_of_what_is_no_aircraft(monkeypatch, tmp_path, capsys):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.raises(BadInput, match="no such aircraft"):
-        first_use.derive_if_needed("jsbsim:nothing")
-    assert capsys.readouterr().err == ""
 
 
 def test_states_are_drawn_over_the_envelope_from_engines_just_started(changed):

@@ -1,7 +1,5 @@
 """The table of thrust of an aircraft whose force is its setting, newton for newton."""
 
-from dataclasses import replace
-from math import nan
 from types import SimpleNamespace
 
 import pytest
@@ -32,12 +30,6 @@ def test_each_force_is_its_setting_at_every_airspeed(measured):
     for row in found["force_n"]:
         assert row == pytest.approx(found["setting"], rel=5e-3, abs=1.0)  # it flies 0.1 s meanwhile
     assert found["lag_s"] <= 0.1
-
-
-def test_the_plant_is_left_in_trim(measured):
-    _, _, plant, point = measured
-    assert plant.read("velocities/vt-fps") * 0.3048 == pytest.approx(50.0, abs=1e-6)
-    assert plant.read(plant.aircraft.trim.throttle) == point.settings["thrust_n"]
 
 
 class Turbine:
@@ -145,28 +137,3 @@ def test_an_engines_share_and_arms_are_what_its_own_lever_changes():
     assert set(map(id, [*jet.put, *jet.held])) == {id(TRIM)}
     assert (len(jet.put), jet.put[-1]) == (7, TRIM)
     assert (len(jet.held), jet.runs) == (6 * 60, 6 * 60 * 5)  # 6 s of each, put back each tenth of a second
-
-
-def test_the_table_of_thrust_is_what_power_adds_at_each_airspeed():
-    """1000 lbf of all engines, over airspeed in 100 m/s, above the least setting; the drag is not theirs."""
-    jet = Jet()
-    found = thrust_of(jet, TRIM)
-    assert found["airspeed_mps"] == [40.0, 50.0, 60.0, 70.0, 80.0]
-    assert found["setting"] == pytest.approx([0.1, 0.26, 0.42, 0.58, 0.74, 0.9])
-    for V, row in zip(found["airspeed_mps"], found["force_n"], strict=True):
-        added = [(setting - 0.1) * 1000.0 * 100.0 / V * LBF_N for setting in found["setting"]]
-        assert row == pytest.approx(added, rel=5e-5)  # five digits
-    assert jet.put[:5] == [replace(TRIM, airspeed_mps=V) for V in found["airspeed_mps"]]
-    assert jet.put[5:] == [TRIM, TRIM]
-    assert found["lag_s"] == 0.0  # they push at once
-
-
-def test_power_that_takes_thrust_away_counts_as_what_less_power_gives(monkeypatch):
-    monkeypatch.setattr(Jet, "PUSH_LBF", (310.0, 170.0, -900.0))
-    assert {force for row in thrust_of(Jet(), TRIM)["force_n"] for force in row} == {0.0}
-
-
-@pytest.mark.parametrize("jet", [Jet(power=None), Jet(mass_kg=nan)])
-def test_of_no_power_or_no_mass_there_is_no_table(jet):
-    assert thrust_of(jet, TRIM) is None
-    assert jet.put == []

@@ -21,7 +21,6 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.studies.detectability import engine_failures, of_engines
 from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive
@@ -129,13 +128,6 @@ def test_what_they_cannot_give_is_not_integrated(jet):
     assert given[-1] == pytest.approx(most, rel=1e-3)
     back = answer(control, -most, 1.0, 400)
     assert back[-1] < 0.0
-
-
-def test_without_engines_as_effectors_nothing_is_moved():
-    record = np.zeros(1, engines.ENGINES)[0]
-    engines.configure_engines(record, Declared.of(bf.load("fault-free")))
-    assert record["config"]["n"] == 0
-    assert not record["config"]["B"].any()
 
 
 def lost(surface):
@@ -259,28 +251,3 @@ def test_a_wrong_file_is_refused_in_a_line(jet, tmp_path, change, says):
 def test_one_engine_in_the_middle_is_no_effector(tmp_path):
     with pytest.raises(BadInput, match="do not yaw it"):
         derive("jsbsim:c172p", tmp_path, engines=True)
-
-
-def test_detectability_says_how_an_engine_at_idle_turns_the_aircraft(jet):
-    """As JSBSim has it: its engines' yawing moment, one failed, over the inertia; the model knows it, too."""
-    given = scenario(jet, fdi={"bounds": {"constant_rad_s2": dict.fromkeys("pqr", 0.0)}})
-    (left, right), aircraft = engine_failures(given), given.airframe
-    plant = Plant(100, aircraft=aircraft)
-    point = trim(given.initial.airspeed_mps, given.initial.altitude_m, plant=plant)
-    plant.start(point)
-    plant.write("failures/engine-0-at-idle", 1.0)
-    for _ in range(1500):
-        plant.hold(point)
-        plant.run()
-    yawing = plant.read("moments/n-prop-lbsft") * N_PER_LBF * 0.3048 / aircraft.mass.Iz_kg_m2
-    assert left["turns_rad_s2"][YAW] == pytest.approx(-yawing, rel=0.05)
-    assert left["turns_rad_s2"] == pytest.approx(right["turns_rad_s2"], rel=1e-3)
-    assert left["known"]
-    assert left["shows"] > 10.0
-    known = "the design model knows its moment"
-    assert of_engines([left])[0].endswith(f"{known} and monitors it against the thrust")
-    assert of_engines([left | {"held": False}])[0].endswith(known)
-
-
-def test_of_an_aircraft_without_effectors_it_says_nothing_on_engines():
-    assert engine_failures(bf.load("fault-free")) == []

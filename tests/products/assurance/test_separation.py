@@ -140,30 +140,6 @@ def test_where_a_surface_already_tells_it_is_held():
     assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
 
 
-def test_the_text_has_a_line_for_each_two_candidates():
-    jam, bias, lost = (
-        {"surface": s, "type": kind}
-        for s, kind in (("flap", "stuck"), ("rudder", "bias"), ("aileron", "float"))
-    )
-    one = {"candidates": [jam, bias], "separates": True, "time_s": 0.125, "amplitude_deg": 2.0}
-    one |= {"commands_rad": {"rudder": [], "aileron": []}}
-    none = {"candidates": [bias, lost], "separates": False, "because": "there is no room"}
-    pairs = [one, one | {"left": []}, one | {"left": [jam], "commands_rad": {"flap": []}}]
-    pairs += [one | {"left": [bias, jam], "amplitude_deg": 2e-9}, none]
-    both = "  flap stuck or rudder bias: "
-    document = {"scenario": "mine", "time_s": 1.5, "assumes": "it stays", "pairs": pairs}
-    assert as_text(document | {"not_constant": ["elevator drift", "flap slow"]}).splitlines() == [
-        "mine, 1.5 s: if it stays",
-        f"{both}rudder and aileron by 2 deg, told after 0.125 s",
-        f"{both}rudder and aileron by 2 deg, told after 0.125 s; flown, left: neither",
-        f"{both}flap by 2 deg, told after 0.125 s; flown, left: flap stuck",
-        f"{both}rudder and aileron by 2e-09 deg, told after 0.125 s; flown, left: rudder bias and flap stuck",
-        "  rudder bias or aileron float: none: there is no room",
-        "  a course over many frames tells: elevator drift, flap slow",
-    ]
-    assert "course" not in as_text(document | {"not_constant": []})
-
-
 def test_a_limit_on_the_rates_can_leave_none():
     pair = tell_apart(
         Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES

@@ -180,28 +180,6 @@ def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
             by_aircraft._log_rate_hz(samples)
 
 
-def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
-    """Commands and labels of a file that names them the other way round; at any airspeed as they are."""
-    recording, vehicle = log
-    names = list(bf.aircraft("beaver").surfaces)
-    plain = by_aircraft.read_inputs(recording, vehicle, BEAVER)
-    t_s = recording.columns["p_rad_s"].t_s
-    truth = {f"{name}_truth": Column(t_s, np.full(len(t_s), 0.2 * k + 0.1)) for k, name in enumerate(names)}
-    labelled = RecordedFlight(recording.name, recording.columns | truth)
-    turned = without(
-        vehicle,
-        surfaces=dict(reversed(vehicle.model_dump(exclude_unset=True)["surfaces"].items())),
-        labels={name: f"{name}_truth" for name in names},
-        reference_airspeed_mps=20.0,
-    )
-    found = by_aircraft.read_inputs(labelled, turned, BEAVER)
-    np.testing.assert_array_equal(found.samples.commands, plain.samples.commands)
-    np.testing.assert_allclose(found.samples.labels, np.tile([0.1, 0.3, 0.5, 0.7], (len(t_s), 1)))
-    for one, other in zip(found.input_arrays, plain.input_arrays, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert (found.rate_hz, found.gap_free_stretches) == (100.0, [(0, len(t_s))])
-
-
 def test_a_log_too_slow_or_uneven_is_refused(log):
     recording, vehicle = log
     with pytest.raises(
@@ -289,21 +267,6 @@ PLANE = SimpleNamespace(
     envelope=SimpleNamespace(airspeed_mps=(20.0, 50.0)), alpha_rad=(-0.1, 0.3), surfaces=("aileron",),
     travel={"aileron": SimpleNamespace(min_rad=-0.4, max_rad=0.2)},
 )  # fmt: skip
-
-
-def true(mask):
-    return np.flatnonzero(mask).tolist()
-
-
-def test_what_is_at_a_limit_of_the_envelope_is_inside():
-    airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
-    signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
-    found = by_aircraft._doubtful_rows_of(signals, PLANE, np.arange(6) == 5, [(1, 5)])
-    assert {says: true(mask) for says, mask in found.items()} == {
-        "a number is missing": [5], "samples are not evenly spaced": [0],
-        "airspeed is outside 20 to 50 m/s": [0, 3],
-        "angle of attack is outside -0.1 to 0.3 rad": [3, 4],
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [

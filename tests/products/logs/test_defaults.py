@@ -1,17 +1,11 @@
 """What is assumed where a vehicle file says nothing of laws and air; evidence in other noise; groups."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import small
 
-from beaver_ftc_logs.diagnose import (
-    _add_unknown_surfaces,
-)
 from beaver_ftc_logs.filtering import recent_scale
 from beaver_ftc_logs.identification import assume_law_and_air
-from beaver_ftc_logs.model import FittedRanges
 
 BARE = {key: of for key, of in small.WING.items() if key != "labels"}
 RNG = np.random.default_rng(5005)
@@ -45,15 +39,3 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
     cut = recent_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
     assert np.allclose(cut, scale[:500])
-
-
-def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
-    model = small.model(fitted=FittedRanges(commands=[], rates=[], tied=[1.0, 0.0]).model_dump(by_alias=True))
-    rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
-    flown = small.flight(model, n=60)
-    still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {"left"}
-    found = _add_unknown_surfaces(flown, model, rows)
-    assert set(found.isolated_surfaces[20:]) == {"right+left"}
-    assert (found.effectiveness_high[20:] == 1.0).all()
-    assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])

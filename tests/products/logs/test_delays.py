@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import build_bank
-from kept import in_short
 from products.logs import small
 
 DELAYS_S = [-0.03, 0.0, 0.04]
@@ -38,22 +36,3 @@ def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
         np.testing.assert_allclose(found[:, k], np.exp(total) / np.exp(total).sum(), rtol=1e-9)
     huge = filtering._model_weights([1000.0 * np.ones(3), np.ones(3)], 2.0)
     np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)
-
-
-def test_what_all_delays_say_together(changed):
-    """The mean of what each alone does, by its weight, sample by sample."""
-    samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), build_bank(MODEL)
-    together = filtering.bank_posterior(samples, MODEL, bank)
-    runs = [
-        filtering._run_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
-        for delay_s in DELAYS_S
-    ]
-    weights = filtering._model_weights([run[3] for run in runs], 10.0)
-    for part, found in enumerate(together):
-        each = np.stack([run[part] for run in runs])
-        weight = weights.reshape(*weights.shape, *[1] * (each.ndim - 2))
-        np.testing.assert_allclose(found, (weight * each).sum(axis=0), atol=1e-12)
-    np.testing.assert_allclose(together[0].sum(axis=1), 1.0)
-    assert not changed(
-        {"posterior": in_short(together[0]), "state": together[1][-1], "scale": together[2][::30]}
-    )

@@ -5,8 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes
-from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.filtering import fault_evidence, page_cusum
+from beaver_ftc_logs.filtering import page_cusum
 from beaver_ftc_logs.vehicle import with_alarm_rate
 from products.logs import small
 
@@ -72,27 +71,6 @@ def test_peaks_are_of_stretches_above_zero():
     values = np.array([0.0, 1.0, 3.0, 0.0, 0.0, 2.0, 0.0, 4.0, 5.0])
     assert extremes.peaks_between_zeros(values).tolist() == [3.0, 2.0, 5.0]
     assert page_cusum(np.array([1.0, 2.0, -4.0, -1.0, 2.0, 9.0]), 6.0).tolist() == [1, 3, 0, 0, 2, 6]
-
-
-def test_the_evidence_is_what_changes_alone_do_not_bring():
-    """Where the probability of a fault is what the changes of a sample make of the last, there is none; where
-    its odds are tenfold that, log 10."""
-    bank = build_bank(small.model(small.TAIL))
-    first = float(bank.prior_probability[bank.is_fault_hypothesis].sum())
-    change = bank.change_probability_per_sample * float(
-        bank.transition_share[bank.is_fault_hypothesis].sum() / bank.transition_share.sum()
-    )
-    second = (1.0 - bank.change_probability_per_sample) * first + change
-    odds = (
-        10.0
-        * ((1.0 - bank.change_probability_per_sample) * second + change)
-        / (1.0 - ((1.0 - bank.change_probability_per_sample) * second + change))
-    )
-    posterior = np.zeros((3, len(bank.transition_share)))
-    place = int(np.flatnonzero(bank.is_fault_hypothesis)[0])
-    posterior[:, place] = first, second, odds / (1.0 + odds)
-    posterior[:, 0] = 1.0 - posterior[:, place]
-    np.testing.assert_allclose(fault_evidence(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 1001.0, float("nan")])

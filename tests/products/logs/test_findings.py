@@ -1,8 +1,5 @@
 """What a verdict says, of rows and flights made by hand."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -135,18 +132,6 @@ def _white_responses(samples, model):
     return answers[ok] @ root.T
 
 
-@pytest.mark.parametrize(("share", "separable"), [(0.899, True), (0.901, False)])
-def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
-    """Answers of the second group: as much of the first's as the share says, the rest at right angles."""
-    noise = np.eye(3).tolist()
-    response = [[[1.0, 0.0, 0.0]], [[share, float(np.sqrt(1.0 - share**2)), 0.0]]]
-    model = small.model(lags=1, response=response, response_sd=response, noise=noise)
-    samples = small.flight(small.model(), 60)
-    (pair,) = isolability_document(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
-    assert pair["cosine"] == pytest.approx(share)
-    assert pair["separable"] is separable
-
-
 def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
     """Half of the square of the loss times the information; a complete loss is one."""
     assert findings._smallest_losses(0.5, 5.0) == {
@@ -155,13 +140,3 @@ def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
         "60": pytest.approx(3.0**-0.5),
     }
     assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
-
-
-def test_odds_against_a_change_are_those_of_its_median_share():
-    weight = np.array([0.5, 0.2, 0.1, 0.3])
-    bank = SimpleNamespace(
-        transition_share=weight, is_fault_of_group=lambda group: np.arange(4) % 2 == (1 if group else 5)
-    )
-    model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._alarm_odds(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
-    assert findings._alarm_odds(model, bank, 0, 0.1) == np.inf

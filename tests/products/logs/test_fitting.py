@@ -11,7 +11,6 @@ from beaver_ftc_logs.samples import Samples
 from products.logs import small
 
 MODEL = small.model()
-TAIL = small.model(small.TAIL)
 LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
 
 
@@ -57,49 +56,6 @@ def test_what_follows_a_failure_is_not_fitted():
     assert np.flatnonzero(fitting.usable_mask(samples)).tolist() == list(range(8))
 
 
-def by_hand(samples, vehicle, history, lags):
-    """Regressors and rates of one flight, row by row, where there is past enough for the largest order."""
-    groups = regression.group_surfaces(vehicle)
-    left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    rows, rates = [], []
-    for k in np.flatnonzero(fitting.usable_mask(samples)):
-        reach = max(history, lags)
-        if k < 6 or samples.stretch_number[k - reach] != samples.stretch_number[k]:
-            continue
-        past = [samples.rates[k - j] for j in range(1, history + 1)]
-        moved = [
-            sum(samples.commands[k - j, i] * left[k - j, i] for i in group)
-            for group in groups
-            for j in range(1, lags + 1)
-        ]
-        rows.append(np.concatenate([[1.0], *past, samples.signals[k - 1], moved]))
-        rates.append(samples.rates[k])
-    return np.array(rows), np.array(rates)
-
-
-@pytest.mark.parametrize(("model", "history", "lags"), [(MODEL, 2, 3), (TAIL, 3, 2), (MODEL, 1, 6)])
-def test_regressors_of_several_flights_stand_in_a_row(model, history, lags):
-    flights = [
-        small.flight(model, 180, gap=110, lost=((0, 50, 90, 0.3),)),
-        small.flight(model, 120, seed=2, lost=((1, 40, 80, 0.6),)),
-    ]
-    x, y, run = fitting.stack_data(fitting.fit_parts(flights), model.vehicle, history, lags)
-    parts = [by_hand(flight, model.vehicle, history, lags) for flight in flights]
-    np.testing.assert_allclose(x, np.vstack([part[0] for part in parts]), atol=1e-14)
-    np.testing.assert_allclose(y, np.vstack([part[1] for part in parts]), atol=0)
-    assert run[len(parts[0][0]) - 1] < run[len(parts[0][0])]
-    assert (np.diff(run) >= 0).all()
-
-
-def test_a_stretch_ends_where_a_sample_is_left_out():
-    samples = small.flight(MODEL, 60)
-    use = np.ones(60, dtype=bool)
-    use[[20, 40, 41]] = False
-    _, y, run = fitting.stack_data([FitPart(samples, use)], MODEL.vehicle, 2, 3)
-    assert np.unique(run, return_counts=True)[1].tolist() == [14, 19, 18]
-    assert len(y) == 51
-
-
 def score(usable_flights, vehicle, order):
     """The Bayesian information criterion of an order, of its own fit."""
     x, y, _ = fitting.stack_data(usable_flights, vehicle, *order)
@@ -119,20 +75,6 @@ def test_the_order_is_the_one_of_the_least_criterion(of, true):
     assert found == min(ORDERS, key=lambda order: score(usable_flights, model.vehicle, order))
     if of is small.WING:
         assert found == true
-
-
-def test_columns_of_an_order():
-    """One, the past, the signal, then the lags of each group, of 1 + 12 + 1 + 6 + 6."""
-    assert fitting._order_columns(TAIL.vehicle, 4, 6) == list(range(26))
-    assert fitting._order_columns(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
-    moving = small.vehicle(
-        small.TAIL | {"moving_air": True}
-    )  # as many lags of the signal: 1 + 12 + 4 + 6 + 6
-    assert fitting._order_columns(moving, 4, 6) == list(range(29))
-    assert fitting._order_columns(moving, 2, 3) == [
-        *range(7), 13, 14, 17, 18, 19, 23, 24, 25,
-    ]  # fmt: skip
-    assert fitting._order_columns(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
 
 
 def test_a_fit_wants_ten_samples_a_coefficient():

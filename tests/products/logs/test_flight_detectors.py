@@ -63,21 +63,6 @@ def test_least_squares_by_one_batch(name):
     assert rows.isolated_surfaces[399] == "left"
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_without_labels_a_loss_is_sure_by_five_sd(name):
-    model = small.model(settings={"trim_sd": 0.3})
-    samples = small.flight(model, 400, lost=LOST)
-    rows = detectors.diagnose_with_detector(METHODS[name], samples, model)
-    sure = []
-    for k in range(0, 400, 25):
-        value, sd = batch(samples, model, k, name == "forgetting")
-        np.testing.assert_allclose(rows.effectiveness[k], np.clip(value, 0, 1), atol=1e-9)
-        lost = [side for side, v, s in zip(("right", "left"), value, sd, strict=True) if v + 5.0 * s < 1.0]
-        assert rows.isolated_surfaces[k] == "+".join(lost)
-        sure.append(bool(lost))
-    assert 3 < sum(sure) < 14
-
-
 def logged(*columns):
     return RecordedFlight("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
 
@@ -98,16 +83,6 @@ def test_an_output_that_stands_still_for_six_seconds_is_frozen():
     np.testing.assert_array_equal(rows.fault_probability, np.array(frozen, dtype=float))
     np.testing.assert_array_equal(rows.effectiveness_low, rows.effectiveness)
     np.testing.assert_array_equal(rows.effectiveness_high, rows.effectiveness)
-
-
-def test_before_its_first_stamp_an_output_is_not_frozen():
-    samples = small.flight(TAIL, 40, dt_s=1.0, t_s=np.arange(40.0))
-    late = logged(("elevator_output", [20.0, 21.0], [1.0, 1.0]))
-    rows = detectors.diagnose_by_freeze_rule(late, samples, TAIL)
-    assert np.flatnonzero(rows.faulty).tolist() == list(range(27, 40))
-    assert set(rows.isolated_surfaces) == {"", "elevator"}
-    assert detectors.diagnose_by_freeze_rule(logged(), samples, TAIL) is None
-    assert detectors.diagnose_by_freeze_rule(late, samples, BARE) is None
 
 
 LOSS = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)

@@ -37,23 +37,6 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     assert scale_if_better([pressed(flight)], told)[1] == told
 
 
-def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch):
-    flights = [
-        replace(small.flight(MODEL, 4), airspeed=np.array(speeds))
-        for speeds in ([np.nan, 10.0, 12.0, 90.0], [11.0, np.nan, 13.0, 30.0])
-    ]
-    asked = []
-    monkeypatch.setattr(
-        identification,
-        "scale_by_airspeed",
-        lambda one, mps, powers: asked.append(mps) or one,
-    )
-    monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
-    its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    assert scale_if_better(flights, its) == (flights, its)
-    assert asked == [12.5, 12.5]
-
-
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
     found = scale_by_airspeed(flight, 20.0)
@@ -105,11 +88,6 @@ def test_servo_lag_and_delay_are_found(changed):
 
 def _short(value):
     return {k: _short(v) for k, v in value.items()} if isinstance(value, dict) else round(float(value), 5)
-
-
-def test_a_servo_faster_than_the_rate_tells_is_said():
-    found = fit_output_error(fitting.fit_parts([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]])
-    assert found["shorter_than_can_be_told"] is True
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.04, 0.1, 0.17, 0.35])

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.fitting import usable_mask
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import constant_stretches, load_flights_for_fit
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 
@@ -44,11 +44,6 @@ def test_edges_of_labels_are_not_fitted(wing, wing_folder):
     assert not use[t_s < 5.0].any()
     assert not use[np.abs(t_s - 30.0) < 1.4].any()
     assert use[(t_s > 32) & (t_s < 38)].all()
-
-
-def test_constant_parts_cover_everything_once():
-    labels = np.array([[1.0], [1.0], [0.5], [np.nan], [np.nan], [1.0]])
-    assert constant_stretches(labels) == [(0, 2), (2, 3), (3, 5), (5, 6)]
 
 
 def test_too_short_a_flight_is_refused(wing, wing_folder):

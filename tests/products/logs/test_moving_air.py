@@ -16,24 +16,6 @@ from products.logs import small
 AVERAGE = (1.0, -1.4, 0.49)
 
 
-def test_a_whitened_flight_averages_to_what_it_was():
-    """C(z) of the filtered is C(1) times what was measured, sample by sample; a gap begins anew."""
-    flight = small.flight(small.model(small.TAIL), 80)
-    flight.rates[50] = np.nan
-    gap = replace(flight, stretch_number=(np.arange(80) >= 30).astype(np.int64))
-    found = whiten_samples(gap, AVERAGE, 1.7)
-    assert (found.noise_ma_coefficients, found.fit_weight) == (AVERAGE, 1.7)
-    assert whiten_samples(gap, list(AVERAGE)).fit_weight == 1.0
-    columns = ("rates", "commands", "signals")
-    for now, was in ((getattr(found, name), getattr(flight, name)) for name in columns):
-        again = now[2:] + AVERAGE[1] * now[1:-1] + AVERAGE[2] * now[:-2]
-        inside = np.setdiff1d(np.arange(2, 80), [30, 31, 50, 51, 52])
-        np.testing.assert_allclose(again[inside - 2], sum(AVERAGE) * was[inside], atol=1e-12)
-        np.testing.assert_array_equal(now[[0, 30, 51]], was[[0, 30, 51]])
-    assert np.isnan(found.rates[50]).all()
-    assert np.isfinite(found.rates[51:]).all()
-
-
 def flown(colour, answers, n, seed):
     """Rates that a law answers, with noise of a colour: p' = 0.9 p + 0.5 u + noise."""
     rng = np.random.default_rng(seed)
@@ -112,24 +94,6 @@ def test_bounds_lean_on_no_prior_where_laws_differ():
         np.tile(build_bank(plain).prior_probability, (50, 1)),
     )
     assert (rows.effectiveness_low > 0.9).all()
-
-
-def test_the_predictor_of_a_residual_is_found():
-    """Drawn: e[k] = 0.8 e[k-1] + w[k]. The remaining noise is that of w; few samples give no predictor."""
-    rng, size = np.random.default_rng(3), np.array([0.1, 0.2, 0.05])
-    e = np.zeros((20_000, 3))
-    w = size * rng.standard_normal(e.shape)
-    for k in range(1, len(e)):
-        e[k] = 0.8 * e[k - 1] + w[k]
-    rows = np.concatenate([np.arange(9_000), np.arange(9_500, 20_500)])
-    found = fitting._fit_noise_model([1.0], [(rows, e)])
-    before = np.reshape(found.ar_coefficients, (-1, 3, 3))
-    np.testing.assert_allclose(before[0], 0.8 * np.eye(3), atol=0.1)
-    np.testing.assert_allclose(np.diag(found.residual_covariance), size**2, rtol=0.05)
-    np.testing.assert_allclose(before[1:].sum(axis=0), 0.0, atol=0.15)
-    few = fitting._fit_noise_model([1.0], [(np.arange(100), e[:100])])
-    assert few.ar_coefficients == []
-    np.testing.assert_allclose(few.residual_covariance, np.cov(e[:100].T))
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from kept import page, picture
 from products.logs import small
 
 MODEL = small.model(settings={"alarm": 0.9})
-TAIL = small.model(small.TAIL)
 SOUND, HALF = ("", [1.0, 1.0]), ("left", [1.0, 0.5])
 
 

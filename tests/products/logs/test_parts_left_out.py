@@ -1,15 +1,13 @@
 """What the parts that a fit leaves out say of a model: by closed forms, by hand, and by another road."""
 
 from dataclasses import replace
-from itertools import pairwise, product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc_logs import fitting, trust
 from beaver_ftc_logs.fitting import FitPart
-from beaver_ftc_logs.regression import fit_ols, unexplained_rates
+from beaver_ftc_logs.regression import unexplained_rates
 from products.logs import small
 from telling import apart
 
@@ -111,85 +109,6 @@ def test_the_squares_of_gains_are_in_their_covariance_and_what_lies_between_flig
     assert fitting._error_and_rank(twice, residual, between[:2, :2])[1] == 1
 
 
-def test_the_drift_of_a_trim_from_means_that_follow_one_another(monkeypatch):
-    """Runs of 250 and 170 samples at 10 Hz have three and two means of 80, twelve and eight of 20; a jump
-    between runs is none of a trim. In sd of the noise of the flight's colour, the usual at least."""
-    rng = np.random.default_rng(3)
-    rows = np.concatenate([np.arange(250), 400 + np.arange(170)])
-    series = [
-        np.cumsum(rng.standard_normal((420, 3)), axis=0) * [0.004, 0.0, 0.002] + 5.0 * (rows > 300)[:, None]
-        for _ in range(2)
-    ]
-    sd = np.sqrt(WIDER * np.diag(HEARD))
-    flights = [FitPart(flown(n=9 + i).samples, np.ones(9 + i, dtype=bool)) for i in range(2)]
-    monkeypatch.setattr(
-        fitting,
-        "_splits",
-        lambda of: [([flights[1]], [flights[0]]), ([flights[0]], [flights[1]])],
-    )
-    monkeypatch.setattr(fitting, "refit", lambda fitted, like: like)
-    monkeypatch.setattr(
-        fitting,
-        "whitened_residual",
-        lambda like, held: (rows, series[0 if held is flights[0] else 1], None),
-    )
-    variance = {}
-    for span in (20, 80):
-        squares = []
-        for one in series:
-            for begin, end in ((0, 250), (250, 420)):
-                means = [(one[k : k + span] / sd).mean(axis=0) for k in range(begin, end - span + 1, span)]
-                squares += [(b - a) ** 2 for a, b in pairwise(means)]
-        assert len(squares) == {20: 2 * (11 + 7), 80: 2 * (2 + 1)}[span]
-        variance[span] = np.mean(squares, axis=0)
-    # 2 c / n + 2 n w / 3 of both, less one another
-    walk = 1.5 * (80 * variance[80] - 20 * variance[20]) / (80**2 - 20**2)
-    usual = [1e-4, 3e-4, 2e-4]
-    monkeypatch.setattr(fitting, "FilterSettings", lambda: SimpleNamespace(trim_step_sd=usual))
-    expected = np.maximum(np.sqrt(np.maximum(walk, 0.0)), usual)
-    assert (expected[[0, 2]] > [1e-2, 1e-2]).all()
-    assert expected[1] == 3e-4
-    np.testing.assert_allclose(fitting._estimate_trim_walk(flights, MODEL), expected)
-    rows, series = rows[:100], [one[:100] for one in series]  # no mean of 80 follows another
-    assert fitting._estimate_trim_walk(flights, MODEL) == usual
-
-
-def test_peaks_and_hours_are_of_rows_in_health_that_answer(monkeypatch):
-    """A run ends where a row is not in use, faulty or idle; the sum starts anew behind it."""
-    n = 12
-    gained = np.array([1.0, 2.0, 4.0, 8.0, -9.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0, 1024.0])
-    labels = np.ones((n, 2))
-    labels[2, 1], labels[11, 0] = 0.9, np.nan
-    use = ~np.isin(np.arange(n), [0, 7])
-    posterior = np.tile([0.6, 0.1, 0.3], (n, 1))
-    posterior[9] = 0.3, 0.2, 0.5
-    bank = SimpleNamespace(no_response_hypothesis_index=2)
-    monkeypatch.setattr(fitting, "build_bank", lambda model: bank)
-    monkeypatch.setattr(fitting, "bank_posterior", lambda *of: (posterior, None, None))
-    monkeypatch.setattr(fitting, "fault_evidence", lambda of, by: gained)
-    samples = SimpleNamespace(labels=labels, dt_s=1.5)
-    peaks, hours = fitting._healthy_peaks(MODEL, SimpleNamespace(samples=samples, is_usable=use))
-    # rows 1; 3, 4, 5, 6; 8; 10, 11
-    assert peaks.tolist() == [2.0, 8.0, 48.0, 128.0, 1536.0]
-    assert hours == pytest.approx(8 * 1.5 / 3600.0)
-
-
-def test_a_flight_weighs_in_a_fit_by_its_weight_and_time_is_that_of_most_flights():
-    one, other, slow = (small.flight(MODEL, n, seed=n) for n in (150, 170, 160))
-    flights = fitting.fit_parts(
-        [replace(one, fit_weight=0.3), replace(other, dt_s=0.125), replace(slow, dt_s=0.4)]
-    )
-    x, y, run = fitting.stack_data(flights, MODEL.vehicle, 2, 3)
-    bare = fitting.fit_parts([one])
-    plain, rates, _ = fitting.stack_data(bare, MODEL.vehicle, 2, 3)
-    np.testing.assert_allclose(x[: len(plain)], 0.3 * plain)
-    np.testing.assert_allclose(y[: len(plain)], 0.3 * rates)
-    model = fitting._model_of_order(flights, MODEL.vehicle, 2, 3)
-    assert model.rate_hz == 8.0
-    errors = fit_ols(x, y, run, 16).standard_errors[7:]  # over two seconds of them
-    assert model.response_error == errors.reshape(2, 3, 3).tolist()
-
-
 @pytest.mark.parametrize("laws", [False, True])
 def test_a_flight_that_fails_at_once_leaves_nothing_out(laws):
     """Of three flights one has no sample that is known: the settings are those of the other two."""
@@ -202,14 +121,3 @@ def test_a_flight_that_fails_at_once_leaves_nothing_out(laws):
         for of in ([*flights, idle], flights)
     )
     assert found == pytest.approx(expected)
-
-
-def test_a_flight_louder_than_all_that_were_fitted_widens_no_noise_under_other_laws():
-    """The filter does so by itself. Under the same law it does not; nor if a fitted flight was as loud."""
-    found = {}
-    for laws, fitted in product((False, True), (1.0, 100.0)):
-        model = MODEL.model_copy(update={"vehicle": MODEL.vehicle.model_copy(update={"other_laws": laws})})
-        one, other = (flown((1.0, 1.0), loud, 600, seed) for loud, seed in ((100.0, 5), (fitted, 6)))
-        found[laws, fitted] = np.mean(fitting._window_inflations(known(model, 0.3, 0.4), one, [other]))
-    assert found[False, 1.0] == found[False, 100.0] == found[True, 100.0] > 20.0
-    assert found[True, 1.0] < 3.0

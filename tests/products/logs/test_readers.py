@@ -9,21 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.recording import package_errors_as_bad_input
 from beaver_ftc_logs.samples import _latest_and_age, load_flights_for_fit
-from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
-
-
-def test_an_alfa_folder(tmp_path):
-    folder = synthetic.write_alfa(tmp_path / "carbonZ_left_aileron_failure", failure_s=40.0)
-    recording = read_flight(folder)
-    columns = recording.columns
-    assert columns["p_rad_s"].t_s[:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
-    assert columns["roll_error_rad"].t_s[0] == pytest.approx(0.02, abs=1e-6)
-    flown = synthetic.fly(60.0, seed=3, trim=(0.0, 0.0))
-    np.testing.assert_allclose(columns["roll_error_rad"].values, flown["roll_command"], atol=1e-12)
-    assert [(event.surface, round(event.t_s, 3)) for event in recording.logged_failures] == [
-        ("left_aileron", 40.0)
-    ]
 
 
 def test_a_held_column_is_never_newer_than_its_row(tmp_path):
@@ -123,24 +109,6 @@ def test_what_a_package_stumbles_over_is_one_line(tmp_path, capsys, error, reaso
     says = f"{tmp_path}: is no logbook that can be read ({reason}), allowed: a .book of a ship"
     assert str(refused.value) == says
     assert capsys.readouterr().out == ""
-
-
-@pytest.mark.parametrize("suffix", ["ulg", "bin", "log"])
-def test_a_log_without_any_wanted_column_says_which_it_has(tmp_path, suffix):
-    pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
-    path = tmp_path / f"flight.{suffix}"
-    columns = {"t_s": np.arange(3) / 10.0, "P": np.ones(3), "Q": np.ones(3)}
-    if suffix == "bin":
-        synthetic.write_dataflash(path, [("RATE", {"TimeUS": k, "P": 1.0, "Q": 1.0}) for k in range(3)])
-    else:
-        {"ulg": synthetic.write_ulog, "log": synthetic.write_ardupilot}[suffix](path, columns, "RATE")
-    for nothing in ((), ["ATT.Roll"]):
-        found = read_flight(path, columns=nothing).columns
-        assert list(found) == ["RATE.P", "RATE.Q"]
-        assert not any(column.t_s.size or column.values.size for column in found.values())
-    (tmp_path / "wing.yaml").write_text(synthetic.vehicle("ATT"))
-    with pytest.raises(BadInput, match=r"no column ATT\.p_rad_s, .* it has RATE\.P, RATE\.Q$"):
-        load_flights_for_fit([path], load_vehicle(tmp_path / "wing.yaml"))
 
 
 def dataflash_format(number, size, name, codes, fields):

@@ -25,58 +25,6 @@ SAID = [
 ]
 T_S = np.arange(len(SAID)) * 0.5
 
-# With what candidates and estimates beyond the bounds say; bounds of single faults that differ in each row.
-SAYS = [
-    *SAID,
-    Verdict(True, candidates=("flap", "elevator")),
-    Verdict(True, candidates=("elevator", "unanticipated")),
-    Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.9),
-    Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.1),
-    Verdict(True, candidates=tuple(SURFACES)),
-]
-ROW = np.arange(len(SAYS))
-ALONE = (
-    np.array([0.9, 0.5, 0.7, 0.4]) - 0.01 * ROW[:, None],
-    np.array([0.97, 0.7, 0.8, 0.95]) + 0.001 * ROW[:, None],
-)
-BOUNDS = {  # low and high of each row
-    "aileron": ([0.9, 0, 1, 1, 1, 0.85, 0, 1, 0, 1, 1, 0.79], [1, 1, 1, 1, 1, 0.975, *[1] * 6]),
-    "elevator": (
-        [0.5, 0, 0.48, 1, 1, 1, 0, 0.43, 0, 0.41, 0.4, 0.39], [1, 1, 0.702, 1, 1, 1, 1, 1, 1, 0.709, 0.71, 1],
-    ),
-    "rudder": ([0.7, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0.59], [1] * 12),
-    "flap": ([0.4, 0, 1, 1, 1, 1, 0, 0.33, 0, 1, 1, 0.29], [1] * 12),
-}  # fmt: skip
-
-
-def columns_of(is_ours=True, pairs=False):
-    fdi = SimpleNamespace(is_ours=is_ours, pairs=pairs)
-    rows = stepped.rows_of_replay(
-        0.5 * ROW, stepped.Replayed(SAYS, *ALONE, np.ones(4), np.ones(4)), SURFACES, fdi
-    )
-    return {name: list(values) for name, values in of.diagnosis_columns(rows, SURFACES).items()}
-
-
-def test_verdicts_as_columns():
-    columns = columns_of()
-    assert list(columns) == [
-        "t_s", "faulty", "named",
-        *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
-    ]  # fmt: skip
-    assert columns["t_s"] == [0.5 * k for k in range(12)]
-    assert columns["faulty"] == [0] + [1] * 11
-    assert columns["named"] == [
-        "", "unknown", "elevator", "rudder", "rudder", "aileron", *["unknown"] * 3, "elevator", "elevator",
-        "unknown",
-    ]  # fmt: skip
-    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.41, 0.71, 1])
-    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, *[1] * 8]
-    assert columns["aileron_effectiveness"] == columns["flap_effectiveness"] == [1] * 12
-    for name, (low, high) in BOUNDS.items():
-        assert columns[f"{name}_low"] == pytest.approx(low), name
-        assert columns[f"{name}_high"] == pytest.approx(high), name
-    assert columns["credible"] == [1] * 12
-
 
 def scenario(**sensors):
     return SimpleNamespace(name="one", sensors=Sensors.model_validate(sensors))

@@ -1,7 +1,6 @@
 """Which aircraft is meant, where it goes, and how many terms there is room for."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -11,38 +10,6 @@ from beaver_ftc_aircraft.derive import derivation, outline
 from beaver_ftc_aircraft.derive.derivation import Source, source_of
 
 from .known import TRAINER
-
-
-@pytest.mark.parametrize(
-    ("room", "tried"), [(26, [26]), (19, [26, 22, 18]), (6, [26, 22, 18, 14, 10, 6]), (5, None)]
-)
-def test_there_are_as_many_terms_as_the_evaluator_has_room_for(room, tried, monkeypatch):
-    asked = []
-
-    def fitted(samples, aircraft, most, weight):
-        assert weight is None
-        asked.append(most)
-        return {"Cl": [{"name": "Cl_any", "value": 1.0, "surface": "aileron"}], "most": most}
-
-    def design_record(of):
-        if of > room:
-            raise ValueError("too many products")
-
-    def aircraft_of(data, folder):
-        assert "model_error_map" not in data
-        return data["moments"].get("most", SimpleNamespace(name="trainer"))
-
-    monkeypatch.setattr(derivation, "fitted", fitted)
-    monkeypatch.setattr(derivation, "design_record", design_record)
-    monkeypatch.setattr(outline, "aircraft_of", aircraft_of)
-    data = {"surfaces": {"aileron": {}}, "model_error_map": {}}
-    if tried is None:
-        with pytest.raises(BadInput, match=r"^trainer: its terms need more than \d+ products of signals"):
-            derivation._moments(None, data, Path(), None)
-        assert asked == [26, 22, 18, 14, 10, 6]
-    else:
-        assert derivation._moments(None, data, Path(), None)["most"] == tried[-1]
-        assert asked == tried
 
 
 def test_an_aircraft_is_found_by_its_name_its_folder_or_its_model(tmp_path, monkeypatch):

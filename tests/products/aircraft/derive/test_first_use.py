@@ -50,17 +50,6 @@ def test_another_inertia_of_the_model_is_said(trainer):
     assert "q" in [line[0] for line in first_use.kept_or_compared(read(trainer))]
 
 
-def test_it_is_compared_once_for_each_state_of_the_files(trainer, monkeypatch):
-    asked = []
-    monkeypatch.setattr(first_use, "compared", lambda aircraft: asked.append(aircraft) or ["off"])
-    aircraft = read(trainer)
-    assert [first_use.kept_or_compared(aircraft) for _ in range(3)] == [["off"]] * 3
-    assert len(asked) == 1
-    change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
-    first_use.kept_or_compared(aircraft)
-    assert len(asked) == 2
-
-
 @pytest.mark.parametrize("left", [b"", b'["of', b"\xff"])
 def test_of_a_cache_that_was_cut_off_it_is_compared_again(trainer, monkeypatch, left):
     asked = []

@@ -70,33 +70,6 @@ def test_the_pursuit_as_before(seed, changed):
     })  # fmt: skip
 
 
-def test_columns_are_solved_by_normal_equations_also_if_one_is_there_twice():
-    A = np.array([[3.0, 3.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
-    products = fit.Products(fit.Columns(A), np.array([6.0, 8.0, 1.0]))
-    twice = products.solved([0, 1])
-    assert twice.sum() == pytest.approx(10.0)
-    assert twice == pytest.approx([5.0, 5.0], rel=0.01), (
-        "a ridge of 1e-13 lets a machine's last digits through"
-    )
-    assert products.solved([2]) == pytest.approx([1.0])
-    assert products.unexplained([0, 1]) == pytest.approx(1.0)
-    assert products.unexplained([2]) == pytest.approx(100.0)
-    assert products.unexplained([0, 2]) == pytest.approx(0.0, abs=1e-9)
-    assert products.total == pytest.approx(26.0)  # about the mean of 5
-    assert fit.Products(fit.Columns(A), np.full(3, 2.0)).total == 1.0
-
-
-@pytest.mark.parametrize(("gain", "terms"), [(0.0032, 2), (0.0028, 1)])
-def test_a_term_is_taken_for_what_it_explains_of_what_is_left(gain, terms):
-    """Orthogonal columns beside a rest that none explains: another needs 3 per mille of what is left."""
-    one, other, rest = (np.repeat(np.tile([1.0, -1.0], 2**k), 32 // 2**k) for k in range(3))
-    b = one + 0.1 * (np.sqrt(gain) * other + np.sqrt(1.0 - gain) * rest)
-    products = fit.Products(fit.Columns(np.column_stack([one, other])), b)
-    assert products.pursued([0, 1]) == [0, 1][:terms]
-    assert products.pursued([1]) == []
-    assert fit.pursue(fit.Columns(np.zeros((64, 2))), b)[0] == []
-
-
 def test_the_largest_error_within_each_age_box_and_share(samples):
     """Of whoever is as old or younger, as far in or further, moved as much or less."""
     errors = np.abs(np.random.default_rng(2).normal(size=(400, 3)))

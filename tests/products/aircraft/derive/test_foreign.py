@@ -112,12 +112,6 @@ def test_what_writes_or_listens_is_left_out_of_the_copy_and_said(tmp_path, prepa
         source_of(str(foreign.write(tmp_path, child)))
 
 
-def law(value, output):
-    """A channel of the author's own that holds a property."""
-    held = f"<function> <value> {value} </value> </function> <output> {output} </output>"
-    return f'<channel name="law"> <fcs_function name="fcs/law"> {held} </fcs_function> </channel>'
-
-
 GEAR = {
     "property": "<product> <property> gear/gear-pos-norm </property> <value> 0.35 </value> </product>",
     "p": "<product> <p> gear/gear-pos-norm[0] </p> <v> 0.35 </v> </product>",

@@ -101,19 +101,6 @@ def test_a_row_is_what_the_aircraft_does(plant, trim):
     assert [of.tolist() for of in (found.box, found.level, found.age)] == [[3, 0], [2, 0], [1, 0]]
 
 
-def test_what_is_not_finite_is_left_out(plant):
-    def row(k, rate):
-        return [k, 0, 0, 0, 0, k, 0, k, 0, 0, k, *rate, 1, 2, 0]
-
-    rows = [row(1.0, [0, 0, 0]), row(2.0, [0, np.nan, 0]), row(3.0, [np.inf, 0, 0]), row(4.0, [1, 2, 3])]
-    found = sampling.finite(sampling.Reader(plant, {"mach": "velocities/mach"}).samples(rows))
-    assert found.x[:, 0].tolist() == found.u[:, 2].tolist() == [1.0, 4.0]
-    assert found.y[:, 2].tolist() == [0.3048, 4 * 0.3048]
-    assert found.signals["mach"].tolist() == [1.0, 4.0]
-    assert found.rate.tolist() == [[0, 0, 0], [1, 2, 3]]
-    assert [of.tolist() for of in (found.box, found.level, found.age)] == [[1, 1], [2, 2], [0, 0]]
-
-
 def test_terms_multiply_dimensionless_rates():
     """p b/2V, q c/V, r b/2V."""
     trainer = aircraft("mach", "engines_m")
@@ -151,9 +138,3 @@ def test_a_state_is_in_the_innermost_box_that_has_it_and_in_its_share_of_the_tra
     assert found.rate[:, 0].tolist() == [0, 3, 6, 9, 12, 15], "the last is in no box"
     assert found.box.tolist() == [0, 0, 0, 1, 1, 1]
     assert found.level.tolist() == [0, 1, 1, 3, 2, 3]
-
-
-def few(box, seed):
-    """Samples in these boxes, all of whose numbers tell."""
-    of = states(aircraft("mach", "engines_m"), n=len(box), seed=seed)
-    return replace(of, box=np.array(box))

@@ -109,23 +109,6 @@ def test_the_comparison_finds_a_copy_that_takes_names_at_their_word(case, tmp_pa
     assert all(found[other].share < 1e-6 for other in others)
 
 
-def test_a_moment_that_the_copy_lacks_refuses_the_aircraft_with_its_cause(tmp_path, quick_trim):
-    """The author's trim tab goes with the elevator command, inside of what the aerodynamics read of it."""
-    tab = foreign.scale("fcs/elevator-cmd-norm", -0.2, 0.2, "fcs/elevator-servo")
-    sees = "<sum> <property> fcs/elevator-pos-rad </property> <property> aero/tab </property> </sum>"
-    reads = '<fcs_function name="aero/tab"> <function> <property> fcs/elevator-servo </property> </function> </fcs_function>'  # noqa: E501
-    text = foreign.controlled(foreign.NAVION, tab, f'<channel name="tab"> {reads} </channel>')
-    path = foreign.write(tmp_path, foreign.seen_as(text, "fcs/elevator-pos-rad", sees))
-    with pytest.raises(BadInput, match=r"^navion: its copy would fly otherwise, off by .* with elevator at"):
-        derivation.derive(str(path), tmp_path / "out")
-
-
-@pytest.fixture
-def quick_trim(monkeypatch):
-    """Nothing is sampled: what a test is about comes before."""
-    monkeypatch.setattr(derivation, "_derived", lambda *of: pytest.fail("it was sampled"))
-
-
 def test_a_rudder_of_another_name_is_not_left_out_in_silence(tmp_path):
     text = foreign.NAVION.replace("fcs/rudder-pos-rad", "fcs/posRud_rad")
     path = foreign.write(tmp_path, text)
@@ -146,24 +129,6 @@ def test_one_property_by_two_commands_is_no_surface(tmp_path):
         BadInput, match="aileron and elevator commands both move fcs/elevon, allowed: one surface"
     ):
         find_surfaces(path, own, {})
-
-
-DEFLECTIONS = np.linspace(-0.3, 0.2, 41)
-CURVES = [
-    (1.7 * DEFLECTIONS, 1.0, 1.7),
-    (1.0 * DEFLECTIONS, 1.0, 1.0),
-    (0.0 * DEFLECTIONS, 1.0, 0.0),
-    (0.1 + 2.0 * DEFLECTIONS, 1.0, ((-0.3, -0.5), (0.2, 0.5))),
-    (np.where(DEFLECTIONS > 0, 3.0, 1.0) * DEFLECTIONS, 1.0, ((-0.3, -0.3), (0.0, 0.0), (0.2, 0.6))),
-    (np.abs(DEFLECTIONS), ((-0.3, 0.3), (0.0, 0.0), (0.2, 0.2)), ((-0.3, 0.3), (0.0, 0.0), (0.2, 0.2))),
-]
-
-
-@pytest.mark.parametrize(("values", "usual", "view"), CURVES)
-def test_what_is_read_is_a_gain_or_points(values, usual, view):
-    found = view_of(DEFLECTIONS, values, usual)
-    assert isinstance(found, type(view))
-    assert np.array(found) == pytest.approx(np.array(view), abs=1e-9)
 
 
 def test_two_values_of_one_deflection_are_no_function():

@@ -95,47 +95,6 @@ class Row:
         return (c * one * other + b + earth + 1e-11) / self.instants
 
 
-@pytest.mark.parametrize("instants", [1, 3])
-@pytest.mark.parametrize("block", [None, (3, 2, 11), (1, 4, 12)])
-def test_a_frame_is_a_row_or_a_block_of_rows(instants, block):
-    """Of a block all is a mean, but rates and errors of gyros, which are those of its last row."""
-    log = made_log(healthy=(1, 2, 6))
-    log["q_eta_bar_rad_s2"][10] = 0.1  # less than the declared bounds explain: such a frame shows nothing
-    of, found = Row(log, instants), frames_of(log, instants, block)
-    length, begin, end = block or (1, 0, ROWS)
-    count, dt = (end - begin) // length, DT * length
-    assert (found.dt, found.late_frames) == (pytest.approx(dt), int(instants * length > 1))
-    shows = np.zeros(count, bool)
-    for n in range(count):
-        rows = range(begin + n * length, begin + (n + 1) * length)
-        assert found.row_of(n) == rows[-1]
-        beyond, explained = False, True
-        for i in range(3):
-            rate, noise = of.of("{}_measured_rad_s", rows[-1], i), of.noise(rows[-1], i)
-            model, eta = (np.mean([of.of(name, k, i) for k in rows])
-                          for name in ("{}_design_rad_s2", "{}_eta_bar_rad_s2"))  # fmt: skip
-            assert found.rates_rad_s[n, i] == rate
-            assert found.gyro_change_rad_s[n, i] == pytest.approx(noise)
-            assert [found.model_rad_s2[n, i], found.eta_bar_rad_s2[n, i]] == pytest.approx([model, eta])
-            stated = np.mean([of.stated(k, i) for k in rows]) if rows[0] else np.nan
-            assert found.stated_bound_rad_s2[n, i] == pytest.approx(stated, nan_ok=True)
-            if n == 0:
-                assert np.isnan(found.innovation_rad_s2[0, i])
-                explained = False
-                continue
-            nu = (rate - of.of("{}_measured_rad_s", rows[0] - 1, i)) / dt - model
-            most = eta + (noise + of.noise(rows[0] - 1, i)) / dt
-            assert found.innovation_rad_s2[n, i] == pytest.approx(nu)
-            assert found.innovation_bound_rad_s2[n, i] == pytest.approx(most)
-            beyond, explained = beyond or abs(nu) > most, explained and bool(stated <= eta)
-        shows[n] = beyond and explained
-    beside = [*shows[1:], False], [False, *shows[:-1]]
-    expected = shows & beside[0] & beside[1] if instants * length > 1 else shows
-    assert found.is_unexplained.tolist() == expected.tolist()
-    if length == 1:
-        assert 0 < expected.sum() < count - 1
-
-
 D = [0.7, -0.2, 0.5]
 
 
@@ -279,40 +238,6 @@ def refused_with(says, call):
 # --- Courses
 
 
-def bound(log, frames, i, side, sign, of_swing=False):
-    """The same as a certificate states it."""
-    said = {"d": [0.0, 0.0, 0.0], "first": frames[0], "frame": frames[-1], "h": [], "Z": [], "r": []}
-    column = {name: log[f"fie_flap_position_{'pqr'[i]}_{name}"] for name in (
-        "offset_rad_s2", "slope", "spread_rad_s2")}  # fmt: skip
-    along = said["d"][i] = float(side * sign * np.sign(column["slope"][frames[0]]))
-    for k in frames:
-        said["h"].append(0.0 if of_swing else along * column["offset_rad_s2"][k])
-        said["Z"].append(along * sign * column["slope"][k])
-        said["r"].append(column["spread_rad_s2"][k])
-    return said
-
-
-def course_log():
-    """On q the slope keeps its sign, so that frames that follow one another bound the surface likewise."""
-    log = made_log()
-    log["fie_flap_position_q_slope"] = -abs(log["fie_flap_position_q_slope"])
-    return log
-
-
-Q, R = 1, 2
-
-
-def course(kind, sign, **fields):
-    """Frame 6 from below by q, and frame 9 from above by r; of an oscillation and an approach 6 to 8."""
-    log, swing = course_log(), kind == "oscillatory"
-    several = swing or kind == "rate_limit"
-    bounds = [bound(log, range(6, 9) if several else range(6, 7), Q, 1, sign, swing)]
-    if not swing:
-        above = 6 if kind == "rate_limit" else 9
-        bounds.append(bound(log, range(above, above + 1), R, -1, sign))
-    return log, {"what": f"flap {kind}", "theta": "course", "bounds": bounds, **fields}
-
-
 # --- Chance
 
 
@@ -353,22 +278,6 @@ CHANCE: dict[str, Any] = {
 
 
 # --- Instruments, events, the whole document
-
-
-@pytest.mark.parametrize(("value", "says"), [
-    ((3.0, 2.0), ""), ((2.0, 2.0), "alarm: 2 is not more than 2"),
-    ((2.0, 3.0), "alarm: 2 is not more than 3"), ((3.0, float("nan")), "alarm: the sides are no numbers"),
-    ((1.0 + 5e-11, 1.0), "alarm: 1 is not more than 1"), ((1.0 + 2e-10, 1.0), ""),
-])  # fmt: skip
-def test_the_greater_side_is_greater_by_more_than_rounding(monkeypatch, value, says):
-    """And both are stated as they are: 1e-11 of one is another number."""
-    monkeypatch.setattr(checker, "sides_of_terms", lambda *of: value)
-    log, term = made_log(), made_term(made_log(), first=4, frame=4)
-    said = {"what": None, "column": "detected", "frame": ALARM, "theta": "any", "terms": [term]}
-    finite = [side if np.isfinite(side) else 0.0 for side in value]
-    for off, reason in ((1.0, says), (1.0 + 1e-11, says or "alarm: the stated sides are not the recomputed")):
-        found = [*refused_in(log, said | {"sides": [finite[0], off * finite[1]]})]
-        assert [one[: len(reason)] for one in found] == [reason] * bool(reason)
 
 
 GYRO = {"noise_std_deg_s": 0.1, "bias_deg_s": 0.2, "quantum_deg_s": 0.4, "scale_error": 0.05}

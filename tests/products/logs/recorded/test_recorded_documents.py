@@ -1,12 +1,8 @@
 """The benchmark on recorded flights from the folder to the figure: whole, from small flights and by hand."""
 
-import json
-
-import numpy as np
 import pytest
 
 from beaver_ftc_logs.recorded import benchmark
-from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import Samples
 
 
@@ -93,18 +89,5 @@ def test_tables_of_a_document(changed, name):
     )
 
 
-def test_files_of_a_document():
-    files = benchmark.result_files(DOCUMENT)
-    assert set(files) == {"flights.png", "flights.json", "flights.md"}
-    assert json.loads(files["flights.json"])["sets"][0]["set"] == "gliders"
-    assert files["flights.md"] == benchmark.as_markdown(DOCUMENT)
-
-
 def changed(samples, **changes):
     return Samples(**(vars(samples) | changes))
-
-
-def recording(samples):
-    """A recording beside samples: all that the freeze rule reads of it."""
-    still = Column(samples.t_s, np.where(samples.t_s < 20.0, samples.t_s, 20.0))
-    return RecordedFlight(samples.name, {"elevator_output": still}, samples.logged_failures)

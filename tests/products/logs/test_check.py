@@ -4,12 +4,10 @@ import json
 
 import numpy as np
 import pytest
-import yaml
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import check
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
@@ -107,26 +105,6 @@ def test_a_mis_scaled_column_is_refused_with_the_factor_that_fits(tmp_path, fact
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_a_proposed_vehicle_file_says_what_was_found_and_which_keys_there_are_besides(tmp_path):
-    path = logged(tmp_path / "good.csv")
-    told = json.loads(run("identify", "--check", path, "--format", "json").stdout)["vehicle"]
-    assert told == {
-        "name": "good", "reader": "table", "rates": {axis: f"{axis}_rad_s" for axis in "pqr"},
-        "commands": ["roll_cmd", "pitch_cmd"],
-        "surfaces": {"roll_cmd": {"roll_cmd": 1.0}, "pitch_cmd": {"pitch_cmd": 1.0}},
-        "attitude": {"roll": "roll_rad", "pitch": "pitch_rad"}, "acceleration": "az_m_s2",
-    }  # fmt: skip
-    text = check.vehicle_file_text(told)
-    assert text in run("identify", "--check", path).stdout
-    assert yaml.safe_load(text) == told
-    keys = [line[2:].partition(":")[0] for line in text[text.index("# Further keys:") :].splitlines()[1:]]
-    assert keys == [
-        "time", "signals", "labels", "airspeed", "energy", "flow", "full_deflection_rad",
-        "reference_airspeed_mps", "airspeed_powers", "outputs", "false_alarms_per_hour", "faults",
-        "other_laws", "moving_air", "max_rate_hz",
-    ]  # fmt: skip
-
-
 def test_a_log_whose_gyro_is_dead_cannot_be_used(tmp_path):
     done = run("identify", "--check", logged(tmp_path / "k.csv", factors={"q_rad_s": 0.0}))
     assert done.exit_code == 2
@@ -140,37 +118,6 @@ def test_a_log_without_rates_names_what_it_has(tmp_path):
     done = run("identify", "--check", path)
     assert done.exit_code == 2
     assert "no column looks like the rate p" in done.stdout
-
-
-def test_identify_without_check_wants_vehicle_and_out(tmp_path):
-    path = logged(tmp_path / "k.csv")
-    with pytest.raises(BadInput, match="--vehicle is missing"):
-        run("identify", path)
-    with pytest.raises(BadInput, match="--out is missing"):
-        run("identify", path, "--vehicle", "alfa")
-    (tmp_path / "there.yaml").write_text("")
-    with pytest.raises(BadInput, match=r"there.yaml exists, allowed: another name"):
-        run("identify", "--check", path, "--out", tmp_path / "there.yaml")
-
-
-@pytest.mark.parametrize(("change", "notes"), [
-    (lambda t: [x.replace(",", ";") for x in t], ["cells are parted by semicolons"]),
-    (lambda t: [x.replace(",", ";").replace(".", ",") for x in t],
-     ["cells are parted by semicolons, with a decimal comma"]),
-    (lambda t: [x.replace(",", "\t") for x in t], ["cells are parted by tabs"]),
-    (lambda t: ["logger 3", "", *t], ["names are in line 3, what is above is left out"]),
-    (lambda t: [t[0], "s,rad/s" + ",1" * 6, *t[1:]], ["t_s: rows without a number, left out: 1 of 201"]),
-    (lambda t: [*t[:7], t[7] + ",3", *t[8:], "1,2"], ["lines with too few or too many cells, left out: 1"]),
-])  # fmt: skip
-def test_tables_as_people_write_them(tmp_path, change, notes):
-    plain = synthetic.write_csv(tmp_path / "plain.csv", synthetic.fly(20.0))
-    other = tmp_path / "other.csv"
-    other.write_text("\n".join(change(plain.read_text().splitlines()[:-1])) + "\n")
-    read, expected = read_flight(other), read_flight(plain)
-    assert set(notes) <= set(read.notes) or notes[0][:40] in "".join(read.notes)
-    column, same = read.columns["q_rad_s"], expected.columns["q_rad_s"]
-    np.testing.assert_array_equal(column.values, same.values[np.isin(same.t_s, column.t_s)])
-    assert len(column.values) >= 198
 
 
 def test_an_err_in_a_cell_is_that_cell_and_no_more(tmp_path):
@@ -231,12 +178,6 @@ def test_a_mistaken_unit_is_a_line(tmp_path, keys, says):
     with pytest.raises(BadInput) as error:
         load_vehicle(tmp_path / "v.yaml")
     assert says in str(error.value)
-
-
-def test_a_log_that_says_its_time_itself_is_asked_for_no_other(tmp_path):
-    (tmp_path / "a.log").write_text("")
-    with pytest.raises(BadInput, match="time: t in s is not its time, allowed: TimeUS in us"):
-        read_flight(tmp_path / "a.log", None, ("t", "s"))
 
 
 def test_the_sample_logs_are_followed_from_check_to_diagnosis(tmp_path):

@@ -86,38 +86,3 @@ def test_how_far_gains_are_from_one_beyond_what_the_noise_allows(loud):
     nothing = replace(one, is_usable=np.zeros(150, dtype=bool))
     found = fitting._squared_deviations(MODEL, nothing)
     assert np.isnan(found).tolist() == [True, True]
-
-
-def test_the_squares_of_gains_are_in_their_covariance_and_what_lies_between_flights():
-    """g' ((F' F)^-1 + S)^-1 g; what nothing tells, or two say alike, is no gain more."""
-    rng = np.random.default_rng(2)
-    responses, residual = rng.standard_normal((90, 3)) * [1.0, 0.4, 2.0], rng.standard_normal(90)
-    residual += responses @ [0.3, -0.5, 0.2]
-    root = np.array([[0.3, 0.0, 0.0], [0.2, 0.1, 0.0], [-0.1, 0.05, 0.25]])
-    between = root @ root.T
-    gains = np.linalg.lstsq(responses, residual, rcond=None)[0]
-    spread = np.linalg.inv(responses.T @ responses) + between
-    found, n = fitting._error_and_rank(responses, residual, between)
-    assert (found, n) == (pytest.approx(gains @ np.linalg.solve(spread, gains)), 3)
-    some, n = fitting._error_and_rank(responses[:, :2], residual, between[:2, :2])
-    idle = responses * [1.0, 1.0, 0.0]
-    assert fitting._error_and_rank(idle, residual, between) == (
-        pytest.approx(some), n,
-    )  # fmt: skip
-    assert n == 2
-    twice = np.column_stack([responses[:, 0], responses[:, 0]])
-    assert fitting._error_and_rank(twice, residual, between[:2, :2])[1] == 1
-
-
-@pytest.mark.parametrize("laws", [False, True])
-def test_a_flight_that_fails_at_once_leaves_nothing_out(laws):
-    """Of three flights one has no sample that is known: the settings are those of the other two."""
-    vehicle = small.vehicle(small.TAIL | {"other_laws": laws})
-    like = small.model(small.TAIL)
-    flights = fitting.fit_parts([small.flight(like, 300, seed=seed) for seed in (1, 2)])
-    idle = FitPart(small.flight(like, 200, seed=3), np.zeros(200, dtype=bool))
-    found, expected = (
-        fitting.gain_overdispersion(of, fitting._model_of_order(of, vehicle, 2, 3))
-        for of in ([*flights, idle], flights)
-    )
-    assert found == pytest.approx(expected)

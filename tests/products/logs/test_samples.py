@@ -20,27 +20,6 @@ def stamps(step, n=60):
     return np.arange(n) * step
 
 
-@pytest.mark.parametrize(("t_s", "rate_hz", "says"), [
-    (stamps(0.1, 49), None, "has 49 samples of the rates, allowed: at least 50"),
-    (stamps(0.1, 50), 10.0, None),
-    (stamps(0.25), 4.0, None),
-    (stamps(0.2501), None, r"logged at 4 Hz, allowed: at least 4 Hz to tell"),
-    (stamps(2.0**-16, 200_000), 20.0, None),
-    (stamps(0.999e-5), None, r"logged at 1e\+05 Hz, allowed: up to 100000 Hz, time in seconds"),
-    (stamps(1.0 / 20.9), 20.9, None),  # a twentieth more than the most is no reason to average
-    (stamps(1.0 / 21.1), 20.0, None),
-])  # fmt: skip
-def test_rates_that_a_log_may_have(t_s, rate_hz, says):
-    if says:
-        with pytest.raises(BadInput, match=says):
-            of._time_base("log", t_s, 20.0)
-        return
-    found, run, step = of._time_base("log", t_s, 20.0)
-    assert 1.0 / step == pytest.approx(rate_hz)
-    assert set(run.tolist()) == {0}
-    assert (found is t_s) is (rate_hz != 20.0)
-
-
 @pytest.mark.parametrize(("gap", "gaps"), [(3.49, 0), (3.51, 1)])
 def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
     t_s = stamps(0.125)
@@ -182,15 +161,6 @@ def test_two_flights_of_one_name_are_refused(tmp_path):
     assert [one.name for one in of.load_flights_for_fit(paths[:1], vehicle)] == ["one"]
     with pytest.raises(BadInput, match="two flights are named one: one result would replace the other"):
         of.load_flights_for_fit(paths, vehicle)
-
-
-@pytest.mark.parametrize(("rate_hz", "says"), [
-    (0.02, " (time in ms would be 20 Hz)"), (0.01, " (time in ms would be 10 Hz)"), (0.0099, ""),
-    (1.0, " (time in ms would be 1e+03 Hz)"), (1.01, ""), (2e-5, " (time in us would be 20 Hz)"),
-    (3e-8, " (time in ns would be 30 Hz)"), (5e-9, ""),
-])  # fmt: skip
-def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
-    assert of._other_time_unit_hint(rate_hz) == says
 
 
 DEG, CDEG = np.pi / 180.0, np.pi / 18000.0

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
 from beaver_ftc_logs.diagnose import diagnose, finish_rows
-from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
+from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.model import FittedRanges
 from products.logs import small
 
@@ -141,24 +141,6 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     assert trust.tied_shares([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
 
 
-def test_a_surface_that_never_moved_is_not_claimed(model):
-    still = small.flight(model, n=1200, seed=2)
-    still.commands[:, 0] = 0.2
-    known = trusted(still)
-    assert trust.known_effects(known) == [False, True]
-    rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
-    assert (rows.effectiveness_low[:, 0] == 0.0).all()
-    assert (rows.effectiveness_high[:, 0] == 1.0).all()
-    assert set(rows.isolated_surfaces) <= {"", "unknown", "right+left"}
-    assert not (rows.faulty & (rows.isolated_surfaces == "")).any()
-    (line,) = trust.unknown_sentences(known)
-    assert line.startswith("of what right does, 100.0%")
-    with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
-        right, left = isolability_document(still, known)["groups"]
-    assert set(right["smallest_loss"].values()) == {None}
-    assert left["smallest_loss"]["60"] < 0.5
-
-
 def test_few_minutes_mean_wide_bounds():
     """Standard errors of gains fall as the root of the time."""
     errors = []
@@ -246,20 +228,3 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
             trust.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
     else:
         trust.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
-
-
-def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
-    model = small.model(fitted={"commands": [], "rates": [], "tied": [0.98, 0.979]})
-    assert (trust.known_effects(model), trust.unknown_surfaces(model)) == (
-        [False, True],
-        {"right"},
-    )
-    says = (
-        "of what right does, 98.0% follows from the rates, signals and other surfaces of the flights fitted"
-    )
-    assert trust.unknown_sentences(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
-    for unknown in (small.model(), small.model(fitted={"commands": [], "rates": []})):
-        assert (trust.known_effects(unknown), trust.unknown_sentences(unknown)) == (
-            [True, True],
-            [],
-        )

@@ -70,22 +70,6 @@ def test_the_pursuit_as_before(seed, changed):
     })  # fmt: skip
 
 
-def test_the_largest_error_within_each_age_box_and_share(samples):
-    """Of whoever is as old or younger, as far in or further, moved as much or less."""
-    errors = np.abs(np.random.default_rng(2).normal(size=(400, 3)))
-    table = fit.largest(errors, samples)
-    assert table.shape == (3, 4, 4, 3)
-    for age, box, level, axis in np.ndindex(table.shape):
-        inside = [
-            errors[k, axis]
-            for k in range(400)
-            if samples.age[k] <= age and samples.box[k] <= box and samples.level[k] <= level
-        ]
-        assert table[age, box, level, axis] == max(inside)
-    nobody = samples.at(samples.age == 2)
-    assert not fit.largest(errors[samples.age == 2], nobody)[:2].any()
-
-
 def test_the_error_map(trainer, samples, changed):
     first = moving(trainer, samples, [0.001, 0.002, 0.003])
     second = moving(trainer, states(trainer, seed=2), [0.002, 0.001, 0.0])

@@ -13,7 +13,6 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.present.page import contents
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc_assurance.evidence import flown, shown
-from beaver_ftc_assurance.evidence import judged as judged_module
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc_assurance.evidence.judged import document_of
 from beaver_ftc_assurance.evidence.plan import load_plan
@@ -205,17 +204,3 @@ def test_without_what_writes_pdf_nothing_flies(tmp_path, monkeypatch):
     with pytest.raises(BadInput, match=r"allowed: pip install 'beaver-ftc\[evidence\]'"):
         run_plan(plan, tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("verdict", "margin", "expected", "rank"),
-    [
-        (NOT_MET, None, 5.0, (0, -inf)), (NOT_SHOWN, None, 5.0, (1, inf)), (MET, None, 5.0, (2, inf)),
-        (MET, 2.0, -4, (2, 0.5)), (MET, 2.0, 0, (2, 2.0)), (MET, 2.0, True, (2, 2.0)),
-        (MET, 2.0, "x", (2, 2.0)),
-        (NOT_MET, -3.0, {"at_least": -6.0, "at_most": 12.0}, (0, -0.5)),
-        (MET, 3.0, {"at_least": 0.0, "at_most": 12.0}, (2, 0.25)), (MET, 3.0, {"level": 2}, (2, 3.0)),
-    ],
-)  # fmt: skip
-def test_the_worst_is_by_verdict_then_by_margin_over_the_limit(verdict, margin, expected, rank):
-    assert judged_module._rank({"verdict": verdict, "margin": margin, "expected": expected}) == rank

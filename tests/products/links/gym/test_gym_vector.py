@@ -86,15 +86,3 @@ def test_actions_that_are_no_numbers_are_refused(three, bad):
     with pytest.raises(BadInput, match=r"actions: .*, allowed: finite numbers of shape \(3, 4\)"):
         three.step(bad)
     assert np.isfinite(three.step(np.zeros((3, 4)))[0]).all()
-
-
-def test_a_step_after_the_end_asks_for_a_reset():
-    env = BeaverEnv(scenario(**FLOWN), frames_per_step=50)
-    seeds = env.reset(seed=np.int64(3)), env.reset(seed=3)
-    assert np.array_equal(seeds[0][0], seeds[1][0])
-    assert env.step(np.zeros(4))[3]
-    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
-        env.step(np.zeros(4))
-    env.reset()
-    with pytest.raises(BadInput, match=r"action: .*, allowed: finite numbers"):
-        env.step(np.full(4, 1j))

@@ -179,14 +179,6 @@ def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):
     assert len(found.meant) > 3
 
 
-def test_the_bad_line_would_notice():
-    """A body that is shown frames twice, or not at all."""
-    found = trial.Found(meant=[[0, 1, 2]], flown=[[0, 1, 1, 2]])
-    assert (found.twice, found.lost > 0) == (1, True)
-    assert trial.Found(meant=[[0, 1, 2]], flown=[[0, 2]]).lost > 0
-    assert trial.Found(meant=[[0, 1]], flown=[[0, 1]]).lost == 0
-
-
 ALOFT = Instant(
     12.5, (0.11, -0.23, 0.37), (1.3, -2.9, -9.1), (0.05, 0.21, 6.1), 61.0, -0.04, 1520.0, 3050.0,
     (410.0, -75.0, -2890.0), (58.0, -13.0, 2.5), 45.0036, -0.00095, 2890.0, (0.07, 0.19, 0.6),

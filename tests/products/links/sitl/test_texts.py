@@ -104,17 +104,6 @@ def test_a_failure_the_scenario_refuses_is_denied():
     assert says.startswith("faults: this flight has had 1000, allowed: ")
 
 
-def test_a_long_text_is_said_in_parts():
-    line = Mavlink()
-    long = "x" * 49 + "y" * 50 + "z"
-    data = line.texts([Text(1.0, 4, "short"), Text(1.0, 2, long)])
-    heard = common.MAVLink(None).parse_buffer(data)
-    parts = [(m.severity, m.text, m.id, m.chunk_seq) for m in heard]
-    assert parts[0] == (4, "short", 0, 0)
-    assert "".join(text for _, text, _, _ in parts[1:]) == long
-    assert [part[2:] for part in parts[1:]] == [(1, 0), (1, 1)]
-
-
 def test_only_the_command_for_failures_is_obeyed():
     line = Mavlink()
     asked = []

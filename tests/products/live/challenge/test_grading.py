@@ -84,27 +84,6 @@ def test_a_mistake_costs_its_flight_and_what_is_barred_flies_no_more(
     assert first.given[0][:2] == ("text", "ada-3.py")
 
 
-@pytest.mark.parametrize(("kind", "points"), [("detector", 89.7), ("law", 75.5)])
-def test_a_try_gives_the_points_of_the_practice_flight(stands, monkeypatch, kind, points):
-    """1.03 s of 5 s late and named rightly; 0.4 / 0.53 of the oracle's error."""
-    first = stands(Started(kind))
-    result = replace(SEEN, delay_s=1.03, rms_deg_s=0.53)
-    asked, oracle = [], []
-    monkeypatch.setattr(folders, "practice", lambda: "practice")
-    monkeypatch.setattr(grading, "fly_submission", lambda *given: asked.append(given) or result)
-    monkeypatch.setattr(grading, "_flown", lambda *given: oracle.append(given) or SEEN)
-    assert grading.tried("text", "name.py") == {
-        "kind": kind, "class": "Mine", "walls": ["limits", "files"], "points": points,
-    }  # fmt: skip
-    allowance = first.given[0][2]
-    assert asked == [(first, "text", "name.py", allowance, "practice")]
-    assert oracle == ([] if kind == "detector" else [("practice of oracle", Entry(SCHEME, "oracle"))])
-    first.fails = SimulationFailed("no class")
-    with pytest.raises(BadInput) as refused:
-        grading.tried("text", "name.py")
-    assert str(refused.value) == "name.py: no class"
-
-
 def test_nobody_else_may_read_where_hidden_flights_lie(tmp_path):
     at = tmp_path / "autumn"
     folders.new(at, 4, grading.rules())

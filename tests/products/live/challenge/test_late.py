@@ -161,24 +161,3 @@ def test_the_message_that_must_come_is_the_only_one_that_is_taken(monkeypatch, k
         assert isinstance(ended.value, line.Barred) == (said[:1] != b"E" or found == WRITES)
     assert code._allowance.left_s < 10.0
     assert code._deadline == float("inf")
-
-
-@pytest.mark.parametrize(
-    ("left_s", "charged", "limit_s", "last"),
-    [(1.5, True, 1.5, True), (2.0, True, 2.0, False), (9.0, True, 2.0, False), (1.5, False, 2.0, False)],
-)
-def test_an_answer_has_the_time_of_a_frame_or_what_is_left_of_all(
-    monkeypatch, left_s, charged, limit_s, last
-):
-    code = line.SubmittedCode("source", "name", line.Allowance(left_s))
-    code._accounts = SimpleNamespace(waited_s=lambda: 0.25, computed_s=lambda: 0.5)
-    seen, parts = [], [pilot.HEAD.pack(pilot.BEGUN, 0, 0), b""]
-
-    def read(size):
-        seen.append((code._deadline, code._before, code._last_chance))
-        return parts.pop(0)
-
-    monkeypatch.setattr(code, "_read", read)
-    monkeypatch.setattr(line.time, "monotonic", lambda: 100.0)
-    code._answer(pilot.BEGUN, 0, 2.0, charged)
-    assert seen[0] == (100.0 + limit_s, (limit_s, 0.25, 0.5), last)

@@ -104,21 +104,6 @@ def test_a_submission_may_read_python_and_packages_but_those_that_are_hidden(mon
     assert confine.readable() == [str((tmp_path / place).resolve()) for place in shown]
 
 
-def test_of_the_folders_beside_only_pythons_own_are_listed(monkeypatch):
-    """What is allowed is read; a folder that it lies in is listed where an import looks through it."""
-    given = []
-    system = SimpleNamespace(syscall=lambda *of: 6, prctl=lambda *of: 0)
-    monkeypatch.setattr(confine, "_linux", lambda: system)
-    monkeypatch.setattr(confine.os, "close", lambda rules: None)
-    monkeypatch.setattr(
-        confine, "_allow", lambda system, rules, path, right: given.append((path, right)) or True
-    )
-    allowed = ["/python3.11/json", "/python3.11/os.py", "/teacher/mine", "beside"]
-    confine._restrict_files(allowed)
-    read = confine._READ_FILE | confine._READ_DIR
-    assert given == [*((path, read) for path in allowed), ("/python3.11", confine._READ_DIR)]
-
-
 def test_a_submission_has_a_gigabyte_a_minute_and_no_file_to_write(monkeypatch):
     resource, given = pytest.importorskip("resource"), {}
     monkeypatch.setattr(resource, "setrlimit", lambda what, most: given.update({what: most}))

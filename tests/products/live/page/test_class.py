@@ -6,7 +6,6 @@ import pytest
 from live_site import EVERYTHING, Site, says
 
 from beaver_ftc_live.page import server
-from beaver_ftc_live.page.gate import COOKIE
 
 
 @pytest.fixture
@@ -118,22 +117,6 @@ def test_anothers_token_on_ones_own_path_opens_nothing(site):
         assert (status, headers["set-cookie"].startswith(site.keys[1])) == (303, True), again
 
 
-@pytest.mark.parametrize(
-    ("query", "cookie", "wrong"),
-    [("token=x", None, 1), ("token=x&token=y", None, 1), ("", f"{COOKIE}=x", 1), ("", None, 0),
-     ("a=b", None, 0), ("token=", None, 0), ("token=%ff", None, 1)],
-)  # fmt: skip
-def test_tokens_that_open_nothing_are_counted(site, query, cookie, wrong):
-    for path in ("/", "/nothing/", f"{site.gate.flyer.room}/", f"{site.gate.guests[0].room}/"):
-        site.gate.wrong = 0
-        status, headers, body = site.get(path, query, cookie=cookie)
-        assert (status, site.gate.wrong) == (403, wrong)
-        assert body == b"Open the address that beaver-ftc live has printed."  # the same for every path
-        assert headers["referrer-policy"] == "no-referrer"
-    roster = site.gate.roster()
-    assert roster["wrong"] == wrong
-
-
 def test_whoever_tries_tokens_waits_and_whoever_has_one_does_not(monkeypatch):
     site, waited = Site(), []
 
@@ -159,17 +142,3 @@ def test_a_guest_reaches_the_pages_files_alone(site, path):
     status, _, body = site.get(f"{room}/{path}", cookie=site.keys[0])
     assert status in (403, 404)
     assert b"import" not in body
-
-
-def test_a_guest_has_three_pages_and_no_more(site):
-    seat = site.gate.guests[0]
-    added = [site.pages.add(None, seat) for _ in range(3)]
-    for page in added:
-        page.tell = lambda told: None
-    assert as_guest(site)[0]["type"] == "websocket.close"
-    site.pages.remove(added[0])
-    site.pages.remove(added[0])
-    assert seat.pages == 2
-    assert as_guest(site)[0]["type"] == "websocket.accept"
-    told = site.talk(cookie=site.keys[1], seat=site.gate.guests[1])
-    assert told[0]["type"] == "websocket.accept"

@@ -15,7 +15,6 @@ from beaver_ftc.control.engines import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis import monitors
 from beaver_ftc.diagnosis.monitors import ENGINE_MONITOR_RECORD
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
@@ -246,8 +245,3 @@ def test_a_wrong_file_is_refused_in_a_line(jet, tmp_path, change, says):
     (tmp_path / "aircraft.yaml").write_text(yaml.safe_dump(data))
     with pytest.raises(ScenarioError, match=says):
         read(tmp_path)
-
-
-def test_one_engine_in_the_middle_is_no_effector(tmp_path):
-    with pytest.raises(BadInput, match="do not yaw it"):
-        derive("jsbsim:c172p", tmp_path, engines=True)

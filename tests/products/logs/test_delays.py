@@ -23,16 +23,3 @@ def test_commands_that_act_sooner_or_later(delay_s, share, later):
     np.testing.assert_allclose(
         found, (1 - share) * samples.commands + share * samples.commands[at], atol=1e-15
     )
-
-
-def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
-    """What was 600 s ago counts 1/e."""
-    rng = np.random.default_rng(1)
-    evidence = [0.1 * rng.standard_normal(2000) for _ in range(3)]
-    found = filtering._model_weights(evidence, 2.0)
-    for k in (0, 10, 1999):
-        age_s = 0.5 * np.arange(k, -1, -1)
-        total = np.array([(np.exp(-age_s / 600.0) * one[: k + 1]).sum() for one in evidence])
-        np.testing.assert_allclose(found[:, k], np.exp(total) / np.exp(total).sum(), rtol=1e-9)
-    huge = filtering._model_weights([1000.0 * np.ones(3), np.ones(3)], 2.0)
-    np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)

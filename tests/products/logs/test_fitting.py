@@ -120,31 +120,6 @@ def fitted(usable_flights):
     return fitting.fit_model(usable_flights, MODEL.vehicle)
 
 
-def days(gains):
-    """Flights of days on which the right surface acts so many times as the left one does."""
-    flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
-    told = [changed(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
-    return fitting.fit_parts(
-        [changed(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
-    )
-
-
-def test_flights_that_are_alike_tell_all_that_their_noise_allows():
-    """The squares of Gaussian gains are as many as these, on average: 12 of them, within three sd of that."""
-    alike = fitting.gain_overdispersion(days([1.0] * 6), MODEL)
-    assert alike == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 12.0))
-
-
-def test_days_that_differ_let_a_sample_tell_less():
-    """Differences far above what the noise allows: the larger they are, the less."""
-    none, some, more = (
-        fitting.gain_overdispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL)
-        for size in (0.0, 0.15, 0.3)
-    )
-    assert more > 1.5 * some > 5.0 * none
-    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).effective_sample_share < 0.2
-
-
 def test_several_flights_are_left_out_in_turn():
     one, two, three = usable_flights = fitting.fit_parts(
         [small.flight(MODEL, 60, name=name) for name in ("a", "b", "c")]

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-import yaml
 
 from beaver_ftc_logs.mixing import mixing_of_log
 from beaver_ftc_logs.readers import read_flight
@@ -19,7 +18,6 @@ GYRO = {"t_s": T_S} | {
     f"Gyr{axis}": KINEMATIC[f"{rate}_rad_s"] for axis, rate in zip("XYZ", "pqr", strict=True)
 }
 GYRO_TOPIC = "vehicle_angular_velocity"
-RATES = {"name": "wing", "rates": {axis: f"{GYRO_TOPIC}.xyz[{i}]" for i, axis in enumerate("pqr")}}
 ELEVONS = (
     ("SERVO1_FUNCTION", 77), ("SERVO1_MIN", 1000), ("SERVO1_MAX", 2000), ("SERVO1_TRIM", 1500),
     ("SERVO1_REVERSED", 1),
@@ -271,26 +269,3 @@ def test_parameters_of_a_ulog_and_their_changes(tmp_path):
         assert len(read["BAD"]) == 1
     lines = mixing_of_log("ulog", read_flight(path).parameters, ()).lines
     assert "CA_SV_CS_COUNT changes in the log: its last value, 3, is used" in lines
-
-
-def vehicle_file(path, **keys):
-    path.write_text(yaml.safe_dump(RATES | {"reader": "ulog"} | keys))
-    return path
-
-
-def test_identify_fits_a_log_whose_mixing_is_in_its_parameters(tmp_path):
-    """The whole way: the wing of the tests, its two surfaces as the servos of PX4."""
-    pytest.importorskip("pyulog")
-    flown = synthetic.fly(240.0)
-    half_sum = 0.5 * (flown["roll_command"] + flown["pitch_command"])
-    half_difference = 0.5 * (flown["roll_command"] - flown["pitch_command"])
-    rates = {"t_s": flown["t_s"]} | {f"xyz[{i}]": flown[f"{axis}_rad_s"] for i, axis in enumerate("pqr")}
-    servos = {"t_s": flown["t_s"], "control[0]": half_difference, "control[1]": half_sum}
-    log = synthetic.write_ulog(
-        tmp_path / "wing.ulg", rates, GYRO_TOPIC, {"actuator_servos": servos}, PX4_ELEVONS
-    )
-    done = run("identify", log, "--vehicle", vehicle_file(tmp_path / "v.yaml"), "--out", tmp_path / "m.json")
-    assert done.exit_code == 0
-    assert "surface 0 is the left elevon: CA_SV_CS0_TYPE 5" in done.stdout
-    model = json.loads((tmp_path / "m.json").read_text())
-    assert set(model["vehicle"]["surfaces"]) == {"left_elevon", "right_elevon"}

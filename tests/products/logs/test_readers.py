@@ -8,17 +8,8 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.recording import package_errors_as_bad_input
-from beaver_ftc_logs.samples import _latest_and_age, load_flights_for_fit
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
-
-
-def test_a_held_column_is_never_newer_than_its_row(tmp_path):
-    folder = synthetic.write_alfa(tmp_path / "flight", duration_s=20.0)
-    recording = read_flight(folder)
-    held, age_s = _latest_and_age(recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s)
-    np.testing.assert_allclose(held[1:], recording.columns["roll_error_rad"].values[:-1])
-    assert np.isnan(held[0])
-    assert age_s == pytest.approx(0.08, abs=1e-6)
 
 
 @pytest.mark.parametrize(

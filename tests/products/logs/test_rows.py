@@ -1,7 +1,5 @@
 """From probabilities of hypotheses to rows: each step by hand, and the whole as it was kept."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from products.logs import small
 
 SETTINGS = {"level_step": 0.25, "alarm": 0.5, "bounds": 0.8}
 WING = small.model(settings=SETTINGS)
-TAIL = small.model(small.TAIL, settings=SETTINGS)
 
 
 @pytest.mark.parametrize(("at_hz", "of_hz", "taken"), [
@@ -38,28 +35,7 @@ def test_a_condition_stands_once_it_has_held(hold_s, stands):
     assert diagnose._held_long_enough(raised[1:], model).astype(int).tolist() == stands[1:]
 
 
-@pytest.mark.parametrize(("raised", "well", "alarm"), [
-    ("0100000", "0000100", "0111000"),  # until health is likelier again
-    ("0100000", "0111000", "0100000"),  # raised goes before well
-    ("0001001", "1110010", "0001101"),
-    ("0000000", "0000000", "0000000"),
-    ("1000000", "0000000", "1111111"),  # from the first row on
-    ("1000000", "1100000", "1000000"),
-])  # fmt: skip
-def test_an_alarm_stands_until_health_is_the_likelier(raised, well, alarm):
-    given = (np.array([flag == "1" for flag in flags]) for flags in (raised, well))
-    assert "".join(str(int(flag)) for flag in diagnose._latched(*given)) == alarm
-
-
 LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
-
-
-@pytest.mark.parametrize(("mass", "median"), [
-    ([0.0, 0.5, 0.0, 0.5], 0.25), ([0.0, 0.499, 0.002, 0.499], 0.5), ([0.2, 0.2, 0.1, 0.5], 0.5),
-    ([0.6, 0.2, 0.1, 0.1], 0.0), ([0.1, 0.1, 0.1, 0.7], 1.0),
-])  # fmt: skip
-def test_half_of_the_probability_is_on_either_side_of_the_median(mass, median):
-    assert diagnose._median_level(LEVELS, np.array([mass])).tolist() == [median]
 
 
 @pytest.mark.parametrize(("mass", "bounds"), [
@@ -92,56 +68,7 @@ def posterior(bank, *shares):
     return rows
 
 
-ONE = np.array([1])
 SOUND, RIGHT, LEFT, BOTH = (1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
-STUCK = [
-    {LEFT: 1.0}, {"unknown": 0.6, LEFT: 0.4}, {"unknown": 0.5, LEFT: 0.5}, {"unknown": 0.7, RIGHT: 0.3},
-    {SOUND: 1.0}, {RIGHT: 0.6, "unknown": 0.4}, {"unknown": 1.0}, {SOUND: 0.9, RIGHT: 0.1},
-]  # fmt: skip
-
-
-def test_names_by_hand():
-    """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
-    bank = build_bank(TAIL)
-    found = diagnose.rows_of_posterior(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
-    assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
-    aileron = "left_aileron+right_aileron"
-    assert found.isolated_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
-    assert found.effectiveness[0].tolist() == [1.0, 0.25, 1.0]
-    assert (found.effectiveness_low[5].tolist(), found.effectiveness_high[5].tolist()) == (
-        [0.0, 0.875, 0.0],
-        [1.0, 1.0, 1.0],
-    )
-    first = diagnose._surfaces_at_fault(
-        TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), ONE, ONE > 0
-    )
-    assert first.tolist() == ["elevator"]
-    split = diagnose._surfaces_at_fault(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), ONE, ONE > 0)
-    assert split.tolist() == ["unknown"]
-
-
-def test_rows_at_the_stamps_of_a_faster_log():
-    """Each stamp has the last row up to it; those before the first have the first."""
-    rows = small.rows(
-        [(1, "", [1.0, 1.0]), (1, "left", [1.0, 0.5]), (1, "right", [0.4, 1.0])]
-    )  # at 10, 10.5, 11
-    samples = small.flight(WING, 3, log_stamps_s=np.array([9.0, 10.0, 10.4, 10.5, 10.9, 11.0, 20.0]))
-    found = diagnose._at_log_stamps(samples, rows)
-    last = [0, 0, 0, 1, 1, 2, 2]
-    np.testing.assert_array_equal(found.t_s, samples.log_stamps_s)
-    for name in (
-        "faulty",
-        "isolated_surfaces",
-        "effectiveness",
-        "effectiveness_low",
-        "effectiveness_high",
-        "fault_probability",
-    ):
-        np.testing.assert_array_equal(getattr(found, name), getattr(rows, name)[last])
-    same = small.flight(WING, 3, log_stamps_s=rows.t_s)
-    assert diagnose._at_log_stamps(same, rows) is rows
-    late = replace(same, log_stamps_s=rows.t_s + 0.1)
-    np.testing.assert_array_equal(diagnose._at_log_stamps(late, rows).t_s, rows.t_s + 0.1)
 
 
 @pytest.mark.parametrize("threshold", [None, 4.0])

@@ -20,47 +20,6 @@ def stamps(step, n=60):
     return np.arange(n) * step
 
 
-@pytest.mark.parametrize(("gap", "gaps"), [(3.49, 0), (3.51, 1)])
-def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
-    t_s = stamps(0.125)
-    t_s[20:] += (gap - 1.0) * 0.125
-    t_s[40:] += (gap - 1.0) * 0.125
-    run = of._time_base("log", t_s, 20.0)[1]
-    assert run.tolist() == [0] * 20 + [gaps] * 20 + [2 * gaps] * 20
-
-
-def test_a_fast_log_is_sampled_over_each_stretch_from_its_first_stamp():
-    """To the last stamp, or half a step beyond it; no sample in a gap."""
-    t_s = np.array([0.0, 0.1, 0.2, 0.28, 1.0, 1.15, 1.28, 5.0])
-    found, run, step = of._even_time_base(t_s, 0.2)
-    np.testing.assert_allclose(found, [0.0, 0.2, 1.0, 1.2, 5.0])
-    assert (run.tolist(), step) == ([0, 0, 1, 1, 2], 0.2)
-    longer, run, _ = of._even_time_base(np.array([0.0, 0.31, 2.0]), 0.2)
-    np.testing.assert_allclose(longer, [0.0, 0.2, 0.4, 2.0])
-    edge = of._even_time_base(np.array([0.0, 3.49 * 0.2, 2.0]), 0.2)[1]
-    assert edge.tolist() == [0] * 4 + [1]
-
-
-@pytest.mark.parametrize(("step", "averaged"), [(0.059, True), (0.061, False)])
-def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
-    fast = column(stamps(step, 40), np.arange(40.0))
-    t_s = stamps(0.1, 10) + 0.3
-    found = of.sample_column(fast, t_s, 0.1)
-    expected = (of._means_and_age if averaged else of._latest_and_age)(
-        fast, *((t_s, 0.1) if averaged else (t_s,))
-    )
-    np.testing.assert_array_equal(found[0], expected[0])
-    assert found[1] == expected[1]
-
-
-def test_a_held_column_is_the_last_value_known():
-    held = column([1.0, 2.0, 3.0, 4.0], [5.0, np.nan, 7.0, 8.0])
-    values, age_s = of._latest_and_age(held, np.array([0.5, 1.0, 2.5, 3.0, 3.75]))
-    np.testing.assert_array_equal(values, [np.nan, 5.0, 5.0, 7.0, 7.0])
-    assert age_s == pytest.approx((0.0 + 1.5 + 0.0 + 0.75) / 4)
-    assert np.isnan(of._latest_and_age(held, np.array([0.0, 0.5]))[1])
-
-
 def test_the_mean_over_the_interval_that_ends_at_a_sample():
     """Its end is in it, its begin is not, to a millionth of a step; of nothing, the last value."""
     fast = column([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.2], [1.0, 2.0, 4.0, np.nan, 16.0, 32.0, 64.0])
@@ -257,14 +216,3 @@ def test_rates_angles_and_gravity_that_contradict_one_another_are_refused(change
     assert said.startswith("log: ")
     assert says in said
     assert said.endswith(", allowed: what the vehicle file says, or its `unit` mended")
-
-
-@pytest.mark.parametrize(("age_s", "stale"), [(0.69, False), (0.71, True)])
-def test_a_held_value_is_stale_three_and_a_half_usual_steps_after_its_row(age_s, stale):
-    """Of the column's own step, or that of the samples where these are rarer; of its only row, the latter."""
-    held, only = column(stamps(0.2, 60), np.arange(60.0)), column([11.8], [1.0])
-    at = np.array([11.8 + age_s])
-    assert of._is_held_value_stale(held, at, 0.1).tolist() == [stale]
-    assert of._is_held_value_stale(held, at, 0.25).tolist() == [False]
-    assert of._is_held_value_stale(column(stamps(0.1, 119), np.arange(119.0)), at, 0.2).tolist() == [stale]
-    assert of._is_held_value_stale(only, at, 0.2).tolist() == [stale]

@@ -90,26 +90,6 @@ def test_a_failure_that_is_not_found_and_a_flight_without_any():
     )
 
 
-RIGHT = {
-    "the other of the group": ({"left_aileron": 1.0}, ["right_aileron"], True),
-    "both": ({"left_aileron+right_aileron": 1.0}, ["right_aileron"], True),
-    "a kind of either side": ({"left_aileron": 1.0}, ["aileron"], True),
-    "another": ({"elevator": 0.6, "rudder": 0.4}, ["rudder"], False),
-    "one more": ({"elevator+rudder": 1.0}, ["rudder"], False),
-    "longest counts": ({"elevator": 0.4, "rudder": 0.6}, ["rudder"], True),
-    "unknown does not": ({"unknown": 0.9, "rudder": 0.1}, ["rudder"], True),
-    "unknown alone": ({"unknown": 1.0}, ["rudder"], None),
-    "no surface": ({"rudder": 1.0}, ["engine"], None),
-    "nothing failed": ({"rudder": 1.0}, [], None),
-}
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_whether_the_group_is_the_right_one(name):
-    named, surfaces, right = RIGHT[name]
-    assert scoring._is_main_name_right(named, surfaces, GROUPS) is right
-
-
 def test_rows_before_the_first_sample_have_its_label():
     model = small.model()
     samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))

@@ -141,17 +141,6 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     assert trust.tied_shares([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
 
 
-def test_few_minutes_mean_wide_bounds():
-    """Standard errors of gains fall as the root of the time."""
-    errors = []
-    for n in (400, 6400):
-        flights = fitting.fit_parts([small.flight(small.model(), n=n, seed=6)])
-        fit = fitting.fit_order(flights, small.vehicle(), 2, 3)
-        errors.append(fitting.group_gain_sd(fit, small.model()))
-    assert (errors[0] / errors[1] > 2.0).all()
-    assert (errors[0] / errors[1] < 8.0).all()
-
-
 def test_a_model_that_explains_less_than_the_mean_is_refused():
     tests = [
         {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},

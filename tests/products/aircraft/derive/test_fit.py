@@ -48,28 +48,6 @@ def columns(seed, n=300, wide=16):
     return A, rng
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_pursuit_as_before(seed, changed):
-    """Coefficients that halve: some explain too little beside noise."""
-    A, rng = columns(seed)
-    values = 0.5 ** rng.permutation(16)
-    b = A @ values + 0.02 * rng.normal(size=300) + 0.3
-    products = fit.Products(fit.Columns(A), b)
-    pursued = products.pursued(range(16))
-    few = fit.pursue(fit.Columns(A), b, 3)
-    taken, found = fit.pursue(fit.Columns(A), b)
-    least = float(np.linalg.lstsq(A[:, taken], b, rcond=None)[1][0])
-    assert products.unexplained(taken) == pytest.approx(least, rel=1e-6)
-    assert found == pytest.approx(np.linalg.lstsq(A[:, taken], b, rcond=None)[0])
-    assert len(few[0]) == 3
-    assert not changed({
-        "pursued": pursued, "exchanged": products.exchanged(pursued, range(16)), "taken": taken,
-        "values": found, "few": few, "left": [products.unexplained(pursued[:k]) for k in range(4)],
-        "of use": products.of_use([*pursued, *(k for k in range(16) if k not in pursued)], least * 1.3),
-        "total": [products.total, products.square], "scale": fit.Columns(A).scale,
-    })  # fmt: skip
-
-
 def test_the_error_map(trainer, samples, changed):
     first = moving(trainer, samples, [0.001, 0.002, 0.003])
     second = moving(trainer, states(trainer, seed=2), [0.002, 0.001, 0.0])

@@ -228,17 +228,3 @@ def test_an_engine_fails_like_a_surface(bench, side, failures, percent):
         fdm[f"failures/{side}_engine/{name}"] = number
     fdm["fcs/throttle-cmd-norm"] = fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
     assert found == pytest.approx([percent, 60.0], abs=1e-6)
-
-
-def test_forces_and_moments_are_the_coefficients_in_their_own_dimensions(bench):
-    """Area 5.9018 ft2, span 6.8488 ft about roll and yaw, chord 0.9153 ft about pitch."""
-    fdm = bench.fdm
-    bench.place(800.0, (150.0, 7.0, 12.0), (0.1, 0.05, 0.0), (0.2, -0.1, 0.3))
-    force_lbf = fdm["aero/qbar-psf"] * 5.9018
-    for name, coefficient, length_ft in (
-        ("force/X-lbs", "CX", 1.0), ("force/Y-lbs", "CY", 1.0), ("force/Z-lbs", "CZ", 1.0),
-        ("moment/L-lbsft", "Cl", 6.8488), ("moment/M-lbsft", "Cm", 0.9153), ("moment/N-lbsft", "Cn", 6.8488),
-    ):  # fmt: skip
-        value = fdm[f"aero/coefficient/{coefficient}"]
-        assert value != 0.0
-        assert fdm[f"aero/{name}"] == pytest.approx(force_lbf * length_ft * value, rel=1e-6)

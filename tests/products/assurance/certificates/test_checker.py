@@ -4,7 +4,6 @@ conditions by a statement that breaks this one alone."""
 import copy
 from hashlib import sha256
 from math import erfc, exp, radians, sqrt
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -241,36 +240,6 @@ def refused_with(says, call):
 # --- Chance
 
 
-@pytest.mark.parametrize(("sense", "foreseen", "evidence"), [
-    ("either", -0.4, 7.0), ("less", -0.4, 6.6), ("less", 0.4, 7.0),
-])  # fmt: skip
-@pytest.mark.parametrize("room", [0.5, 8.0])
-def test_evidence_of_chance_is_held_against_noise_and_what_a_drift_can_do(
-    monkeypatch, sense, foreseen, evidence, room
-):
-    """N = -7, D = 4 at a level of 5; two constants of tolerance 0.5 and 0.2, with sums of -3 and 1."""
-    sums = np.array([-7.0, 4.0, -3.0, 1.0, foreseen])
-    monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (sums, room))
-    log = {"flap_loss_likelihood_share": np.array([0.0, 0.1, 0.6, 0.3])}
-    said = {"what": None, "likelihood": "flap_loss_likelihood_share", "level": 5.0, "sense": sense,
-            "tolerance": [0.5, 0.2], "first": 1, "frame": 2, "frames": [{}, {}]}  # fmt: skip
-    found = checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
-    limit = max(5.0 * 2.0, room + 2.5 * 2.0)
-    left = evidence - 0.5 * 3.0 - 0.2 * 1.0
-    np.testing.assert_allclose(found, [(left, limit), (0.6 * (1 + 1e-5), left / limit)], rtol=1e-12)
-    with pytest.raises(Refused, match="the log has no column flap_loss_likelihood_share"):
-        checker.likelihood_pairs(said, SimpleNamespace(log={}), declared())
-    if sense == "less":
-        monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (-sums, room))
-        with pytest.raises(Refused, match="the evidence has a negative variance"):
-            checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
-        sums[1] = 4.0
-        turned = sums * [-1.0, 1.0, 1.0, 1.0, 1.0]
-        monkeypatch.setattr(checker, "whitened_sums", lambda said, frames: (turned, room))
-        (((found, _), _)) = checker.likelihood_pairs(said, SimpleNamespace(log=log), declared())
-        assert found == pytest.approx(-14.0 + left)
-
-
 CHANCE: dict[str, Any] = {
     "what": None, "likelihood": "flap_likelihood_share", "level": 5.5, "first": 3, "frame": 4,
     "frames": [{}, {}],
@@ -331,10 +300,3 @@ def test_a_level_is_that_of_a_test_in_each_frame_at_the_declared_rate():
     its = declared(scenario={"fdi": {"statistical": {"false_alarms_per_h": rate_per_h}}})
     for level, says in ((4.7 * (1 + 1e-6), ""), (4.7 * (1 - 1e-6), "level: the declared rate allows")):
         refused_with(says, lambda level=level: checker.check_level(CHANCE | {"level": level}, its))
-
-
-@pytest.mark.parametrize(("is_same", "share"), [("is_same", 1e-12), ("is_same_effect", 1e-9)])
-def test_numbers_are_the_same_but_for_rounding(is_same, share):
-    found = [getattr(checker, is_same)(-3.0, -3.0 * (1.0 + off * share)) for off in (0.9, -0.9, 1.3, -1.3)]
-    assert found == [True, True, False, False]
-    assert [checker.is_same_effect(stated, 0.0) for stated in (0.9e-12, 1.3e-12)] == [True, False]

@@ -2,17 +2,14 @@
 
 import json
 import re
-from math import inf, nan
-from types import SimpleNamespace
 
 import pytest
 import yaml
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.present.page import contents
 from beaver_ftc.studies.sweep import one_flight
-from beaver_ftc_assurance.evidence import flown, shown
+from beaver_ftc_assurance.evidence import shown
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, fly_flight
 from beaver_ftc_assurance.evidence.judged import document_of
 from beaver_ftc_assurance.evidence.plan import load_plan
@@ -100,27 +97,6 @@ def test_two_runs_of_a_plan_differ_in_nothing_but_the_date(tmp_path, monkeypatch
     assert not changed(as_text(document, "FOLDER").splitlines(), "text")
     document["sources"][0]["given"] = "beside/healthy.yaml"
     assert not changed(list(page(document)), "page")
-
-
-@pytest.mark.parametrize(
-    ("robustness", "lost_at_s", "verdict"),
-    [
-        (0.0, None, MET),
-        (-1e-9, None, NOT_MET),
-        (0.0, 3.0, MET),
-        (0.0, 2.9, NOT_SHOWN),
-        (-1e-9, 2.9, NOT_MET),
-        (inf, None, NOT_SHOWN),
-        (nan, None, NOT_SHOWN),
-    ],
-)
-def test_a_formula_is_met_from_zero_on_where_the_flight_lasted_as_far_as_it_looks(
-    robustness, lost_at_s, verdict
-):
-    formula = SimpleNamespace(robustness=lambda columns, rate_hz: robustness, looks_ahead_s=3.0)
-    amounts = Metrics.of({"departure": lost_at_s and {"time_s": lost_at_s}})
-    found = flown._of_formula("text", formula, 100.0, amounts, SimpleNamespace(columns={}))
-    assert found["verdict"] == verdict
 
 
 class Clock:

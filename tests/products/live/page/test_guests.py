@@ -146,15 +146,6 @@ def test_an_address_that_cannot_be_had_is_said_in_a_line(host, says):
 
 
 @pytest.mark.parametrize(
-    ("host", "alone"),
-    [("127.0.0.1", True), ("::1", True), ("localhost", True), ("127.3.2.1", True), ("0.0.0.0", False),
-     ("::", False), ("192.0.2.77", False)],
-)  # fmt: skip
-def test_which_addresses_are_this_machines_alone(host, alone):
-    assert serve.is_loopback(host) is alone
-
-
-@pytest.mark.parametrize(
     ("host", "names"),
     [
         ("127.0.0.1", ("127.0.0.1", "localhost")), ("127.3.2.1", ("127.3.2.1", "localhost")),

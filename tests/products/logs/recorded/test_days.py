@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.recorded import other_days
 from beaver_ftc_logs.recorded.other_days import (
     apply_day_changes,
     unchanged_day,
@@ -46,15 +45,3 @@ def test_what_a_day_makes_of_a_flight(changed, flown, name):
     other = apply_day_changes(replace(unchanged_day(2), **CHANGES[name]), flown, PAST, NOISE)
     assert not changed({"commands": other.commands[::100], "rates": other.rates[::100],
           "all": [in_short(other.commands), in_short(other.rates)]})  # fmt: skip
-
-
-def test_air_by_its_recursion():
-    """Past samples of the rates alone, newest first; what signals do is no air."""
-    past = np.vstack([PAST, [[9.0, 9.0, 9.0]]])  # a signal's row
-    found = other_days._response_to_noise(np.random.default_rng(3), past, NOISE, 40)
-    moments = np.random.default_rng(3).standard_normal((40, 3)) @ np.linalg.cholesky(NOISE).T
-    one = two = np.zeros(3)
-    for k in range(40):
-        now = one @ PAST[:3] + two @ PAST[3:] + moments[k]
-        np.testing.assert_allclose(found[k], now, atol=1e-14)
-        one, two = now, one

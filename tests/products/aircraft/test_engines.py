@@ -1,7 +1,6 @@
 """Engines as effectors: their column of G is arm times thrust over inertia; they take the slow part of what
 surfaces leave; a transport without ailerons and rudder keeps its heading by them, and by nothing else."""
 
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,8 +12,6 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.engines import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis import monitors
-from beaver_ftc.diagnosis.monitors import ENGINE_MONITOR_RECORD
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
@@ -23,7 +20,6 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive
-from beaver_ftc_aircraft.derive.fit import set_engines_apart
 
 M_PER_IN, N_PER_LBF = 0.0254, 4.4482216
 DT, YAW = 0.01, 2
@@ -192,43 +188,6 @@ def test_levers_that_move_as_one_alarm_nobody(jet):
     )  # fmt: skip
     assert np.ptp(flight.log["throttle"]) > 0.2
     assert not flight.metrics["detection"]["detected"]
-
-
-def judged(jet, missing_n, levers=(0.0, 0.0)):
-    """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
-    place in JSBSim's own file."""
-    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINE_MONITOR_RECORD)[0]
-    monitors.configure_balance(of_it["config"], aircraft)
-    names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
-    y = np.zeros(4 + len(names))
-    y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
-    y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
-    of_it, before = of_it.view(np.recarray), of_it["config"].copy()
-    monitors.disable_if_apart(of_it, np.array(levers))
-    alarmed = monitors.detect_engine_failure(of_it, 1e-6, y)
-    assert of_it["config"] == before
-    assert of_it["output"]["engine_failed"] == alarmed
-    return alarmed
-
-
-@pytest.mark.parametrize(("off", "known"), [(1e-8, True), (1e-4, False)])
-def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
-    """Propellers yaw aslant, and by something else while they come to speed."""
-    aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
-    of_it = {
-        "thrust": thrust,
-        "engines_n": monitors.yaw_per_thrust(aircraft) * thrust + [0.0, off, 0.5 * off],
-    }
-    set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
-    assert [("engines_apart" in box) for box in boxes] == [known, known]
-
-
-def test_a_thrust_that_is_missing_on_one_side_alarms(jet):
-    """Beyond what fuel burnt from one side first explains: 0.05 m of 4.9; not once a law moved them apart."""
-    assert judged(jet, 0.013 * 60_000)
-    assert judged(jet, -0.013 * 60_000)
-    assert not judged(jet, 0.009 * 60_000)
-    assert not judged(jet, 30_000, levers=(0.1, -0.1))
 
 
 @pytest.mark.parametrize(

@@ -131,19 +131,6 @@ def test_an_err_in_a_cell_is_that_cell_and_no_more(tmp_path):
     assert column.note == "p_rad_s: 1 cell holds no number, the first in row 9: 'ERR'"
 
 
-@pytest.mark.parametrize(("content", "says"), [
-    (b"0.0,1.0\n0.1,2.0\n", "its first line holds numbers and no names"),
-    (bytes(range(256)), "it holds bytes that are no text"),
-    ("t_s,p\n1,2\n".encode("utf-16"), "is written in UTF-16"),
-    (b"a line\nanother\n", "no line of names with a line of as many numbers below it"),
-    (b"t_s,p\n1,2\n1,2,3\n1\n", "2 of 3 lines have another number of cells than the header"),
-])  # fmt: skip
-def test_no_table_says_what_was_found(tmp_path, content, says):
-    (tmp_path / "a.csv").write_bytes(content)
-    with pytest.raises(BadInput, match=says):
-        read_flight(tmp_path / "a.csv")
-
-
 def test_columns_of_a_vehicle_have_units_scale_and_offset(tmp_path):
     (tmp_path / "v.yaml").write_text(
         "name: w\ntime: {column: ms, unit: ms}\n"

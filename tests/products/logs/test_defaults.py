@@ -1,4 +1,4 @@
-"""What is assumed where a vehicle file says nothing of laws and air; evidence in other noise; groups."""
+"""What is assumed where a vehicle file says nothing of laws and air."""
 
 import pytest
 import small

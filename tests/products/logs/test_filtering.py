@@ -14,7 +14,7 @@ from beaver_ftc_logs.filtering import (
     bank_posterior,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
-from products.logs import synthetic
+from products.logs import small, synthetic
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +102,16 @@ def test_evidence_is_the_log_of_a_likelihood_ratio():
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
     assert filtering.fault_evidence(posterior, bank) == pytest.approx(expected)
     assert np.isfinite(filtering.fault_evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()
+
+
+@pytest.mark.parametrize(("delay_s", "share", "later"), [
+    (0.03, 0.3, True), (-0.03, 0.3, False), (0.1, 1.0, True), (0.7, 1.0, True), (-0.2, 1.0, False),
+])  # fmt: skip
+def test_commands_that_act_sooner_or_later(delay_s, share, later):
+    """So much of the command of the sample before, or of the one after; the ends repeated."""
+    samples = small.flight(small.model(), 12)
+    found = _with_command_delay(samples, delay_s).commands
+    at = np.clip(np.arange(12) + (-1 if later else 1), 0, 11)
+    np.testing.assert_allclose(
+        found, (1 - share) * samples.commands + share * samples.commands[at], atol=1e-15
+    )

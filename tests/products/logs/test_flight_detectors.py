@@ -1,6 +1,4 @@
-"""Plain estimators, the freeze rule and the loop's detectors, on small flights: by another road, or whole."""
-
-from types import SimpleNamespace
+"""Least squares on small flights, by one batch; which detectors a flight may have."""
 
 import numpy as np
 import pytest
@@ -8,13 +6,11 @@ import pytest
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
-from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.regression import unexplained_rates
 from products.logs import small
 
 WING = small.model(settings={"levels": {"left": [0.4, 0.8]}, "level_step": 0.25, "trim_sd": 0.3})
 BARE = small.model()
-TAIL = small.model(small.TAIL)
 LOST = ((1, 150, 400, 0.4),)
 METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-squares"}
 
@@ -63,45 +59,11 @@ def test_least_squares_by_one_batch(name):
     assert rows.isolated_surfaces[399] == "left"
 
 
-def logged(*columns):
-    return RecordedFlight("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
-
-
-def test_an_output_that_stands_still_for_six_seconds_is_frozen():
-    """Still from 2 s on, until 20 s; each sample knows the last output up to its own time."""
-    t_s = np.arange(1.0, 30.0, 2.0)
-    values = np.where((t_s > 2.0) & (t_s < 20.0), 5.0, t_s)
-    moving = ("elevator_output", np.arange(0.0, 30.0, 3.0), np.arange(10.0))
-    samples = small.flight(TAIL, 60, dt_s=0.5, t_s=0.5 * np.arange(60))
-    rows = detectors.diagnose_by_freeze_rule(logged(("left_output", t_s, values), moving), samples, TAIL)
-    frozen = [3.0 + 6.0 < t < 21.0 for t in samples.t_s]
-    assert rows.faulty.tolist() == frozen
-    assert set(rows.isolated_surfaces[np.array(frozen)]) == {"left_aileron"}
-    np.testing.assert_array_equal(
-        rows.effectiveness, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))])
-    )
-    np.testing.assert_array_equal(rows.fault_probability, np.array(frozen, dtype=float))
-    np.testing.assert_array_equal(rows.effectiveness_low, rows.effectiveness)
-    np.testing.assert_array_equal(rows.effectiveness_high, rows.effectiveness)
-
-
 LOSS = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
 
 
 def left(share):
     return LOSS._replace(effectiveness=np.array([0.9, share, 0.2, 0.1]))
-
-
-def test_a_detector_is_stepped_through_the_whole_flight():
-    told = []
-    detector = SimpleNamespace(
-        reset=lambda context: told.append(context.dt_s),
-        step=lambda measured, command: told.append(measured.t_s) or Verdict(statistic=measured.t_s),
-    )
-    samples = small.flight(BARE, 30)
-    rows = detectors.run_loop_detector(detector, samples, BARE)
-    assert told == [0.1, *samples.t_s]
-    assert np.flatnonzero(rows.faulty)[0] == 11
 
 
 def test_detectors_of_flights_come_first_and_others_are_refused():

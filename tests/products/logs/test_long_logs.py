@@ -1,4 +1,4 @@
-"""A long log is read in parts: memory does not grow with it, and what is said is what the whole says."""
+"""A long log is read in parts: memory does not grow with it, and mistakes are said by their row."""
 
 import os
 import subprocess

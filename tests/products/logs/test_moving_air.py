@@ -9,7 +9,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
-from beaver_ftc_logs.model import load_model, model_file_text
 from beaver_ftc_logs.samples import whiten_samples
 from products.logs import small
 
@@ -121,18 +120,6 @@ def test_columns_are_compared_in_white(moving, colour):
     assert colour == (1.0,) or min(plain.upper_gains) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
-
-
-@pytest.mark.parametrize(("keys", "rate_hz"), [
-    ({}, 20.0), ({"max_rate_hz": 40}, 40.0), ({"moving_air": True}, 100.0),
-    ({"moving_air": True, "max_rate_hz": 50}, 50.0),
-])  # fmt: skip
-def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
-    """In memory a key that was left out is known to be; a file has every key."""
-    model = small.model(small.WING | keys)
-    assert model.vehicle.max_sample_rate_hz == rate_hz
-    (tmp_path / "model.json").write_text(model_file_text(model))
-    assert load_model(tmp_path / "model.json").vehicle.max_sample_rate_hz == rate_hz
 
 
 @pytest.mark.parametrize("a", [0.9, 0.3])

@@ -1,4 +1,4 @@
-"""What the readers make of small files: every column, event and refusal."""
+"""What the readers of ALFA and of tables make of small files: every column, event and refusal."""
 
 import numpy as np
 import pytest

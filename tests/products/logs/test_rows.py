@@ -1,11 +1,10 @@
-"""From probabilities of hypotheses to rows: each step by hand, and the whole as it was kept."""
+"""From probabilities of hypotheses to rows: when a name stands, and which bounds hold."""
 
 import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
-from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_bank
 from products.logs import small
 
 SETTINGS = {"level_step": 0.25, "alarm": 0.5, "bounds": 0.8}
@@ -50,36 +49,3 @@ LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
 def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
     low, high = diagnose._credible_bounds(LEVELS, np.array([mass]), 0.8)
     assert (low[0], high[0]) == bounds
-
-
-def posterior(bank, *shares):
-    """A row each: {what: probability}, what being `idle`, `unknown` or (level of each group)."""
-    rows = np.zeros((len(shares), len(bank.hypothesis_kind)))
-    for row, said in zip(rows, shares, strict=True):
-        for what, share in said.items():
-            if isinstance(what, str):
-                row[
-                    (bank.hypothesis_kind == {"idle": NO_RESPONSE, "unknown": UNKNOWN_OFFSET}[what]).argmax()
-                ] = share
-                continue
-            row[
-                ((bank.effectiveness == what).all(axis=1) & (bank.hypothesis_kind != UNKNOWN_OFFSET)).argmax()
-            ] = share
-    return rows
-
-
-SOUND, RIGHT, LEFT, BOTH = (1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
-
-
-@pytest.mark.parametrize("threshold", [None, 4.0])
-def test_evidence_began_where_its_sum_was_last_at_zero(monkeypatch, threshold):
-    """However high it may rise; in the first row where it never was."""
-    model = small.model(settings=SETTINGS | {"threshold": threshold})
-    gained = np.array([1.0, 2.0, -9.0, 2.0, 5.0, -6.0, 1.0, -3.0, -1.0, 2.0])
-    monkeypatch.setattr(diagnose, "fault_evidence", lambda of, by: gained)
-    bank = build_bank(model)
-    samples = small.flight(model, 10, t_s=7.0 + 0.25 * np.arange(10))
-    found = diagnose.rows_of_posterior(samples, model, bank, posterior(bank, *[{SOUND: 1.0}] * 10))
-    # sums 1 3 0 2 7 1 2 0 0 2, and 1 3 0 2 4 0 1 0 0 2 where 4 is the most
-    since = [0, 0, 2, 2, 2, 2, 2, 7, 8, 8] if threshold is None else [0, 0, 2, 2, 2, 5, 5, 7, 8, 8]
-    assert found.evidence_start_time_s.tolist() == samples.t_s[since].tolist()

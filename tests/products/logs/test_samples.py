@@ -1,4 +1,4 @@
-"""One time base for all columns of a log: each step at its bounds, on columns made by hand."""
+"""One time base for all columns of a log: on columns made by hand, each in SI; contradictions refused."""
 
 import numpy as np
 import pytest

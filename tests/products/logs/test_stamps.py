@@ -1,4 +1,4 @@
-"""A log whose clock jumps: a gap costs nothing, a stamp out of order is said with its row."""
+"""A log whose clock jumps: a gap costs nothing, and what is left out is said."""
 
 import json
 

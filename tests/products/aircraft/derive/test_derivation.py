@@ -1,11 +1,11 @@
-"""Which aircraft is meant, where it goes, and how many terms there is room for."""
+"""Which aircraft is meant, where it goes, and where it is sampled."""
 
 from pathlib import Path
 
 import pytest
 
 from beaver_ftc.aircraft import aircraft as loading
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_aircraft.derive import derivation, outline
 from beaver_ftc_aircraft.derive.derivation import Source, source_of
 
@@ -49,23 +49,6 @@ def test_only_what_was_derived_is_written_over(tmp_path):
     assert derivation._target(Source("a", Path(), target=tmp_path / "b"), None) == tmp_path / "b"
     with pytest.raises(BadInput, match=r"^mine: give --out DIR"):
         derivation._target(source, None)
-
-
-def test_a_copy_of_the_model_is_put_on_trial(monkeypatch):
-    asked = []
-    monkeypatch.setattr(derivation, "lacking_in_trial", lambda model: asked.append(model) or ["of/0", "of/1"])
-    source = Source("mine", TRAINER / "trainer.xml")
-    assert derivation.try_out(source) == ("of/0", "of/1")
-    (model,) = asked
-    assert (model.name, model.parent.name) == ("trainer.xml", "mine")
-    assert model.parent != TRAINER
-
-    def fails(model):
-        raise SimulationFailed("no")
-
-    monkeypatch.setattr(derivation, "lacking_in_trial", fails)
-    with pytest.raises(SimulationFailed, match=r"^mine: no$"):
-        derivation.try_out(source)
 
 
 def test_where_to_sample_is_read_from_a_file(tmp_path):

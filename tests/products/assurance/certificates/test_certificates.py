@@ -16,6 +16,8 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
+from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
+from beaver_ftc.results.writer import run
 from beaver_ftc_assurance.certificates import check_certificate
 from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import failures
@@ -445,3 +447,25 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
         main()
     assert ended.value.code == 2
     assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
+
+
+def test_a_run_writes_the_certificate_of_its_flight(tmp_path):
+    scenario = bf.load(
+        {"name": "test", "duration_s": 3.0, "reference": SINES, "faults": [STUCK]} | {"fdi": SOUND}
+    )
+    run(scenario, tmp_path, report=False, certified=True)
+    assert (tmp_path / "test/certificate.json").read_text() == as_text(bf.fly(scenario).certificate())
+
+
+@pytest.mark.parametrize("kind", range(N_TYPES))
+def test_the_checker_defines_every_type_as_its_row_does(kind):
+    """It is written apart from the rows."""
+    row, words, travel = TYPES[kind], DESCRIPTIONS_IN_TYPE_ORDER[kind], (-0.2, 0.7)
+    if row.frames_test:
+        found = check_certificate.COURSES[words]
+        assert found == (row.frames_test.replace(" ", "_"), row.stop_direction)
+        return
+    relation = row.deflection_relation
+    expected = relation.command_gain, relation.theta_is_share, row.has_constant_parameter
+    found = check_certificate.RELATIONS[words](*travel)
+    assert found == (*expected, *relation.theta_span(*travel))

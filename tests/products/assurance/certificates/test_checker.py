@@ -1,5 +1,5 @@
-"""The checker by itself, on a log made by hand: what it computes by plain sums over rows, and each of its
-conditions by a statement that breaks this one alone."""
+"""The checker by itself, on a log made by hand: a sum over filters by plain sums over rows, and its
+conditions, each by a statement that breaks this one alone."""
 
 import copy
 from hashlib import sha256
@@ -232,12 +232,6 @@ def refused_with(says, call):
     with pytest.raises(Refused) as refused:
         call()
     assert str(refused.value).startswith(says)
-
-
-# --- Courses
-
-
-# --- Chance
 
 
 CHANCE: dict[str, Any] = {

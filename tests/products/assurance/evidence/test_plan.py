@@ -119,12 +119,6 @@ def test_a_plan_has_as_many_flights_as_are_allowed(write, monkeypatch, most, say
         assert len(load_plan(write(GOOD)).cases) == 6
 
 
-@pytest.mark.parametrize("meant", ["many", "elevator-stuck", "surfaces-grid"])
-def test_flights_of_the_plan_built_in_scenarios_and_sweeps_are_suggested(meant, write):
-    with pytest.raises(BadInput, match=f"no flight of the plan and not built in, did you mean {meant}[?]"):
-        load_plan(write(GOOD.replace("[many,", f"[{meant[:-1]},")))
-
-
 def test_a_mistake_in_a_file_that_is_named_is_in_that_file(write, tmp_path):
     (tmp_path / "deeper" / "also.yaml").write_text("name: also\nduration: 3\n")
     with pytest.raises(BadInput, match=r"^.*deeper/also.yaml:2: duration: unknown key"):

@@ -1,4 +1,4 @@
-"""The environment's parts by hand: spaces, seeds, what a step sees and costs, who flies which episode."""
+"""What a step of the environment sees and costs, in the units that its docstring says."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""ArduPilot's packets and answers: both forms, and the reader on the other side, in Python and in C."""
+"""ArduPilot's packets and answers: both forms, and the reader on the other side."""
 
 import struct
 

@@ -138,18 +138,6 @@ def test_the_small_autopilot_takes_off_climbs_turns_and_lands(over):
     assert not sim._diagnoses
 
 
-def test_in_declared_turbulence_the_diagnosis_begins_above_2000_ft():
-    """As its declaration is meant; until then it does not listen, and no other wheel or gust wakes it."""
-    air = {"environment": {"turbulence": "dryden", "severity": "light"}, "fdi.bounds.turbulence": "light"}
-    sim = Flown(scenario(300.0, **air), ground_m=300.0)
-    assert not any("turbulence" in warning for warning in scenario(300.0, **air).warnings())
-    heights = {300.0: False, 900.0: False, 920.0: True, 905.0: False, 911.0: False}
-    for height_m, listens in heights.items():
-        sim._frame["truth"]["value"][[5, 12]] = 40.0, height_m
-        sim._start_or_stop_diagnosis()
-        assert sim._diagnoses == listens, height_m
-
-
 def test_what_cannot_begin_on_the_ground():
     base = scenario()
     with pytest.raises(

@@ -193,3 +193,19 @@ def test_a_link_to_itself_is_no_file_to_hand_in(tmp_path):
         str(done.exception)
         == f"{tmp_path / 'mine'}: is no Python file, allowed: one .py file, or a folder with one"
     )
+
+
+def test_nobody_else_may_read_where_hidden_flights_lie(tmp_path):
+    at = tmp_path / "autumn"
+    folders.new(at, 4, grading.rules())
+    for place, others in (
+        ("teacher", 0o040), ("teacher", 0o001), ("teacher/healthy.yaml", 0o004), ("teacher/loss.yaml", 0o020),
+    ):  # fmt: skip
+        path, own = at / place, 0o700 if place == "teacher" else 0o600
+        path.chmod(own | others)
+        with pytest.raises(BadInput) as refused:
+            folders.hidden_flights(at)
+        assert str(refused.value) == (
+            f"challenge grade: {path}: others may read it, allowed: its owner alone (chmod go= {path})"
+        )
+        path.chmod(own)

@@ -1,4 +1,4 @@
-"""When an answer is late: what the system says of a process, and what follows of it, from given numbers."""
+"""The line to a submission: which message is taken, what it may know, what its time costs, how it ends."""
 
 import signal
 import sys
@@ -11,31 +11,6 @@ import pytest
 from beaver_ftc_live.challenge import line, pilot
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="accounts are Linux's")
-
-
-@pytest.mark.parametrize(
-    ("over_s", "wants", "computed_s", "waited_s", "late"),
-    [
-        (-0.5, True, 9.0, 3.0, False),  # it has time
-        (0.5, True, 4.9, 3.0, False),  # 2.9 s computed of 3, it waits for others
-        (0.5, True, 5.1, 9.0, True),
-        (0.5, False, 5.1, 1.4, True),  # it sleeps, others kept it waiting for 0.4 s
-        (0.5, False, 9.0, 1.7, False),
-    ],
-)
-def test_who_has_had_its_time_is_late(monkeypatch, over_s, wants, computed_s, waited_s, late):
-    """3 s are allowed; before, 2 s were computed and 1 s waited."""
-    monkeypatch.setattr(line.time, "monotonic", lambda: 100.0 + over_s)
-    monkeypatch.setattr(line.select, "select", lambda *_: ([], [], []))
-    stranger = object.__new__(line.SubmittedDetector)
-    stranger._deadline, stranger._before = 100.0, (3.0, 1.0, 2.0)
-    stranger._accounts = SimpleNamespace(
-        wants_a_processor=lambda: wants, computed_s=lambda: computed_s, waited_s=lambda: waited_s
-    )
-    process = SimpleNamespace(stdout=None)
-    assert stranger._is_late(process) == late
-    monkeypatch.setattr(line.select, "select", lambda *_: ([process.stdout], [], []))
-    assert not stranger._is_late(process)  # what it has said is there
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Both ends of the line, without a process between them: what the grader sends is what the pilot unpacks."""
+"""Both ends of the line, without a process between: what the grader sends is what a submission is shown."""
 
 from types import SimpleNamespace
 

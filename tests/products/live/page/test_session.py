@@ -175,3 +175,15 @@ def test_the_rates_of_a_level_turn():
     rates = level_turn(np.pi / 3, 0.0, 98.0665 * np.tan(np.pi / 3))
     assert rates == pytest.approx([0.0, 0.1 * np.sin(np.pi / 3), 0.05])
     assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
+
+
+def test_what_the_session_was_given_can_be_flown_again_and_files_cannot(session):
+    given = bf.load({"name": "mine", "seed": 77})
+    own = Session(given, session._out)
+    asked(own, do="fresh", scenario="fault-free")
+    assert own.hello()["scenario"] == "fault-free"
+    assert "mine" in own.hello()["scenarios"]
+    asked(own, do="fresh", scenario="mine", law="lqr")
+    assert (own.scenario.seed, own.scenario.control.law, own.hello()["law"]) == (77, "lqr", "lqr")
+    with pytest.raises(BadInput, match="scenario: 'fault-fre' is not known, did you mean fault-free"):
+        asked(own, do="fresh", scenario="fault-fre")

@@ -1,4 +1,4 @@
-"""Other days: which they are, what each change makes of a flight by another road, and how they are told."""
+"""Other days: what each change makes of a flight."""
 
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ import pytest
 from beaver_ftc_logs.bank import (
     GROUP_LOSS,
     build_bank,
-    build_noise,
-    build_states,
 )
 from products.logs import small
 
@@ -23,22 +21,6 @@ MODELS = {
     "slaved, may be stuck": small.model(small.TAIL, settings=SETTINGS),
     "one group": small.model(ONE, settings=SETTINGS),
 }
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_the_hypotheses_of_a_model(changed, name):
-    assert not changed(build_bank(MODELS[name])._asdict())
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_what_may_differ_from_a_model(changed, name):
-    model = MODELS[name]
-    assert not changed(
-        {
-            "adaptation": build_states(model)._asdict(),
-            "noise": build_noise(model)._asdict(),
-        }
-    )
 
 
 def test_levels_seen_carry_their_share_of_a_groups_faults():

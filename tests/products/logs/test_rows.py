@@ -5,6 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
+from beaver_ftc_logs.bank import UNKNOWN_OFFSET, build_bank
 from products.logs import small
 
 SETTINGS = {"level_step": 0.25, "alarm": 0.5, "bounds": 0.8}
@@ -49,3 +50,38 @@ LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
 def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
     low, high = diagnose._credible_bounds(LEVELS, np.array([mass]), 0.8)
     assert (low[0], high[0]) == bounds
+
+
+def posterior(bank, *shares):
+    """A row each: {level of each group: probability}."""
+    rows = np.zeros((len(shares), len(bank.hypothesis_kind)))
+    for row, said in zip(rows, shares, strict=True):
+        for levels, share in said.items():
+            its = (bank.effectiveness == levels).all(axis=1) & (bank.hypothesis_kind != UNKNOWN_OFFSET)
+            row[its.argmax()] = share
+    return rows
+
+
+RIGHT, LEFT, BOTH = (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
+
+
+def test_names_under_other_laws(monkeypatch):
+    """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
+    settings = WING.settings.model_copy(update={"alarm_threshold": 2.0})
+    other = {"name_evidence_ratio": 4.0, "rename_hold_s": 1.0, "one_faulty_group": True}
+    asks = settings.model_copy(update=other)
+    model = WING.model_copy(update={"settings": asks})
+    reach = round(WING.rate_hz)
+    gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
+    monkeypatch.setattr(diagnose, "fault_evidence", lambda posterior, bank: gained)
+    shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
+    bank = build_bank(model)
+
+    def named_by(of):
+        found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
+        assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
+        return found.isolated_surfaces.tolist()
+
+    assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
+    same = model.model_copy(update={"settings": settings})
+    assert named_by(same) == ["", *["left"] * 3, "right+left", *["right"] * (2 * reach + 1)]

@@ -70,11 +70,6 @@ def test_a_log_on_one_time_base():
     np.testing.assert_array_equal(tail.signals, t_s[:, None])
 
 
-def test_the_mixer_has_a_row_a_surface():
-    tail = small.vehicle(small.TAIL)
-    assert of.mixer_matrix(tail).tolist() == [[1.0, 0.0], [0.0, 0.8], [0.5, 0.0]]
-
-
 MILLION = np.full(60, 1e6)
 REFUSED = {
     "missing": ({"roll": None}, "no column roll, allowed: a log that has it; it has p_rad_s, q_rad_s, r_rad"),

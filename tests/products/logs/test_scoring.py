@@ -88,11 +88,3 @@ def test_a_failure_that_is_not_found_and_a_flight_without_any():
         0,
         0.0,
     )
-
-
-def test_rows_before_the_first_sample_have_its_label():
-    model = small.model()
-    samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))
-    given = small.rows([(3, "left", [1.0, 0.5])])  # at 10, 10.5, 11
-    early = LogRows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
-    assert scoring.score_diagnosis(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)

@@ -58,15 +58,6 @@ def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past_coefficients)[1], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["multiple-models", "sliding-least-squares"])
-def test_a_rival_finds_a_large_loss(flown, wing_model, name):
-    rows = diagnose_with_detector(name, flown, wing_model)
-    late = rows.t_s > 90.0
-    assert rows.faulty[late].mean() > 0.8
-    assert np.mean(rows.isolated_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
-    assert rows.faulty[(rows.t_s > 30) & (rows.t_s < 60)].mean() < 0.3
-
-
 def test_an_unknown_detector(flown, wing_model):
     with pytest.raises(BadInput, match="--detector ekf: is not known"):
         diagnose_with_detector("ekf", flown, wing_model)

@@ -167,18 +167,6 @@ def under_an_autopilot(folder, name):
     return vehicle.flight.land()
 
 
-def test_it_flies_under_an_autopilot(derived):
-    _, folder, name = derived
-    landed = under_an_autopilot(folder, name)
-    assert landed.passed, landed
-
-
-def test_it_does_not_stand_on_the_ground(derived):
-    _, folder, name = derived
-    with pytest.raises(BadInput, match=f"{name}'s file has no `ground` to stand on, allowed: false"):
-        load_text(FLIGHT.replace("NAME", name) + "initial: {on_ground: true}", folder=folder)
-
-
 def test_what_leaves_the_envelope_raises_no_alarm(derived):
     """A steep dive at a rate the map does not have: nothing is known there, so nothing is said."""
     wild = {"reference.q": [{"step": {"amplitude_deg_s": -30, "start_s": 3, "end_s": 4.5}}], "duration_s": 8}

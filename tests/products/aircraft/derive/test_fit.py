@@ -1,4 +1,4 @@
-"""The fit in steps: coefficients from accelerations, columns that are taken, errors in boxes."""
+"""The fit in steps: coefficients from accelerations, errors in boxes."""
 
 import numpy as np
 import pytest
@@ -30,22 +30,6 @@ def test_coefficients_follow_from_the_accelerations_and_errors_from_the_coeffici
     one = fit._accelerations(samples, trainer)
     size = samples.y[:, 3].mean() * 15.1
     assert one == pytest.approx([size * 10.4 / 1310.0, size * 1.48 / 1890.0, size * 10.4 / 2870.0])
-
-
-def test_regressors_are_the_products(trainer, samples):
-    products = [({}, None), ({"alpha": 2, "mach": 1}, None), ({"beta": 1}, "rudder"), ({"qh": 3}, None)]
-    A = fit.regressors(samples, trainer, products)
-    (alpha, beta, V, _), q = samples.y.T, samples.x[:, 1]
-    columns = [np.ones(400), alpha**2 * samples.signals["mach"], beta * samples.u[:, 2], (q * 1.48 / V) ** 3]
-    assert pytest.approx(np.column_stack(columns)) == A
-
-
-def columns(seed, n=300, wide=16):
-    """Columns of which neighbours are much alike."""
-    rng = np.random.default_rng(seed)
-    A = rng.normal(size=(n, wide))
-    A[:, 1::2] = A[:, ::2] + 0.6 * A[:, 1::2]
-    return A, rng
 
 
 def test_the_error_map(trainer, samples, changed):

@@ -77,16 +77,3 @@ def test_the_autopilot_flies_not_the_page(vehicle):
         answer = page.ask(n=n, **request)
         assert not answer["ok"]
         assert answer["says"] == f"{request['do']}: not under an autopilot, allowed: break, repair, blow"
-
-
-def test_a_flight_begun_anew_is_shown_anew(vehicle):
-    page = Page(vehicle)
-    fly(vehicle, 50)
-    page.told("f")
-    vehicle.begin(100)
-    assert len(page.told("hello")) == 1
-    vehicle.begin(200)
-    (hello,) = page.told("hello")
-    assert hello["rate_hz"] == 200
-    fly(vehicle, 5)
-    assert page.told("hello") == []

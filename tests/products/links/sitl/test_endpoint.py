@@ -97,25 +97,6 @@ def test_a_flight_over_tcp_with_a_second_caller_and_a_ground_station():
     assert (autopilot.gps.fix_type, autopilot.gps.satellites_visible) == (3, 12)
 
 
-def test_the_ground_station_breaks_a_servo():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
-        ground.bind(("127.0.0.1", 0))
-        ground.settimeout(5)
-        small = Small()
-
-        def pilot(told):
-            if told.t_s == 0.2:
-                _, sender = ground.recvfrom(65536)
-                ground.sendto(peers.Px4(None).inject(102, 2, 4), sender)
-            return small.outputs(told)
-
-        with served("ardupilot", ground=ground.getsockname(), speed=20.0) as at:
-            peers.Ardupilot(pilot, 100).fly(at.address, 500)
-    (fault,) = at.flight.metrics["faults"]
-    assert (fault["actuator"], fault["type"]) == ("rudder", "stuck")
-    assert "rudder: stuck" in at.said
-
-
 def started(folder, protocol, *more):
     """The command itself, and where it listens."""
     (folder / "case.yaml").write_text(CASE, encoding="utf-8")

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pyarrow import csv as arrow
 from pyarrow import parquet
 from typer.testing import CliRunner
@@ -331,3 +333,21 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     del logged["theta"]
     with pytest.raises(BadInput, match=r"^log: attitude\.pitch: is missing, allowed: its column"):
         by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
+
+
+shares, sizes = st.floats(-1.0, 0.0), st.floats(-3.0, 3.0)
+
+
+@given(theta=shares, slopes=st.tuples(sizes, sizes, sizes), off=st.tuples(sizes, sizes, sizes))
+def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
+    bound = np.abs(off)
+    expected = np.array(slopes)[None, :, None]
+    innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
+    least, greatest = stepped._explaining_losses(innovation, bound[None, :, None], expected)
+    assert least[0, 0] <= theta <= greatest[0, 0]
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
+def test_the_latest_greatest_looks_back_only(values, reach):
+    found = stepped._sliding_maximum(np.array(values)[:, None], reach)[:, 0]
+    assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]

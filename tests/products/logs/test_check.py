@@ -8,7 +8,6 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 from products.logs.test_signals import T_S, turning
@@ -118,17 +117,6 @@ def test_a_log_without_rates_names_what_it_has(tmp_path):
     done = run("identify", "--check", path)
     assert done.exit_code == 2
     assert "no column looks like the rate p" in done.stdout
-
-
-def test_an_err_in_a_cell_is_that_cell_and_no_more(tmp_path):
-    lines = synthetic.write_csv(tmp_path / "a.csv", synthetic.fly(20.0)).read_text().splitlines()
-    cells = lines[9].split(",")
-    lines[9] = ",".join([cells[0], "ERR", *cells[2:]])
-    lines[12] = ",".join([(cells := lines[12].split(","))[0], "NA", *cells[2:]])  # missing, and no text
-    (tmp_path / "b.csv").write_text("\n".join(lines) + "\n")
-    column = read_flight(tmp_path / "b.csv").columns["p_rad_s"]
-    assert np.flatnonzero(np.isnan(column.values)).tolist() == [8, 11]
-    assert column.note == "p_rad_s: 1 cell holds no number, the first in row 9: 'ERR'"
 
 
 def test_columns_of_a_vehicle_have_units_scale_and_offset(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.recording import package_errors_as_bad_input
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
@@ -76,30 +75,6 @@ def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
         np.testing.assert_allclose(columns[name].t_s, t_s + 0.01 * i, atol=1e-6)
         np.testing.assert_array_equal(columns[name].values, np.sin(t_s) + 0.5 * i)
         assert columns[name].note == ""
-
-
-def stumble(error):
-    print("what a package prints stays here")
-    raise error
-
-
-@pytest.mark.parametrize(
-    ("error", "reason"),
-    [
-        (ValueError("a header\n  of no\tsense"), "a header of no sense"),
-        (struct.error(""), "error"),
-        (KeyError(140), "140"),
-    ],
-)
-def test_what_a_package_stumbles_over_is_one_line(tmp_path, capsys, error, reason):
-    with (
-        pytest.raises(BadInput) as refused,
-        package_errors_as_bad_input(tmp_path, "logbook", "pylogbook", "a .book of a ship"),
-    ):
-        stumble(error)
-    says = f"{tmp_path}: is no logbook that can be read ({reason}), allowed: a .book of a ship"
-    assert str(refused.value) == says
-    assert capsys.readouterr().out == ""
 
 
 def dataflash_format(number, size, name, codes, fields):

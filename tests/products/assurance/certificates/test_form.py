@@ -87,13 +87,6 @@ def test_what_is_another_is_refused_in_words(changed):
     assert not changed(found)
 
 
-@pytest.mark.parametrize("gone", ["pole_per_s", "since", "x", "weight"])
-def test_fields_that_go_together(gone):
-    term = {name: value for name, value in TERM.items() if name != gone}
-    with pytest.raises(Refused, match="a pole needs the frame" if gone in ("pole_per_s", "since") else gone):
-        check_statement_form(SUM | {"terms": [term]})
-
-
 def test_what_a_scenario_declares_from_a_row_on():
     """Noise cut off at 4 standard deviations, bias, half a step of the resolution: 0.1, 0.03, 0.02 of p."""
     gyro = {"noise_std_deg_s": 0.1, "bias_deg_s": -0.03, "quantum_deg_s": 0.04, "scale_error": -0.2}

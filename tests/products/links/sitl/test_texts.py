@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +10,10 @@ from pymavlink.dialects.v20 import common
 from tools.autopilots.small import Small, Told
 
 import beaver_ftc as bf
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import failures
+from beaver_ftc_links.sitl.link import Times
 from beaver_ftc_links.sitl.mavlink import Mavlink
 from beaver_ftc_links.sitl.telling import CRITICAL, INFO, WARNING, Teller, Text
 from beaver_ftc_links.sitl.vehicle import Vehicle
@@ -118,3 +122,30 @@ def test_only_the_command_for_failures_is_obeyed():
     assert answers[0] == (b"", "")
     (ack,) = common.MAVLink(None).parse_buffer(answers[1][0])
     assert (ack.command, ack.result, ack.target_system, ack.target_component) == (420, 0, 255, 190)
+
+
+@given(st.lists(st.floats(2e-6, 9.0), min_size=1, max_size=200), st.floats(0.01, 1.0))
+def test_quantiles_to_four_percent(times_s, share):
+    times = Times()
+    for time_s in times_s:
+        times.add(time_s)
+    exact = np.sort(times_s)[int(np.ceil(share * len(times_s))) - 1]
+    assert exact <= times.quantile(share) * (1 + 1e-12)
+    assert times.quantile(share) <= exact * 1.04
+    assert times.mean == pytest.approx(np.mean(times_s))
+    assert times.spread == pytest.approx(np.std(times_s), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (None, None), ("host:14550", ("host", 14550)), ("[::1]:1", ("[::1]", 1)), ("h:65535", ("h", 65535)),
+        *((wrong, BadInput) for wrong in ("h:65536", "h:0", "h:-1", "h:x", ":14550", "host", "")),
+    ],
+)  # fmt: skip
+def test_an_address_is_a_host_and_a_port(given, found):
+    if found is BadInput:
+        with pytest.raises(BadInput, match=r"^--mavlink: .* is no address, allowed: HOST:PORT"):
+            address(given)
+    else:
+        assert address(given) == found

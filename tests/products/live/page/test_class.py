@@ -3,9 +3,12 @@
 import json
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from live_site import EVERYTHING, Site, says
 
-from beaver_ftc_live.page import server
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_live.page import messages, server
 
 
 @pytest.fixture
@@ -142,3 +145,14 @@ def test_a_guest_reaches_the_pages_files_alone(site, path):
     status, _, body = site.get(f"{room}/{path}", cookie=site.keys[0])
     assert status in (403, 404)
     assert b"import" not in body
+
+
+@given(st.text(max_size=40))
+def test_a_name_is_one_short_line_that_says_whose_it_is(name):
+    try:
+        request = messages.parse(json.dumps({"do": "name", "name": name}))
+    except BadInput:
+        return
+    assert 0 < len(request.name) <= 24
+    assert request.name.isprintable()
+    assert request.name == request.name.strip()

@@ -63,20 +63,6 @@ def score(usable_flights, vehicle, order):
     return len(y) * np.linalg.slogdet(rest.T @ rest / len(y))[1] + 3 * x.shape[1] * np.log(len(y))
 
 
-ORDERS = [(history, lags) for history in (1, 2, 3, 4) for lags in (2, 3, 4, 6)]
-
-
-@pytest.mark.parametrize("true", [(1, 2), (2, 3), (3, 4), (4, 6)])
-@pytest.mark.parametrize("of", [small.WING, small.TAIL], ids=["wing", "tail"])
-def test_the_order_is_the_one_of_the_least_criterion(of, true):
-    model = small.model(of, history=true[0], lags=true[1])
-    usable_flights = fitting.fit_parts([small.flight(model, 400), small.flight(model, 300, seed=3)])
-    found = fitting.choose_order(usable_flights, model.vehicle)
-    assert found == min(ORDERS, key=lambda order: score(usable_flights, model.vehicle, order))
-    if of is small.WING:
-        assert found == true
-
-
 def test_a_fit_wants_ten_samples_a_coefficient():
     """13 coefficients an axis: 130 samples will do, 129 will not."""
     samples = small.flight(MODEL, 146)
@@ -138,3 +124,28 @@ def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
     assert all(0.8 < share < 1.0 for entry in entries for share in entry["explained"].values())
     assert all(entry["score"]["classes"] > 0.8 for entry in entries)
+
+
+def days(gains):
+    """Flights of days on which the right surface acts so many times as the left one does."""
+    flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
+    told = [changed(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
+    return fitting.fit_parts(
+        [changed(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
+    )
+
+
+def test_flights_that_are_alike_tell_all_that_their_noise_allows():
+    """The squares of Gaussian gains are as many as these, on average: 12 of them, within three sd of that."""
+    alike = fitting.gain_overdispersion(days([1.0] * 6), MODEL)
+    assert alike == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 12.0))
+
+
+def test_days_that_differ_let_a_sample_tell_less():
+    """Differences far above what the noise allows: the larger they are, the less."""
+    none, some, more = (
+        fitting.gain_overdispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL)
+        for size in (0.0, 0.15, 0.3)
+    )
+    assert more > 1.5 * some > 5.0 * none
+    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).effective_sample_share < 0.2

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import findings
 from beaver_ftc_logs.findings import (
     as_text,
     duration_text,
@@ -130,13 +129,3 @@ def _white_responses(samples, model):
         model.settings.effective_sample_share
     )
     return answers[ok] @ root.T
-
-
-def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
-    """Half of the square of the loss times the information; a complete loss is one."""
-    assert findings._smallest_losses(0.5, 5.0) == {
-        "5": None,
-        "20": 1.0,
-        "60": pytest.approx(3.0**-0.5),
-    }
-    assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}

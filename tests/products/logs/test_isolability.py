@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import isolability_document, isolability_sentences
 from beaver_ftc_logs.identification import identify
@@ -81,3 +82,30 @@ def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, w
         in isolability_sentences(found)[-1]
     )
     assert isolability_document(samples, wing_model)["alike"][0]["separable"] is True
+
+
+def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
+    """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
+    samples taken for half as long each carry twice as much a second."""
+    samples = sampled(wing, wing_folder, "closed", duration_s=40.0, seed=46)
+    inverse = np.linalg.inv(np.array(wing_model.residual_covariance))
+    response, lags = np.array(wing_model.command_response), wing_model.n_command_lags
+    first = max(lags, wing_model.n_rate_lags)
+    information = []
+    for k in range(first, len(samples.t_s)):
+        moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
+        information.append(moved @ inverse @ moved)
+    settings = wing_model.settings
+    for rate_hz in (10.0, 20.0):
+        found = isolability_document(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
+        per_s = settings.effective_sample_share * np.mean(information) * rate_hz
+        assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
+        odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
+        share = np.median(
+            build_bank(wing_model).transition_share[build_bank(wing_model).is_fault_of_group(0)]
+        )
+        change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
+        assert odds == pytest.approx(
+            np.log(settings.alarm_probability / (1.0 - settings.alarm_probability) / change),
+            rel=1e-9,
+        )

@@ -162,18 +162,6 @@ def pair():
     return socket.socketpair()
 
 
-def test_a_peer_that_never_reads_does_not_keep_the_flight_from_ending():
-    """Its buffer is full: sending waits, until somebody ends the flight."""
-    near, far = pair()
-    endpoint = SimpleNamespace(ended=False)
-    end = threading.Timer(0.3, lambda: setattr(endpoint, "ended", True))
-    with near, far:
-        end.start()
-        began_s = time.monotonic()
-        serving._send(near, bytes(50_000_000), endpoint)
-        assert 0.2 < time.monotonic() - began_s < 2.0
-
-
 def test_a_peer_that_goes_on_talking_is_hung_up_on():
     near, far = pair()
     talks = threading.Event()

@@ -101,9 +101,3 @@ def test_what_fits_neither_x_nor_y_is_refused(x, y):
     model, _ = asking()
     with pytest.raises(line.Mistake, match=r"allowed|x \(3,\) or \(n, 3\), y \(5,\)"):
         model.f(np.ones(x), np.ones(y))
-
-
-def test_a_thousand_questions_in_a_frame_are_allowed():
-    asking(1000)[0].G(np.ones(5))
-    with pytest.raises(line.Barred, match="more than 1000 times in a frame"):
-        asking(1001)[0].G(np.ones(5))

@@ -1,9 +1,7 @@
 """The web side without a network: requests and websockets handed to the application as a server does."""
 
 import asyncio
-import signal
 import socket
-from types import SimpleNamespace
 
 import pytest
 from live_site import HOST, Site, says
@@ -107,19 +105,3 @@ def test_a_port_is_had_on_the_loopback_alone():
         assert (host, port > 0) == ("127.0.0.1", True)
         assert listener.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)
     assert listener.fileno() == -1
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_server(number):
-    server = SimpleNamespace(should_exit=False)
-
-    async def signalled():
-        serve._on_signals(server)
-        signal.raise_signal(number)
-        for _ in range(100):
-            await asyncio.sleep(0.001)
-            if server.should_exit:
-                return
-
-    asyncio.run(signalled())
-    assert server.should_exit is True

@@ -1,7 +1,6 @@
 """Engines as effectors: their column of G is arm times thrust over inertia; they take the slow part of what
 surfaces leave; a transport without ailerons and rudder keeps its heading by them, and by nothing else."""
 
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,19 +12,14 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.engines import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis import monitors
-from beaver_ftc.diagnosis.monitors import ENGINE_MONITOR_RECORD
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.instrumented import source_of
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.studies.detectability import engine_failures, of_engines
 from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive
-from beaver_ftc_aircraft.derive.fit import set_engines_apart
 
 M_PER_IN, N_PER_LBF = 0.0254, 4.4482216
 DT, YAW = 0.01, 2
@@ -131,13 +125,6 @@ def test_what_they_cannot_give_is_not_integrated(jet):
     assert back[-1] < 0.0
 
 
-def test_without_engines_as_effectors_nothing_is_moved():
-    record = np.zeros(1, engines.ENGINES)[0]
-    engines.configure_engines(record, Declared.of(bf.load("fault-free")))
-    assert record["config"]["n"] == 0
-    assert not record["config"]["B"].any()
-
-
 def lost(surface):
     return {"actuator": surface, "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 20}
 
@@ -203,43 +190,6 @@ def test_levers_that_move_as_one_alarm_nobody(jet):
     assert not flight.metrics["detection"]["detected"]
 
 
-def judged(jet, missing_n, levers=(0.0, 0.0)):
-    """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
-    place in JSBSim's own file."""
-    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINE_MONITOR_RECORD)[0]
-    monitors.configure_balance(of_it["config"], aircraft)
-    names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
-    y = np.zeros(4 + len(names))
-    y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
-    y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
-    of_it, before = of_it.view(np.recarray), of_it["config"].copy()
-    monitors.disable_if_apart(of_it, np.array(levers))
-    alarmed = monitors.detect_engine_failure(of_it, 1e-6, y)
-    assert of_it["config"] == before
-    assert of_it["output"]["engine_failed"] == alarmed
-    return alarmed
-
-
-@pytest.mark.parametrize(("off", "known"), [(1e-8, True), (1e-4, False)])
-def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
-    """Propellers yaw aslant, and by something else while they come to speed."""
-    aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
-    of_it = {
-        "thrust": thrust,
-        "engines_n": monitors.yaw_per_thrust(aircraft) * thrust + [0.0, off, 0.5 * off],
-    }
-    set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
-    assert [("engines_apart" in box) for box in boxes] == [known, known]
-
-
-def test_a_thrust_that_is_missing_on_one_side_alarms(jet):
-    """Beyond what fuel burnt from one side first explains: 0.05 m of 4.9; not once a law moved them apart."""
-    assert judged(jet, 0.013 * 60_000)
-    assert judged(jet, -0.013 * 60_000)
-    assert not judged(jet, 0.009 * 60_000)
-    assert not judged(jet, 30_000, levers=(0.1, -0.1))
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -254,33 +204,3 @@ def test_a_wrong_file_is_refused_in_a_line(jet, tmp_path, change, says):
     (tmp_path / "aircraft.yaml").write_text(yaml.safe_dump(data))
     with pytest.raises(ScenarioError, match=says):
         read(tmp_path)
-
-
-def test_one_engine_in_the_middle_is_no_effector(tmp_path):
-    with pytest.raises(BadInput, match="do not yaw it"):
-        derive("jsbsim:c172p", tmp_path, engines=True)
-
-
-def test_detectability_says_how_an_engine_at_idle_turns_the_aircraft(jet):
-    """As JSBSim has it: its engines' yawing moment, one failed, over the inertia; the model knows it, too."""
-    given = scenario(jet, fdi={"bounds": {"constant_rad_s2": dict.fromkeys("pqr", 0.0)}})
-    (left, right), aircraft = engine_failures(given), given.airframe
-    plant = Plant(100, aircraft=aircraft)
-    point = trim(given.initial.airspeed_mps, given.initial.altitude_m, plant=plant)
-    plant.start(point)
-    plant.write("failures/engine-0-at-idle", 1.0)
-    for _ in range(1500):
-        plant.hold(point)
-        plant.run()
-    yawing = plant.read("moments/n-prop-lbsft") * N_PER_LBF * 0.3048 / aircraft.mass.Iz_kg_m2
-    assert left["turns_rad_s2"][YAW] == pytest.approx(-yawing, rel=0.05)
-    assert left["turns_rad_s2"] == pytest.approx(right["turns_rad_s2"], rel=1e-3)
-    assert left["known"]
-    assert left["shows"] > 10.0
-    known = "the design model knows its moment"
-    assert of_engines([left])[0].endswith(f"{known} and monitors it against the thrust")
-    assert of_engines([left | {"held": False}])[0].endswith(known)
-
-
-def test_of_an_aircraft_without_effectors_it_says_nothing_on_engines():
-    assert engine_failures(bf.load("fault-free")) == []

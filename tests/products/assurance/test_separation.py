@@ -5,32 +5,24 @@ import sys
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyarrow.parquet import read_table
-from scipy.optimize import linprog
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.loop import FrameReadout
-from beaver_ftc_assurance.certificates.check_certificate import failures
 from beaver_ftc_assurance.separation import (
     Candidate,
     Situation,
     as_text,
     doublet,
     separate,
-    situation_of,
     tell_apart,
-    write,
 )
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from samples import samples
-from telling import apart, fill
 
 SMALL = {
     "p": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 0.5}}],
@@ -60,24 +52,6 @@ def test_what_is_left_of_a_bias_holds_the_true_one():
     left = [one["deg"] for pair in pairs for one in pair["candidates"] if one["type"] == "bias"]
     assert left
     assert all(low <= 2.0 <= high for low, high in left)
-
-
-def test_a_doublet_that_was_flown_leaves_log_and_certificate(tmp_path):
-    """What it excluded is proved by its own log."""
-    scenario = ambiguous(fdi={"probing": {}})
-    document = separate(scenario)
-    folder = write(document, scenario, tmp_path)
-    flown = [place for place, pair in enumerate(document["pairs"]) if "left" in pair]
-    assert [int(one.name) for one in sorted((folder / "flown").iterdir())] == flown
-    for place in flown:
-        own, pair = folder / "flown" / str(place), document["pairs"][place]
-        proof, table = json.loads((own / "certificate.json").read_text()), read_table(own / "log.parquet")
-        log = {name: table[name].to_numpy() for name in table.column_names}
-        assert [*failures(proof, log, (own / "scenario.yaml").read_text())] == []
-        said = {one["what"] for one in proof["statements"]}
-        gone = [one for one in pair["candidates"] if one not in pair["left"]]
-        assert gone
-        assert {f"{one['surface']} {one['type']}" for one in gone} <= said
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
@@ -166,30 +140,6 @@ def test_where_a_surface_already_tells_it_is_held():
     assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
 
 
-def test_the_text_has_a_line_for_each_two_candidates():
-    jam, bias, lost = (
-        {"surface": s, "type": kind}
-        for s, kind in (("flap", "stuck"), ("rudder", "bias"), ("aileron", "float"))
-    )
-    one = {"candidates": [jam, bias], "separates": True, "time_s": 0.125, "amplitude_deg": 2.0}
-    one |= {"commands_rad": {"rudder": [], "aileron": []}}
-    none = {"candidates": [bias, lost], "separates": False, "because": "there is no room"}
-    pairs = [one, one | {"left": []}, one | {"left": [jam], "commands_rad": {"flap": []}}]
-    pairs += [one | {"left": [bias, jam], "amplitude_deg": 2e-9}, none]
-    both = "  flap stuck or rudder bias: "
-    document = {"scenario": "mine", "time_s": 1.5, "assumes": "it stays", "pairs": pairs}
-    assert as_text(document | {"not_constant": ["elevator drift", "flap slow"]}).splitlines() == [
-        "mine, 1.5 s: if it stays",
-        f"{both}rudder and aileron by 2 deg, told after 0.125 s",
-        f"{both}rudder and aileron by 2 deg, told after 0.125 s; flown, left: neither",
-        f"{both}flap by 2 deg, told after 0.125 s; flown, left: flap stuck",
-        f"{both}rudder and aileron by 2e-09 deg, told after 0.125 s; flown, left: rudder bias and flap stuck",
-        "  rudder bias or aileron float: none: there is no room",
-        "  a course over many frames tells: elevator drift, flap slow",
-    ]
-    assert "course" not in as_text(document | {"not_constant": []})
-
-
 def test_a_limit_on_the_rates_can_leave_none():
     pair = tell_apart(
         Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES
@@ -248,97 +198,3 @@ def test_what_a_surface_has_left_of_its_way(instants, approach, commands):
         assert (1 - mean_left) * command + mean_left * end == pytest.approx(np.mean(seen), abs=1e-12)
         end = (1 - left) * command + left * end
         assert end == pytest.approx(p, abs=1e-12)
-
-
-def flown_by_hand(command, at):
-    """Mean deflection of surface 0 in each frame, and the rates after it."""
-    p, moved = 0.0, []
-    for c in command:
-        seen = []
-        for instant in range(at.instants):
-            if at.instants == 1 or instant:
-                p += at.approach[0] * (c - p)
-            seen.append(p)
-        if at.instants > 1:
-            p += at.approach[0] * (c - p)
-        moved.append(np.mean(seen))
-    return np.array(moved), at.dt * np.outer(at.G[:, 0], np.cumsum(moved))
-
-
-@settings(max_examples=samples(12), deadline=None)
-@given(
-    st.floats(0.02, 0.25),
-    st.sampled_from([1, 2]),
-    st.floats(0.1, 1.0),
-    st.floats(0.02, 0.1),
-    st.floats(5, 20),
-)
-def test_the_amplitude_is_that_of_the_programme_without_states(target, instants, approach, step, rate):
-    """The same limits as full matrices of the commands alone, from impulses flown by hand."""
-    at = replace(
-        PLAIN, instants=instants, approach=np.full(4, approach), step=np.full(4, step), rate=radians(rate)
-    )
-    found = doublet({0: target}, at)
-    tells = [t for t in (1, 4, 16) if found is None or t <= found[1] - at.held + 1]
-    least = [by_impulses(target, at, t) for t in tells]
-    assert least[:-1] == [None] * (len(least) - 1)
-    if found is None:
-        assert least[-1] is None
-    else:
-        assert abs(found[0]).max() == pytest.approx(least[-1], rel=1e-6)
-
-
-def by_impulses(target, at, tells):
-    frames = 2 * (tells + at.held - 1)
-    pulses = [flown_by_hand(row, at) for row in np.eye(frames)]
-    moved, rates = (np.moveaxis(np.array(each), 0, -1) for each in zip(*pulses, strict=True))
-    pitch, there = at.dt * np.cumsum(rates[1], axis=0), slice(tells - 1, tells + at.held - 1)
-    pace = np.diff(moved, axis=0, prepend=0.0)
-    parts = [(-moved[there], -target), (pace, at.step[0] * at.instants), (-pace, at.step[0] * at.instants)]
-    parts += [(sign * each, at.rate) for each in rates for sign in (1, -1)]
-    parts += [(pitch, at.alpha_range[1] - at.alpha), (-pitch, at.alpha - at.alpha_range[0])]
-    rows = [np.hstack([part, np.zeros((len(part), 1))]) for part, _ in parts]
-    rows += [np.hstack([sign * np.eye(frames), -np.ones((frames, 1))]) for sign in (1, -1)]
-    most = np.concatenate([*(np.full(len(part), limit) for part, limit in parts), np.zeros(2 * frames)])
-    same = np.vstack([rates[[0, 2], -1], np.diff(np.eye(frames)[there], axis=0)])
-    same = np.hstack([same, np.zeros((len(same), 1))])
-    found = linprog(
-        np.r_[np.zeros(frames), 1.0], np.vstack(rows), most, same, np.zeros(len(same)),
-        [(-0.3, 0.3)] * frames + [(0, None)],
-    )  # fmt: skip
-    return found.x[-1] if found.status == 0 else None
-
-
-def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown():
-    """Of a record every number of which is another: of the bound, what the rates add to it, and the errors of
-    two readings a frame apart."""
-    record = bf.Simulation(ambiguous(substeps=2))._loop.frames
-    frame = fill(record.copy()[0], seed=1)
-    bound, design, means = (
-        frame["fdi"]["bound"],
-        frame["prediction"]["design"],
-        frame["prediction"]["means"],
-    )
-    bound["declared_errors"]["given"], frame["fdi"]["types"]["config"]["frames_per_block"] = (
-        1,
-        1,
-    )
-    x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["prediction"]["actuators"]
-    apart(
-        eta_bar=bound["eta_bar"],
-        noise=bound["n_gyro"],
-        inertia=bound["inertia_coupling_error_share"],
-        G=means["G"],
-        x=x,
-    )
-    at = situation_of(SimpleNamespace(last=FrameReadout(frame)), ambiguous(substeps=2), 0.3)
-    coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
-    turning = bound["inertia_coupling_error_share"] * coupling * 0.3**2
-    assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["n_gyro"] * 100.0))
-    for found, expected in (
-        (at.G, means["G"]), (at.u, frame["prediction"]["u"]), (at.x, x), (at.alpha, y[0]),
-        (at.stops, [actuators["low"], actuators["high"]]), (at.step, actuators["step"]),
-        (at.approach, actuators["approach"]), (at.alpha_range, (-0.1, 0.28)),
-    ):  # fmt: skip
-        assert found == pytest.approx(np.array(expected))
-    assert (at.instants, at.held, at.in_blocks, at.dt, at.rate) == (2, 3, False, 0.01, 0.3)

@@ -20,10 +20,6 @@ TAIL = {
     "surfaces": {"left_aileron": {"roll": 1.0}, "elevator": {"pitch": 0.8}, "right_aileron": {"roll": 0.5}},
     "outputs": {"left_aileron": "left_output", "elevator": "elevator_output"}, "faults": ["loss", "stuck"],
 }  # fmt: skip
-FIELD_OF_KEPT = {
-    "estimate": "effectiveness", "low": "effectiveness_low", "high": "effectiveness_high",
-    "probability": "fault_probability",
-}  # fmt: skip
 RESPONSE = np.array(
     [
         [[0.05, -0.02, 0.01], [0.5, 0.25, 0.06], [0.2, 0.1, 0.02]],

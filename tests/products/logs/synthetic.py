@@ -10,6 +10,7 @@ RIGHT = np.array([[0.05, -0.02, 0.01], [0.5, 0.25, 0.06], [0.2, 0.10, 0.02]])
 LEFT = RIGHT * np.array([1.0, -1.0, 1.0])
 TRIM = np.array([-0.03, 0.04, 0.0])
 NOISE = np.array([0.05, 0.04, 0.02])
+SHORT = {"p_rad_s": "p", "q_rad_s": "q", "r_rad_s": "r", "roll_command": "roll", "pitch_command": "pitch"}
 VEHICLE = """\
 name: wing
 rates: {p: p_rad_s, q: q_rad_s, r: r_rad_s}
@@ -81,11 +82,12 @@ def write_parquet(path, columns):
     return path
 
 
-def write_alfa(folder, duration_s=60.0, failure_s=None, seed=3):
-    """A folder in the processed form of the ALFA set: gyro 10 Hz, attitude errors 12 Hz, outputs 3 Hz."""
+def write_alfa(folder, duration_s=60.0, failure_s=None, seed=3, columns=None):
+    """A folder in the processed form of the ALFA set: gyro 10 Hz, attitude errors 20 ms later, outputs 3 Hz.
+    columns: of a flight, else one of this duration and seed."""
     folder.mkdir()
     origin_ns = 1_538_768_543_780_097_959
-    flown = fly(duration_s, seed=seed, trim=(0.0, 0.0))
+    flown = columns or fly(duration_s, seed=seed, trim=(0.0, 0.0))
     ns = origin_ns + np.round(flown["t_s"] * 1e9).astype(np.int64)
 
     def write(topic, stamps, columns):
@@ -196,3 +198,12 @@ def write_dataflash(path, messages):
     own = struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     path.write_bytes(message(128, own) + data)
     return path
+
+
+def write_rates(path, columns):
+    """A flight as messages RATE of a binary dataflash log, under short names."""
+    messages = []
+    for i, t_s in enumerate(columns["t_s"]):
+        row = {SHORT[name]: columns[name][i] for name in SHORT if name in columns}
+        messages.append(("RATE", {"TimeUS": round(t_s * 1e6) + 1_000_000} | row))
+    return write_dataflash(path, messages)

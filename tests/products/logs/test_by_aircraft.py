@@ -21,7 +21,6 @@ from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import read_vehicle_columns
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
-LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
 BEAVER = load_diagnosed("beaver")
 
 
@@ -136,30 +135,6 @@ def test_a_log_of_another_aircraft_is_not_credible(log):
     assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
 
 
-@pytest.mark.parametrize(
-    ("theta", "gain"),
-    [
-        ([(0.0, 0.0)] * 4, (1.0, 1.0)),
-        ([(0.0, -2.0), (-0.1, -2.1), (-0.2, -2.2), (-0.3, -2.3)], (1.0, -1.0)),
-        ([(-0.9, -0.4), (-0.5, -2.0), (-0.7, 0.3), (-0.8, -1.0)], (0.5, 1.3)),
-    ],
-)
-def test_what_each_command_does_in_all_of_a_flight(theta, gain):
-    """Innovations that are theta times what was expected, in each quarter another, a trim and noise: a little
-    over 1 + theta of the quarter in which it is largest."""
-    rng = np.random.default_rng(6)
-    expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
-    planted = np.repeat(theta, 1000, axis=0)
-    innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
-    innovation[0], innovation[7, 1] = 1e6, np.nan  # the first ends no frame
-    gains, most = stepped._command_gains(innovation, expected)
-    assert np.all(most > gain)
-    assert most == pytest.approx(gain, abs=0.1)
-    assert gains == pytest.approx(1.0 + np.mean(theta, axis=0), abs=0.05)
-    short = stepped._command_gains(innovation[:200], expected[:200])
-    assert np.all(np.array(short) == 1.0)
-
-
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
     sine = [{"sine": {"amplitude_deg_s": 3.0, "frequency_hz": 0.4}}]
     scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
@@ -173,32 +148,6 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
     moving = load_diagnosed("beaver", str(tmp_path / "moving.yaml"))
     assert diagnose_aircraft(turned, vehicle, moving)[2]["faulty"] in (False, True)
-
-
-@pytest.mark.parametrize("loss", [0.0, 0.9])
-def test_a_command_whose_sign_shows_in_no_part_for_sure_is_refused_if_its_other_sign_has_no_alarm(
-    tmp_path, loss
-):
-    """Gyro noise hides the sign in each second. The turned log of a lost surface has an alarm too."""
-    noise = {axis: {"noise_std_deg_s": 0.05} for axis in "pqr"}
-    sine = [{"sine": {"amplitude_deg_s": 1.0, "frequency_hz": 0.3}}]
-    lost = {"actuator": "aileron", "type": "loss_of_effectiveness", "at_s": 0.0, "magnitude": loss}
-    scenario = bf.load({
-        "name": "noisy", "duration_s": 4.0, "reference": dict.fromkeys("pqr", sine), "sensors": noise,
-        "fdi": {"bounds": {"sensors": noise}}, "faults": [lost] if loss else [],
-    })  # fmt: skip
-    bf.fly(scenario).save(tmp_path, report=False)
-    path, vehicle = exported(tmp_path / "noisy", "table", tmp_path)
-    declared = load_diagnosed("beaver", str(tmp_path / "noisy" / "scenario.yaml"))
-    recording = read_vehicle_columns(path, vehicle)
-    assert diagnose_aircraft(recording, vehicle, declared)[2]["isolated"] == ("aileron" if loss else None)
-    if not loss:
-        with pytest.raises(BadInput, match=r"command of aileron has the other sign, there is no alarm"):
-            diagnose_aircraft(changed(recording, aileron_command=np.negative), vehicle, declared)
-        aileron, flap = (recording.columns[f"{name}_command"].values for name in ("aileron", "flap"))
-        exchanged = changed(recording, aileron_command=lambda _: flap, flap_command=lambda _: aileron)
-        with pytest.raises(BadInput, match=r"aileron and flap are exchanged, there is no alarm"):
-            diagnose_aircraft(exchanged, vehicle, declared)
 
 
 def without(vehicle, **keys):
@@ -231,38 +180,6 @@ def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
     else:
         with pytest.raises(BadInput, match=f"log: is logged at {rate_hz:g} Hz, allowed: .* 20 to 1000 Hz"):
             by_aircraft._log_rate_hz(samples)
-
-
-def test_the_rate_is_that_of_the_first_fifty_samples_whose_steps_are_even():
-    """To four digits: a log that was cut short has the same."""
-    steps = np.full(90, 0.0123456)
-    steps[10], steps[50:] = 0.07, 0.013
-    samples = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.0123)
-    assert by_aircraft._log_rate_hz(samples) == 81.0
-    uneven = SimpleNamespace(name="log", t_s=np.cumsum(steps), dt_s=0.03)
-    assert by_aircraft._log_rate_hz(uneven) == 33.33
-
-
-def test_surfaces_of_a_log_stand_in_the_order_of_the_aircraft(log):
-    """Commands and labels of a file that names them the other way round; at any airspeed as they are."""
-    recording, vehicle = log
-    names = list(bf.aircraft("beaver").surfaces)
-    plain = by_aircraft.read_inputs(recording, vehicle, BEAVER)
-    t_s = recording.columns["p_rad_s"].t_s
-    truth = {f"{name}_truth": Column(t_s, np.full(len(t_s), 0.2 * k + 0.1)) for k, name in enumerate(names)}
-    labelled = RecordedFlight(recording.name, recording.columns | truth)
-    turned = without(
-        vehicle,
-        surfaces=dict(reversed(vehicle.model_dump(exclude_unset=True)["surfaces"].items())),
-        labels={name: f"{name}_truth" for name in names},
-        reference_airspeed_mps=20.0,
-    )
-    found = by_aircraft.read_inputs(labelled, turned, BEAVER)
-    np.testing.assert_array_equal(found.samples.commands, plain.samples.commands)
-    np.testing.assert_allclose(found.samples.labels, np.tile([0.1, 0.3, 0.5, 0.7], (len(t_s), 1)))
-    for one, other in zip(found.input_arrays, plain.input_arrays, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert (found.rate_hz, found.gap_free_stretches) == (100.0, [(0, len(t_s))])
 
 
 def test_a_log_too_slow_or_uneven_is_refused(log):
@@ -326,14 +243,6 @@ def test_options_that_contradict(tmp_path, options, says):
     assert says in str(done.exception)
 
 
-@pytest.mark.parametrize("flight", [".", "/"])
-def test_a_folder_without_a_name_has_no_vehicle_file_beside_it(tmp_path, monkeypatch, flight):
-    (tmp_path / "flight").mkdir()
-    monkeypatch.chdir(tmp_path / "flight")
-    done = CliRunner().invoke(app, ["diagnose", flight, "--aircraft", "beaver"])
-    assert str(done.exception) == f"{flight}: no vehicle.yaml beside it, allowed: --vehicle FILE"
-
-
 def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     path, _ = exported(flown[0], "table", tmp_path)
     truth = arrow.read_csv(path).to_pandas()
@@ -356,97 +265,10 @@ def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     assert "The model is that of beaver" in page
 
 
-shares, sizes = st.floats(-1.0, 0.0), st.floats(-3.0, 3.0)
-
-
-@given(theta=shares, slopes=st.tuples(sizes, sizes, sizes), off=st.tuples(sizes, sizes, sizes))
-def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
-    bound = np.abs(off)
-    expected = np.array(slopes)[None, :, None]
-    innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
-    least, greatest = stepped._explaining_losses(innovation, bound[None, :, None], expected)
-    assert least[0, 0] <= theta <= greatest[0, 0]
-
-
-def test_a_loss_that_explains_nothing_has_no_place():
-    expected = np.array([1.0, 0.0, 0.0])[None, :, None]
-    innovation = np.array([0.5, 0.0, 0.0])[None, :, None]
-    least, greatest = stepped._explaining_losses(innovation, np.full((1, 3, 1), 0.1), expected)
-    assert least[0, 0] > greatest[0, 0]  # a loss cannot add to what is commanded
-    unmoved = np.array([-0.5, 0.3, 0.0])[None, :, None]
-    least, greatest = stepped._explaining_losses(unmoved, np.full((1, 3, 1), 0.1), expected)
-    assert least[0, 0] > greatest[0, 0]  # nor move another axis
-
-
-@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
-def test_the_latest_greatest_looks_back_only(values, reach):
-    found = stepped._sliding_maximum(np.array(values)[:, None], reach)[:, 0]
-    assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]
-
-
 PLANE = SimpleNamespace(
     envelope=SimpleNamespace(airspeed_mps=(20.0, 50.0)), alpha_rad=(-0.1, 0.3), surfaces=("aileron",),
     travel={"aileron": SimpleNamespace(min_rad=-0.4, max_rad=0.2)},
 )  # fmt: skip
-
-
-def true(mask):
-    return np.flatnonzero(mask).tolist()
-
-
-def test_a_stretch_has_fifty_even_samples_that_are_all_known():
-    """Row 50 is unknown, 49 rows follow up to a step that is a fifth too long; one a twentieth too long
-    parts nothing."""
-    steps = np.full(150, 0.05)
-    steps[[100, 120]] *= 1.2, 1.05
-    unknown = np.arange(150) == 50
-    found = by_aircraft._gap_free_stretches(SimpleNamespace(t_s=np.cumsum(steps)), unknown, 20.0)
-    assert found == [(0, 50), (100, 150)]
-
-
-def test_what_is_at_a_limit_of_the_envelope_is_inside():
-    airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
-    signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
-    found = by_aircraft._doubtful_rows_of(signals, PLANE, np.arange(6) == 5, [(1, 5)])
-    assert {says: true(mask) for says, mask in found.items()} == {
-        "a number is missing": [5], "samples are not evenly spaced": [0],
-        "airspeed is outside 20 to 50 m/s": [0, 3],
-        "angle of attack is outside -0.1 to 0.3 rad": [3, 4],
-    }  # fmt: skip
-
-
-def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
-    """From its alarm on; of what comes after a second, or outside all stretches, nothing is said."""
-    verdicts = [by_aircraft.Verdict()] * 10
-    for k in (0, 3, 6):
-        verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
-    verdicts[5] = by_aircraft.Verdict(True)
-    given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._unexplained_starts(np.arange(10) * 0.5, [(1, 5), (5, 10)], given).items()
-    assert (says.partition(":")[0], true(mask)) == (
-        "no fault explains it from the first second on", [5, 6, 7, 8, 9],
-    )  # fmt: skip
-
-
-def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
-    rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
-    reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
-    found = by_aircraft._complete_reasons([(0, 4), (4, 8)], rows, reasons)
-    says = "the alarm was raised where nothing can be said"
-    assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
-
-
-def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credible():
-    low = np.array([[0.9, 0.0], [0.8, 0.5], [0.6, 0.0], [0.1, 0.9], [0.1, 0.9]])
-    rows = SimpleNamespace(
-        faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), effectiveness_low=low
-    )
-    assert by_aircraft._excluded_losses(rows, ["right", "left"]) == [
-        "right: a loss of more than 20 % shows within a second in half of the flight.",
-        "left: in half of the flight not even a complete loss would show within a second.",
-    ]
-    rows.credible = np.array([0, 0, 0, 1, 0])
-    assert by_aircraft._excluded_losses(rows, ["right", "left"]) == []
 
 
 @pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [
@@ -468,35 +290,6 @@ def test_flow_and_commands_in_another_unit_are_refused(alpha, beta, density, com
         return
     with pytest.raises(BadInput, match=f"^log: .*{says}"):
         by_aircraft._check_plausible("log", [np.empty(0), signals, commands], PLANE)
-
-
-def test_a_column_without_a_number_is_no_warning_of_numpy():
-    """Without an angle nothing is said of its unit; a density of no number is none that is allowed."""
-    signals = np.column_stack([np.full((4, 2), np.nan), np.full(4, 40.0), np.full(4, 0.5 * 1.2 * 40.0**2)])
-    by_aircraft._check_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
-    signals[:, 3] = np.nan
-    with pytest.raises(BadInput, match=r"^log: .*a density of nan kg/m3"):
-        by_aircraft._check_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
-
-
-def test_stretches_make_one_flight():
-    gains = np.array([[0.5, 0.9], [0.6, 0.4]])
-    said = ([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), gains[0] - 1.0, gains[0])
-    one, other = (
-        stepped.Replayed(*said),
-        stepped.Replayed([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), gains[1] - 1.0, gains[1]),
-    )
-    found = by_aircraft._join_stretches(5, [(1, 3), (4, 5)], [one, other])
-    assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
-    assert (
-        found.alone_low[:, 1].tolist(),
-        found.alone_high[:, 0].tolist(),
-    ) == (
-        [0, 0.2, 0.2, 0, 0.3],
-        [1, 0.7, 0.7, 1, 0.8],
-    )
-    assert found.command_gains.tolist() == pytest.approx([-0.5, -0.6])
-    assert found.command_gain_bounds.tolist() == [0.5, 0.4]
 
 
 PAIR = SimpleNamespace(
@@ -542,48 +335,19 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
         by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
 
 
-@pytest.mark.parametrize(("gains", "says"), [
-    ([(-0.31, 0.9), (0.5, 0.8)], "left"), ([(0.5, 0.9), (0.4, -0.31)], "right"),
-    ([(-0.29, 0.9), (0.5, -0.29)], None),
-])  # fmt: skip
-def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
-    gap_free_stretches = [SimpleNamespace(command_gain_bounds=np.array(of)) for of in gains]
-    if says is None:
-        by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
-        return
-    with pytest.raises(BadInput, match=f"log: the rates answer the command of {says} .* signs as of pair"):
-        by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
+shares, sizes = st.floats(-1.0, 0.0), st.floats(-3.0, 3.0)
 
 
-def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
-    """Alarm in row 1, which names left in rows 2 and 4, and right in row 3; in the last row there is none."""
-    said = {"isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ("jam", "bias")}
-    verdicts = [by_aircraft.Verdict(), by_aircraft.Verdict(True), by_aircraft.Verdict(True, isolated="left")]
-    verdicts += [by_aircraft.Verdict(True, isolated="right"), by_aircraft.Verdict(True, **said)]
-    verdicts += [by_aircraft.Verdict(candidates=("bias",))]
-    faulty = np.array([0, 1, 1, 1, 1, 0])
-    low = np.tile([0.9, 0.7], (6, 1))
-    names = np.array(["", "unknown", "left", "right", "left", ""], dtype=object)
-    rows = stepped.LogRows(
-        100.0 + 0.25 * np.arange(6), faulty, names, np.ones((6, 2)), low, np.ones((6, 2)),
-        faulty.astype(float),
-    )  # fmt: skip
-    samples = SimpleNamespace(
-        name="log", t_s=rows.t_s, dt_s=0.25, stretch_number=np.array([0, 0, 1, 1, 1, 2]), notes=("a remark",)
-    )
-    diagnosed = SimpleNamespace(aircraft=PAIR, declared_errors={"fdi": 1})
-    replayed = SimpleNamespace(verdicts=verdicts)
-    found = by_aircraft._verdict_document(samples, rows, replayed, diagnosed, {"alpha": 0.126})
-    expected = {
-        "flight": "log", "aircraft": "pair", "declared": {"fdi": 1}, "duration_s": 1.25, "recorded_s": 1.5,
-        "gaps": 2, "rate_hz": 4.0, "faulty": True, "detection_s": 100.25, "isolation_s": 100.5,
-        "isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ["jam", "bias"],
-        "notes": ["a remark", "alpha is held, 0.13 s old on average: errors declared have to cover it"],
-    }  # fmt: skip
-    assert {name: found[name] for name in expected} == expected
-    quiet = stepped.LogRows(**(vars(rows) | {"faulty": 0 * faulty}))
-    none = by_aircraft._verdict_document(
-        samples, quiet, SimpleNamespace(verdicts=[by_aircraft.Verdict()] * 6), diagnosed, {}
-    )
-    names = ("faulty", "detection_s", "isolation_s", "isolated", "notes")
-    assert [none[name] for name in names] == [False, None, None, None, ["a remark"]]
+@given(theta=shares, slopes=st.tuples(sizes, sizes, sizes), off=st.tuples(sizes, sizes, sizes))
+def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
+    bound = np.abs(off)
+    expected = np.array(slopes)[None, :, None]
+    innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
+    least, greatest = stepped._explaining_losses(innovation, bound[None, :, None], expected)
+    assert least[0, 0] <= theta <= greatest[0, 0]
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
+def test_the_latest_greatest_looks_back_only(values, reach):
+    found = stepped._sliding_maximum(np.array(values)[:, None], reach)[:, 0]
+    assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]

@@ -88,14 +88,6 @@ def diagnosed(folder, path, out, *options):
     return parquet.read_table(out / path.stem / "diagnosis.parquet")
 
 
-@pytest.fixture(scope="module")
-def whole(folder, tmp_path_factory):
-    """The folder of what is written of the whole flight, without a score."""
-    out = tmp_path_factory.mktemp("whole")
-    diagnosed(folder, folder / "flight.csv", out)
-    return out / "flight"
-
-
 @pytest.mark.parametrize("options", [(), ("--score",)])
 def test_labels_are_read_for_the_score_alone(folder, tmp_path, options):
     """Shuffled labels: the rows are the same, to the bit; only a score differs."""
@@ -112,39 +104,6 @@ def test_labels_are_read_for_the_score_alone(folder, tmp_path, options):
     ]
     assert (verdicts[0].pop("score", None) == verdicts[1].pop("score", None)) is (not options)
     assert verdicts[0] == verdicts[1]
-
-
-def test_a_rival_by_its_name(folder, tmp_path):
-    rows = diagnosed(folder, folder / "flight.csv", tmp_path, "--detector", "sliding-least-squares")
-    assert set(rows["named"].to_pylist()) <= {"", "left", "right", "right+left", "unknown"}
-    assert (
-        json.loads((tmp_path / "flight" / "verdict.json").read_text())["detector"] == "sliding-least-squares"
-    )
-
-
-def test_identify_writes_a_page_of_its_own(folder, tmp_path):
-    page = (folder / "wing.html").read_text()
-    assert "http" not in page
-    assert page.count("data:image/png") == 3
-    for said in (
-        "second half",
-        "first half",
-        "command of left[-1]",
-        "Free runs",
-        "density over that of white noise",
-    ):
-        assert said in page
-    (tmp_path / "mine.html").write_text("<p>mine</p>")
-    with pytest.raises(BadInput, match=r"will not replace .*mine.html"):
-        run(
-            "identify",
-            folder / "training.csv",
-            "--vehicle",
-            folder / "wing.yaml",
-            "--out",
-            tmp_path / "mine.json",
-        )
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.html"]
 
 
 def spoilt(folder, name, change):

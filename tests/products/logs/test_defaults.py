@@ -1,21 +1,13 @@
-"""What is assumed where a vehicle file says nothing of laws and air; evidence in other noise; groups."""
-
-from dataclasses import replace
+"""What is assumed where a vehicle file says nothing of laws and air."""
 
 import numpy as np
 import pytest
 import small
 
-from beaver_ftc_logs.diagnose import (
-    _add_unknown_surfaces,
-    _names_all_again,
-)
 from beaver_ftc_logs.filtering import recent_scale
 from beaver_ftc_logs.identification import assume_law_and_air
-from beaver_ftc_logs.model import FittedRanges
 
 BARE = {key: of for key, of in small.WING.items() if key != "labels"}
-RNG = np.random.default_rng(5005)
 
 
 @pytest.mark.parametrize(
@@ -35,56 +27,7 @@ def test_laws_and_air_are_taken_to_be_others_unless_labels_or_a_key_say(of, keys
     assert sum("as the vehicle file says" in line for line in lines) == len(keys)
 
 
-ASSUMED = {
-    (False, None): [
-        "other_laws: true, other laws may fly (logs of healthy flight do not tell)",
-        "moving_air: true, the air may move (logs of healthy flight do not tell)",
-    ],
-    (True, None): [
-        "other_laws: false, as fitted (labels show faults under it)",
-        "moving_air: false, as fitted (labels show faults under it)",
-    ],
-    (False, True): [
-        "other_laws: true, as the vehicle file says", "moving_air: true, as the vehicle file says",
-    ],
-    (True, False): [
-        "other_laws: false, as the vehicle file says", "moving_air: false, as the vehicle file says",
-    ],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("airspeeds", ["none", "of one flight", "with a reference"])
-@pytest.mark.parametrize(("labelled", "told"), ASSUMED)
-def test_what_is_assumed_is_told_with_its_reason(labelled, told, airspeeds):
-    """Of two flights, the second of which has labels or an airspeed, if any has."""
-    model = small.model(small.WING)
-    flight = small.flight(model, n=60)
-    bare = replace(flight, labels=np.full_like(flight.labels, np.nan), airspeed=None)
-    partly = np.where(np.arange(60)[:, None] < 50, np.nan, flight.labels)
-    other = replace(
-        flight,
-        labels=partly if labelled else bare.labels,
-        airspeed=None if airspeeds == "none" else np.full(60, 20.0),
-    )
-    keys = {} if told is None else {"other_laws": told, "moving_air": told}
-    keys |= {"reference_airspeed_mps": 20.0} if airspeeds == "with a reference" else {}
-    given = small.vehicle(small.WING, **keys)
-    vehicle, lines = assume_law_and_air([bare, other], given)
-    taken = (not labelled) if told is None else told
-    assert vehicle == given.model_copy(update={"other_laws": taken, "moving_air": taken})
-    last = {
-        "none": ["reference_airspeed_mps: none, the airspeed is not logged"],
-        "of one flight": ["reference_airspeed_mps: none, the airspeed explains no more"],
-        "with a reference": [],
-    }
-    assert lines == ASSUMED[labelled, told] + last[airspeeds]
-
-
-def test_a_log_is_read_finely_unless_the_air_stands_still_or_labels_show_faults():
-    rates = [small.vehicle(of, **keys).max_sample_rate_hz for of, keys in (
-        (BARE, {}), (small.WING, {}), (BARE, {"moving_air": False}), (small.WING, {"moving_air": True}),
-    )]  # fmt: skip
-    assert rates == [100.0, 20.0, 20.0, 100.0]
+RNG = np.random.default_rng(5005)
 
 
 @pytest.mark.parametrize(("span", "times"), [(1, 1.0), (10, (2.0 * 10**2 + 1.0) / (3.0 * 10.0))])
@@ -98,24 +41,3 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
     cut = recent_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
     assert np.allclose(cut, scale[:500])
-
-
-def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
-    model = small.model(fitted=FittedRanges(commands=[], rates=[], tied=[1.0, 0.0]).model_dump(by_alias=True))
-    rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
-    flown = small.flight(model, n=60)
-    still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_unknown_surfaces(still, model, rows).isolated_surfaces[20:]) == {"left"}
-    found = _add_unknown_surfaces(flown, model, rows)
-    assert set(found.isolated_surfaces[20:]) == {"right+left"}
-    assert (found.effectiveness_high[20:] == 1.0).all()
-    assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])
-
-
-@pytest.mark.parametrize(
-    ("now", "said", "wide"),
-    [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
-)
-def test_a_surface_that_was_excluded_stays_so(now, said, wide):
-    assert _names_all_again(now, said, small.model(settings={"one_group": True})) is wide
-    assert not _names_all_again(now, said, small.model())

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.diagnose import LogRows, diagnose
-from beaver_ftc_logs.findings import verdict_document
+from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.samples import load_flights_for_fit
-from beaver_ftc_logs.scoring import score_against_labels, score_diagnosis
+from beaver_ftc_logs.scoring import score_against_labels
 from products.logs import synthetic
 
 PARTS = ((60, 120, 1.0, 0.5), (160, 220, 0.4, 1.0))
@@ -86,40 +85,11 @@ def test_score_of_a_perfect_diagnosis(flown, rows):
     )
 
 
-def test_a_score_by_one_label_on_the_stamps_of_a_faster_log(flown, rows):
-    """Two stamps a sample, and a surface without a label: the figures of the other one."""
-    labels = flown.labels.copy()
-    labels[:, 0] = np.nan
-    twice = {name: np.repeat(getattr(rows, name), 2, axis=0) for name in rows.__dataclass_fields__}
-    twice["t_s"] = twice["t_s"] + np.tile([0.0, 0.4 * flown.dt_s], len(rows.t_s))
-    found = score_diagnosis(replace(flown, labels=labels), LogRows(**twice), [["right"], ["left"]])
-    left = {
-        name: getattr(rows, name)[:, 1:]
-        for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
-    }
-    wanted = score_against_labels(replace(rows, **left), flown.labels[:, 1:])
-    assert found.pop("rows") == 2 * wanted.pop("rows")
-    assert found.pop("settings") == wanted.pop("settings")
-    assert found == {key: pytest.approx(value) for key, value in wanted.items()}
-
-
 def test_another_rate_is_refused(wing, wing_folder, wing_model):
     columns = {name: values[::2] for name, values in synthetic.fly(60.0).items()}
     path = synthetic.write_csv(wing_folder / "slow.csv", columns)
     with pytest.raises(BadInput, match=r"has samples at 5 Hz, allowed: within 25% of the 10 Hz"):
         diagnose(load_flights_for_fit([path], wing)[0], wing_model)
-
-
-def test_a_verdict_says_what_a_still_flight_cannot_show(wing, wing_folder, wing_model, rows, flown):
-    still = synthetic.fly(60.0, trim=(0.0, 0.0))
-    still["roll_command"][:] = 0.0
-    still["pitch_command"][:] = 0.0
-    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "still.csv", still)], wing)[0]
-    said = verdict_document(samples, wing_model, diagnose(samples, wing_model))["isolability"]["groups"]
-    lively = verdict_document(flown, wing_model, rows)["isolability"]["groups"]
-    for one, other in zip(said, lively, strict=True):
-        assert one["smallest_loss"]["5"] is None
-        assert 0.0 < other["smallest_loss"]["60"] < other["smallest_loss"]["5"]
 
 
 def test_events_are_as_few_as_the_faults(rows, wing):

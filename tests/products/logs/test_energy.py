@@ -12,7 +12,6 @@ from beaver_ftc_logs import energy
 from beaver_ftc_logs.readers import alfa
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import resample
-from beaver_ftc_logs.scoring import _is_main_name_right
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 T_S = np.arange(0.0, 20.0, 0.1)
@@ -59,26 +58,6 @@ def test_an_alarm_while_energy_falls_names_no_surface():
     assert set(named[(T_S >= 5.0) & (T_S < 7.9)]) == {"unknown"}
     assert set(named[(T_S > 8.05) & (T_S < 14.95)]) == {"engine"}
     assert set(named[(T_S < 4.95) | (T_S > 15.05)]) == {""}
-
-
-def test_an_alarm_in_powered_flight_has_its_name_after_the_window_but_where_energy_falls():
-    faulty = (T_S >= 5.0).astype(int)
-    named = named_of(faulty, (T_S >= 11.95) & (T_S < 14.0))
-    assert set(named[(T_S >= 5.0) & (T_S < 9.9)]) == {"unknown"}  # the window reaches to before the fault
-    assert set(named[(T_S > 10.05) & (T_S < 11.9)]) == {"left"}
-    assert set(named[(T_S > 12.0) & (T_S < 13.9)]) == {"unknown"}  # a dive after the alarm is no engine
-    assert set(named[T_S > 14.05]) == {"left"}
-
-
-def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_it_rises():
-    faulty = (T_S >= 12.0).astype(int)
-    falls = (T_S >= 8.0) & (T_S < 10.0)
-    climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
-    names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S - 6.0)
-    assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
-    assert set(named[T_S > 16.05]) == {"left"}
-    assert set(energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]) == {"left"}
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
@@ -136,13 +115,6 @@ def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
         assert "airspeed_by_wind_m_s" not in calm
 
 
-def test_an_engine_is_no_surface_that_was_named():
-    groups = [["left"], ["right"]]
-    assert _is_main_name_right({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
-    assert _is_main_name_right({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
-    assert _is_main_name_right({"engine": 1.0}, ["engine"], groups) is None
-
-
 def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_nothing_rises():
     """The evidence began two seconds before the alarm; the fall ends at 9 s, and no energy comes back."""
     faulty = ((T_S >= 5.0) & (T_S < 18.0)).astype(int)
@@ -151,12 +123,3 @@ def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_
     named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S - 2.0)
     assert set(named[(T_S > 4.95) & (T_S < 7.95)]) == {"unknown"}
     assert set(named[(T_S > 8.05) & (T_S < 17.95)]) == {"engine"}
-
-
-def test_energy_that_neither_falls_as_without_power_nor_rises_tells_of_no_engine():
-    faulty = (T_S >= 5.0).astype(int)
-    names = np.where(faulty == 1, "left", "").astype(object)
-    level = np.full(len(T_S), -0.5)
-    named = energy.withdraw_surfaces(T_S, faulty, names, level, -1.0, T_S)
-    assert set(named[(T_S > 4.95) & (T_S < 9.95)]) == {"unknown"}
-    assert set(named[T_S > 10.05]) == {"left"}

@@ -5,7 +5,6 @@ In the log of these tests no two columns are alike, so that one taken for anothe
 
 import csv
 import math
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,10 +12,8 @@ from pyarrow import parquet
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_csv, write_recording
-from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.model import Expectation, Judged
 from beaver_ftc_logs.readers import read_flight
 from results.synthetic import Flight
 
@@ -129,37 +126,3 @@ def test_every_field_of_a_recording(path, columns, tmp_path, kind):
     for name, (column, factor) in RECORDED[kind].items():
         np.testing.assert_allclose(found[name].t_s, columns["t_s"], rtol=0, atol=0.6e-6, err_msg=name)
         np.testing.assert_allclose(found[name].values, columns[column] * factor, rtol=1e-12, err_msg=name)
-
-
-def test_every_attribute_of_the_junit_file(tmp_path):
-    """Three runs: two expectations of which one is missed, nothing expected, and one that did not fly."""
-    met = Expectation("no_false_alarm", True, True, True)
-    missed = Expectation("detected_within_s", False, 0.5, 0.75)
-    runs = [
-        Judged("one", expectations=(met, missed), took_s=3.0), Judged("two", took_s=1.5),
-        Judged("three", error="cannot be trimmed"),
-    ]  # fmt: skip
-    write_junit(runs, tmp_path / "junit.xml")
-    root = ElementTree.parse(tmp_path / "junit.xml").getroot()
-    assert root.tag == "testsuites"
-    assert root.attrib == {"name": "beaver-ftc", "time": "4.500000"}
-    suites = [("one", "2", "1", "0", "3.000000"), ("two", "1", "0", "0", "1.500000"),
-              ("three", "1", "0", "1", "0.000000")]  # fmt: skip
-    names = ("name", "tests", "failures", "errors", "time")
-    assert [suite.attrib for suite in root] == [dict(zip(names, said, strict=True)) for said in suites]
-    cases = [
-        ("one", "no_false_alarm", "1.500000", None),
-        (
-            "one",
-            "detected_within_s",
-            "1.500000",
-            ("failure", "expected 0.5, actual 0.75", "ExpectationMissed"),
-        ),
-        ("two", "completes", "1.500000", None),
-        ("three", "completes", "0.000000", ("error", "cannot be trimmed", "NotFlown")),
-    ]
-    found = root.findall("*/testcase")
-    for case, (classname, name, time, ending) in zip(found, cases, strict=True):
-        assert case.attrib == {"classname": classname, "name": name, "time": time}
-        ends = [(end.tag, end.get("message"), end.get("type")) for end in case]
-        assert ends == ([] if ending is None else [ending])

@@ -1,16 +1,11 @@
 """What a verdict says, of rows and flights made by hand."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import findings
 from beaver_ftc_logs.findings import (
     as_text,
     duration_text,
-    events_to_show,
     fault_events,
     isolability_document,
     isolability_sentences,
@@ -38,31 +33,6 @@ PARTS = {
 @pytest.mark.parametrize("name", PARTS)
 def test_rows_become_events(changed, name):
     assert not changed(fault_events(small.rows(PARTS[name]), NAMES))
-
-
-def test_an_event_says_what_stood_for_most_of_it():
-    """The brief level within another is part of it: name and level are those of the longer."""
-    (event,) = fault_events(small.rows(PARTS["a brief level within"]), NAMES)
-    assert (event["from_s"], event["to_s"], event["named"], event["brief"]) == (10.0, 21.0, "left", False)
-    assert event["effectiveness"] == {"left": {"estimate": 0.5, "low": 0.4, "high": 0.75}}
-    assert event["probability"] == pytest.approx(0.9 + 0.022)
-
-
-@pytest.mark.parametrize(("count", "brief"), [(6, True), (7, False)])
-def test_three_seconds_are_not_brief(count, brief):
-    events = fault_events(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
-    assert [event["brief"] for event in events] == [brief]
-    assert events_to_show(events) == events  # where every one is brief they are all there is to say
-
-
-def test_what_is_estimated_in_health_parts_no_event():
-    """Four seconds between two events, in which estimates change: long enough to part the events."""
-    still, changing = (
-        fault_events(small.rows([(10, *HALF), (4, "", one), (4, "", other), (10, *HALF)]), NAMES)
-        for one, other in (([1.0, 1.0], [1.0, 1.0]), ([0.97, 0.9], [0.99, 0.95]))
-    )
-    assert still == changing
-    assert len(still) == 2
 
 
 WORLD = {
@@ -159,83 +129,3 @@ def _white_responses(samples, model):
         model.settings.effective_sample_share
     )
     return answers[ok] @ root.T
-
-
-def test_where_nothing_can_be_predicted_nothing_shows():
-    model = WORLD["wing"][0]
-    samples = small.flight(model, 40)
-    found = isolability_document(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
-    nothing = {"5": None, "20": None, "60": None}
-    assert [entry["information_per_s"] for entry in found["groups"]] == [0.0, 0.0]
-    assert all(entry["smallest_loss"] == nothing for entry in found["groups"])
-    assert found["alike"][0]["cosine"] == 0.0
-
-
-@pytest.mark.parametrize(("share", "separable"), [(0.899, True), (0.901, False)])
-def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
-    """Answers of the second group: as much of the first's as the share says, the rest at right angles."""
-    noise = np.eye(3).tolist()
-    response = [[[1.0, 0.0, 0.0]], [[share, float(np.sqrt(1.0 - share**2)), 0.0]]]
-    model = small.model(lags=1, response=response, response_sd=response, noise=noise)
-    samples = small.flight(small.model(), 60)
-    (pair,) = isolability_document(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
-    assert pair["cosine"] == pytest.approx(share)
-    assert pair["separable"] is separable
-
-
-@pytest.mark.parametrize(
-    ("share", "says"),
-    [
-        (1.0, "no fault shows"), (0.999, "no fault shows where the model is credible,"),
-        (0.92, "no fault shows where the model is credible,"), (0.0, "no verdict"),
-    ],
-)  # fmt: skip
-def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
-    """Of all of them without a word more; of hardly any there is no verdict."""
-    assert findings._no_event_text({"credible": {"share": share}}) == says
-    little = findings._MIN_CREDIBLE_SHARE
-    assert findings._no_event_text({"credible": {"share": 0.99 * little}}) == "no verdict"
-    assert findings._no_event_text({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
-
-
-def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
-    """Half of the square of the loss times the information; a complete loss is one."""
-    assert findings._smallest_losses(0.5, 5.0) == {
-        "5": None,
-        "20": 1.0,
-        "60": pytest.approx(3.0**-0.5),
-    }
-    assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
-
-
-def test_odds_against_a_change_are_those_of_its_median_share():
-    weight = np.array([0.5, 0.2, 0.1, 0.3])
-    bank = SimpleNamespace(
-        transition_share=weight, is_fault_of_group=lambda group: np.arange(4) % 2 == (1 if group else 5)
-    )
-    model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._alarm_odds(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
-    assert findings._alarm_odds(model, bank, 0, 0.1) == np.inf
-
-
-def test_an_event_has_the_name_of_most_of_its_rows_and_begins_with_a_brief_alarm_without_one():
-    """The first in the alphabet is not the one that stood; an unknown surface that stands is an event."""
-    within = [(10, "right", [0.5, 1.0]), (4, *LESS), (9, "right", [0.5, 1.0])]
-    (event,) = fault_events(small.rows(within), NAMES)
-    assert (event["named"], list(event["effectiveness"])) == ("right", ["right"])
-    before = [(5, *SOUND), (6, "unknown", [1.0, 1.0]), (12, *HALF), (5, *SOUND)]
-    (event,) = fault_events(small.rows(before), NAMES)
-    assert (event["from_s"], event["to_s"], event["named"]) == (12.5, 21.0, "left")
-    before[1] = (7, "unknown", [1.0, 1.0])
-    one, other = fault_events(small.rows(before), NAMES)
-    assert [(one["from_s"], one["to_s"], one["named"]), (other["from_s"], other["named"])] == [
-        (12.5, 15.5, "unknown"), (16.0, "left"),
-    ]  # fmt: skip
-
-
-def test_the_duration_of_a_flight_is_from_its_first_sample(flown):
-    model, samples = flown
-    late = replace(samples, t_s=samples.t_s + 1000.0)
-    rows = small.rows([(9, "", [1.0] * len(model.vehicle.surfaces))], len(model.vehicle.surfaces))
-    found, expected = (verdict_document(of, model, rows) for of in (late, samples))
-    assert found == expected | {"duration_s": pytest.approx(samples.t_s[-1])}

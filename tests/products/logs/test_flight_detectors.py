@@ -1,6 +1,4 @@
-"""Plain estimators, the freeze rule and the loop's detectors, on small flights: by another road, or whole."""
-
-from types import SimpleNamespace
+"""Least squares on small flights, by one batch; which detectors a flight may have."""
 
 import numpy as np
 import pytest
@@ -8,14 +6,11 @@ import pytest
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
-from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.regression import unexplained_rates
-from kept import in_short
 from products.logs import small
 
 WING = small.model(settings={"levels": {"left": [0.4, 0.8]}, "level_step": 0.25, "trim_sd": 0.3})
 BARE = small.model()
-TAIL = small.model(small.TAIL)
 LOST = ((1, 150, 400, 0.4),)
 METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-squares"}
 
@@ -64,169 +59,11 @@ def test_least_squares_by_one_batch(name):
     assert rows.isolated_surfaces[399] == "left"
 
 
-@pytest.mark.parametrize("name", METHODS)
-def test_without_labels_a_loss_is_sure_by_five_sd(name):
-    model = small.model(settings={"trim_sd": 0.3})
-    samples = small.flight(model, 400, lost=LOST)
-    rows = detectors.diagnose_with_detector(METHODS[name], samples, model)
-    sure = []
-    for k in range(0, 400, 25):
-        value, sd = batch(samples, model, k, name == "forgetting")
-        np.testing.assert_allclose(rows.effectiveness[k], np.clip(value, 0, 1), atol=1e-9)
-        lost = [side for side, v, s in zip(("right", "left"), value, sd, strict=True) if v + 5.0 * s < 1.0]
-        assert rows.isolated_surfaces[k] == "+".join(lost)
-        sure.append(bool(lost))
-    assert 3 < sum(sure) < 14
-
-
-@pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("of", ["wing", "tail"])
-def test_rows_of_least_squares(changed, name, of):
-    model = {"wing": WING, "tail": TAIL}[of]
-    rows = detectors.diagnose_with_detector(METHODS[name], small.flight(model, 300, lost=LOST), model)
-    said = {name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()}
-    assert not changed(said | {"faulty": in_short(rows.faulty), "named": rows.isolated_surfaces[::25]})
-
-
-def logged(*columns):
-    return RecordedFlight("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
-
-
-def test_an_output_that_stands_still_for_six_seconds_is_frozen():
-    """Still from 2 s on, until 20 s; each sample knows the last output up to its own time."""
-    t_s = np.arange(1.0, 30.0, 2.0)
-    values = np.where((t_s > 2.0) & (t_s < 20.0), 5.0, t_s)
-    moving = ("elevator_output", np.arange(0.0, 30.0, 3.0), np.arange(10.0))
-    samples = small.flight(TAIL, 60, dt_s=0.5, t_s=0.5 * np.arange(60))
-    rows = detectors.diagnose_by_freeze_rule(logged(("left_output", t_s, values), moving), samples, TAIL)
-    frozen = [3.0 + 6.0 < t < 21.0 for t in samples.t_s]
-    assert rows.faulty.tolist() == frozen
-    assert set(rows.isolated_surfaces[np.array(frozen)]) == {"left_aileron"}
-    np.testing.assert_array_equal(
-        rows.effectiveness, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))])
-    )
-    np.testing.assert_array_equal(rows.fault_probability, np.array(frozen, dtype=float))
-    np.testing.assert_array_equal(rows.effectiveness_low, rows.effectiveness)
-    np.testing.assert_array_equal(rows.effectiveness_high, rows.effectiveness)
-
-
-def test_before_its_first_stamp_an_output_is_not_frozen():
-    samples = small.flight(TAIL, 40, dt_s=1.0, t_s=np.arange(40.0))
-    late = logged(("elevator_output", [20.0, 21.0], [1.0, 1.0]))
-    rows = detectors.diagnose_by_freeze_rule(late, samples, TAIL)
-    assert np.flatnonzero(rows.faulty).tolist() == list(range(27, 40))
-    assert set(rows.isolated_surfaces) == {"", "elevator"}
-    assert detectors.diagnose_by_freeze_rule(logged(), samples, TAIL) is None
-    assert detectors.diagnose_by_freeze_rule(late, samples, BARE) is None
-
-
-@pytest.mark.parametrize("model", [WING, TAIL], ids=["wing", "tail"])
-def test_what_a_detector_of_the_loop_is_given(model):
-    """The innovation is the one-step residual, nothing where the model is silent; commands of each group."""
-    samples = small.flight(model, 60, gap=30)
-    samples.rates[45, 2] = samples.commands[50, 0] = np.nan
-    stream = detectors.loop_detector_inputs(samples, model)
-    ok, unexplained, answers = unexplained_rates(samples, model)
-    intercept, x = np.array(model.intercept), np.nan_to_num(samples.rates)
-    members = [[0], [1]] if model is WING else [[0, 2], [1]]
-    for k, (now, command) in enumerate(stream):
-        assert now.t_s == samples.t_s[k]
-        np.testing.assert_array_equal(now.x, x[k])
-        assert now.y.tolist() == [0.0] * len(now.y)
-        innovation = now.x - x[max(k - 1, 0)] - 0.1 * now.acceleration
-        left = unexplained[k] - intercept - answers[k].sum(axis=0) if ok[k] else np.zeros(3)
-        np.testing.assert_allclose(innovation, left, atol=1e-12)
-        of_groups = answers[k].T if ok[k] else np.zeros((3, 2))
-        np.testing.assert_allclose(now.contribution[:, :2] * 0.1, of_groups, atol=1e-12)
-        assert now.contribution[:, 2:].tolist() == [[0.0, 0.0]] * 3
-        moved = [samples.commands[k, group].sum() for group in members]
-        np.testing.assert_allclose(command, [*np.nan_to_num(moved), 0.0, 0.0], atol=1e-12)
-        np.testing.assert_allclose(now.eta_bar, np.sqrt(np.diag(model.residual_covariance)) * 10.0)
-    assert stream[3][0].eta_bar is not stream[4][0].eta_bar
-
-
-def test_a_detector_of_the_loop_knows_three_groups():
-    table = {"a": {"roll": 1.0}, "b": {"pitch": 1.0}, "c": {"roll": 1.0, "pitch": 1.0}}
-    three = small.model(small.WING | {"surfaces": table, "labels": {}})
-    assert len(detectors.loop_detector_inputs(small.flight(three, 20), three)) == 20
-    four = small.WING | {"surfaces": table | {"d": {"roll": 1.0, "pitch": -1.0}}, "labels": {}}
-    model = small.model(four)
-    with pytest.raises(
-        BadInput, match="wing: 4 groups of surfaces, allowed for a detector of the loop: at most 3"
-    ):
-        detectors.loop_detector_inputs(small.flight(model, 20), model)
-
-
-def test_what_a_detector_is_told_before_the_flight(changed):
-    told = detectors.loop_detector_context(WING)
-    assert isinstance(told.model, detectors.LinearRateModel)
-    fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
-    assert not changed(fields | {"declared": vars(told.declared)})
-    x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
-    past = np.array(WING.past_coefficients)[:3]
-    np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)
-    assert told.model.G(np.zeros(4)).tolist() == [[0.0] * 4] * 3
-
-
 LOSS = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
 
 
 def left(share):
     return LOSS._replace(effectiveness=np.array([0.9, share, 0.2, 0.1]))
-
-
-VERDICTS = {
-    "nothing": (Verdict(), ("", 0, [1, 1], [1, 1], 0.0)),
-    "below one": (Verdict(statistic=0.3), ("", 0, [1, 1], [1, 1], 0.3)),
-    "at one": (LOSS._replace(statistic=1.0), ("", 0, [1, 1], [1, 1], 1.0)),
-    "beyond": (LOSS, ("left", 1, [1, 0.6], [1, 0], 1.0)),
-    "a negative statistic": (LOSS._replace(statistic=-1.0), ("", 0, [1, 1], [1, 1], 0.0)),
-    "no statistic": (LOSS._replace(statistic=np.nan), ("left", 1, [1, 0.6], [1, 0], 1.0)),
-    "latched alone": (Verdict(True, statistic=0.2), ("", 0, [1, 1], [1, 1], 0.2)),
-    "no place": (Verdict(True, isolated="rudder"), ("unknown", 1, [1, 1], [0, 0], 1.0)),
-    "not isolated": (Verdict(True), ("unknown", 1, [1, 1], [0, 0], 1.0)),
-    "first place": (LOSS._replace(isolated="aileron"), ("right", 1, [0.6, 1], [0, 1], 1.0)),
-    "too much lost": (LOSS._replace(estimate=-1.4), ("left", 1, [1, 0], [1, 0], 1.0)),
-    "nothing lost": (LOSS._replace(estimate=0.3), ("left", 1, [1, 1], [1, 0], 1.0)),
-    "no estimate": (LOSS._replace(estimate=None), ("left", 1, [1, 1], [1, 0], 1.0)),
-    "of every surface": (
-        left(0.3), ("left", 1, [1, 0.3], [1, 0], 1.0),
-    ),
-    "more than all": (left(1.3), ("left", 1, [1, 1], [1, 0], 1.0)),
-    "less than none": (left(-0.3), ("left", 1, [1, 0], [1, 0], 1.0)),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", VERDICTS)
-def test_a_verdict_of_the_loop_becomes_a_row(name):
-    verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
-    samples = small.flight(BARE, 3)
-    rows = detectors.rows_of_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
-    assert (rows.isolated_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
-    np.testing.assert_allclose(rows.effectiveness, [[1, 1], estimate, [1, 1]])
-    np.testing.assert_allclose(rows.effectiveness_low, [[1, 1], low, [1, 1]])
-    np.testing.assert_allclose(rows.effectiveness_high, np.ones((3, 2)))
-    np.testing.assert_allclose(rows.fault_probability, [0.0, probability, 0.0])
-
-
-def test_surfaces_that_move_together_share_a_verdict():
-    both = LOSS._replace(isolated="aileron")
-    rows = detectors.rows_of_verdicts([both], small.flight(TAIL, 1), TAIL)
-    assert rows.isolated_surfaces.tolist() == ["left_aileron+right_aileron"]
-    assert rows.effectiveness.tolist() == [[0.6, 1.0, 0.6]]
-    assert rows.effectiveness_low.tolist() == [[0.0, 1.0, 0.0]]
-
-
-def test_a_detector_is_stepped_through_the_whole_flight():
-    told = []
-    detector = SimpleNamespace(
-        reset=lambda context: told.append(context.dt_s),
-        step=lambda measured, command: told.append(measured.t_s) or Verdict(statistic=measured.t_s),
-    )
-    samples = small.flight(BARE, 30)
-    rows = detectors.run_loop_detector(detector, samples, BARE)
-    assert told == [0.1, *samples.t_s]
-    assert np.flatnonzero(rows.faulty)[0] == 11
 
 
 def test_detectors_of_flights_come_first_and_others_are_refused():
@@ -240,31 +77,3 @@ def test_detectors_of_flights_come_first_and_others_are_refused():
     slow = small.flight(BARE, 60, dt_s=0.2)
     with pytest.raises(BadInput, match="allowed: within 25% of the 10 Hz"):
         detectors.diagnose_with_detector(names[1], slow, BARE)
-
-
-def test_each_detector_gets_what_it_takes_and_its_rows_stand_at_the_stamps_of_the_log(monkeypatch):
-    """Ours leaves out itself what stands still; the others are given the rates without it."""
-    samples, told = small.flight(BARE, 30), []
-    loop = detectors.detector_names()[-1]
-    stubs = {
-        "check_log_fits_model": lambda of, by: told.append((of, by)),
-        "without_dead_rows": lambda of, by: (of, "alive", by),
-        "diagnose": lambda of, by: ("ours", of, by),
-        "run_loop_detector": lambda by, of, model: ("loop", by, of, model),
-        "made": lambda kind, name: (kind, name),
-        "finish_rows": lambda of, by, rows: ("at its stamps", of, by, rows),
-    }
-    for name, stub in stubs.items():
-        monkeypatch.setattr(detectors, name, stub)
-    plain = {METHODS["sliding"]: lambda of, by: ("sums", of, by)}
-    monkeypatch.setattr(detectors, "_FLIGHT_DETECTORS", detectors._FLIGHT_DETECTORS | plain)
-    ours, sums, stepped = (
-        detectors.diagnose_with_detector(name, samples, BARE)
-        for name in ("bank-of-filters", METHODS["sliding"], loop)
-    )
-    alive = (samples, "alive", BARE)
-    assert ours == ("ours", samples, BARE)
-    assert sums == ("at its stamps", samples, BARE, ("sums", alive, BARE))
-    of_loop = ("loop", (detectors.DETECTORS, loop), alive, BARE)
-    assert stepped == ("at its stamps", samples, BARE, of_loop)
-    assert told == [(samples, BARE)] * 3

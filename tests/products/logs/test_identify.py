@@ -1,14 +1,12 @@
 """Identification of a vehicle whose coefficients are known."""
 
-import itertools
-
 import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.fitting import usable_mask
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import constant_stretches, load_flights_for_fit
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 
@@ -24,14 +22,6 @@ def test_the_noise_is_that_of_the_vehicle(wing_model):
     assert np.sqrt(np.diag(wing_model.residual_covariance)) == pytest.approx(synthetic.NOISE, rel=0.05)
 
 
-def test_what_is_left_of_white_noise_is_white_in_every_band_up_to_half_the_rate(wing_model):
-    bands = wing_model.identification_results["spectrum"]
-    ends = [(band["from_hz"], band["to_hz"]) for band in bands]
-    assert [ends[0][0], ends[-1][1]] == [0.0, synthetic.RATE_HZ / 2]
-    assert all(one[1] == other[0] for one, other in itertools.pairwise(ends))
-    assert [band[axis] for band in bands for axis in "pqr"] == pytest.approx([1.0] * 3 * len(bands), abs=0.4)
-
-
 def test_what_the_labels_say_becomes_the_prior(wing_model):
     assert wing_model.settings.likely_levels == {"right": [0.4], "left": [0.5]}
 
@@ -44,11 +34,6 @@ def test_edges_of_labels_are_not_fitted(wing, wing_folder):
     assert not use[t_s < 5.0].any()
     assert not use[np.abs(t_s - 30.0) < 1.4].any()
     assert use[(t_s > 32) & (t_s < 38)].all()
-
-
-def test_constant_parts_cover_everything_once():
-    labels = np.array([[1.0], [1.0], [0.5], [np.nan], [np.nan], [1.0]])
-    assert constant_stretches(labels) == [(0, 2), (2, 3), (3, 5), (5, 6)]
 
 
 def test_too_short_a_flight_is_refused(wing, wing_folder):

@@ -59,14 +59,6 @@ def test_a_multicopter_is_called_one(parameters, names, said):
     assert reason is None if said is None else said in reason
 
 
-def test_a_blackbox_table_of_a_multicopter_is_refused_as_one(tmp_path):
-    columns = {"loopIteration": np.arange(len(T_S)), "time (us)": 1e6 * T_S}
-    columns |= {f"gyroADC[{k}]": np.rad2deg(RATES[k]) for k in range(3)}
-    columns |= {f"motor[{k}]": 1100.0 + T_S for k in range(4)}
-    found = check_log(synthetic.write_csv(tmp_path / "a.csv", columns), None, None)
-    assert "multicopter (motor[0] to motor[3]" in found["lines"][-1]
-
-
 @pytest.mark.parametrize("names", [
     ("P (deg/s)", "Q (deg/s)", "R (deg/s)", "Aileron Command (norm)", "Phi (deg)"),
     ("____P,rad/s", "____Q,rad/s", "____R,rad/s", "ailrn,yoke1", "_roll,__deg"),

@@ -5,13 +5,9 @@ import math
 
 import numpy as np
 import pytest
-import yaml
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.check import check_log
-from beaver_ftc_logs.mixing import load_vehicle_for_logs, mixing_of_log
+from beaver_ftc_logs.mixing import mixing_of_log
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle
 from products.logs import synthetic
@@ -22,7 +18,6 @@ GYRO = {"t_s": T_S} | {
     f"Gyr{axis}": KINEMATIC[f"{rate}_rad_s"] for axis, rate in zip("XYZ", "pqr", strict=True)
 }
 GYRO_TOPIC = "vehicle_angular_velocity"
-RATES = {"name": "wing", "rates": {axis: f"{GYRO_TOPIC}.xyz[{i}]" for i, axis in enumerate("pqr")}}
 ELEVONS = (
     ("SERVO1_FUNCTION", 77), ("SERVO1_MIN", 1000), ("SERVO1_MAX", 2000), ("SERVO1_TRIM", 1500),
     ("SERVO1_REVERSED", 1),
@@ -188,28 +183,6 @@ def px4(parameters, *columns):
     return mixing_of_log("ulog", {key: (float(value),) for key, value in parameters}, columns)
 
 
-def test_surfaces_that_move_together_follow_one_command():
-    """Two ailerons of one function, and two of opposite torques: no fit can tell the two apart."""
-    pulses = [(f"SERVO{n}_FUNCTION", 4) for n in (1, 5)] + [("SERVO2_FUNCTION", 19)]
-    found = ardupilot(pulses, "RCOU.C1", "RCOU.C2", "RCOU.C5")
-    assert found.surfaces == {
-        "aileron_1": {"RCOU.C1": 1.0}, "elevator": {"RCOU.C2": 1.0}, "aileron_5": {"RCOU.C1": 1.0},
-    }  # fmt: skip
-    assert [entry["column"] for entry in found.commands] == ["RCOU.C1", "RCOU.C2"]
-    assert found.lines[-1].endswith("; it moves with RCOU.C1")
-    torques = [
-        ("CA_SV_CS_COUNT", 2), ("CA_SV_CS0_TYPE", 1), ("CA_SV_CS0_TRQ_R", -0.5), ("CA_SV_CS1_TYPE", 2),
-        ("CA_SV_CS1_TRQ_R", 0.25), *((f"CA_SV_CS{i}_TRQ_{axis}", 0.0) for i in (0, 1) for axis in "PY"),
-    ]  # fmt: skip
-    found = px4(torques, "actuator_servos.control[0]", "actuator_servos.control[1]")
-    assert found.surfaces == {
-        "left_aileron": {"actuator_servos.control[0]": 1.0},
-        "right_aileron": {"actuator_servos.control[0]": -0.5},
-    }
-    vehicle = Vehicle.model_validate(RATES | {"commands": found.commands, "surfaces": found.surfaces})
-    assert group_surfaces(vehicle) == [[0, 1]]
-
-
 def test_flaperons_follow_what_is_left_without_flaps():
     """Flaps are added on one side and taken on the other: half the sum of the two is the aileron."""
     found = ardupilot([("SERVO1_FUNCTION", 24), ("SERVO6_FUNCTION", 25)], "RCOU.C1", "RCOU.C6")
@@ -263,38 +236,6 @@ def test_a_bad_parameter_of_px4_is_one_line(name, value, says):
         assert found.surfaces["right_elevon"] == {"actuator_servos.control[1]": 1.0}
 
 
-def test_without_the_commands_of_the_surfaces_they_stay_out():
-    found = ardupilot(ELEVONS, "AETR.Elev")
-    assert found.surfaces == {}
-    assert found.lines[1] == (
-        "channel 1 is the left elevon (SERVO1_FUNCTION 77), and stays out: its output is not in the log, and "
-        "AETR.Ail is not either"
-    )
-    half = ardupilot(ELEVONS, "RCOU.C1", "AETR.Elev")
-    assert half.surfaces == {"left_elevon": {"RCOU.C1": 1.0}}
-    assert (
-        "channel 2 is the right elevon (SERVO2_FUNCTION 78), and stays out: RCOU.C2 is not in the log"
-        in half.lines
-    )
-    assert set(ardupilot(ELEVONS, "RCOU.C1", "AETR.Elev", "AETR.Ail").surfaces) == {
-        "left_elevon",
-        "right_elevon",
-    }
-    assert found.lines[-1] == ALL_OUT
-    assert ardupilot([]).lines == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
-    assert mixing_of_log("table", {"SERVO1_FUNCTION": (77.0,)}, ["RCOU.C1"]).lines == []
-
-
-def test_of_outputs_without_parameters_nothing_is_guessed(tmp_path):
-    """An output may be a motor's."""
-    pytest.importorskip("pymavlink")
-    path = write_bin(tmp_path / "bare.bin", {"C1": wave(1200.0, 1700.0, 0.8)}, ())
-    found = check_log(path, None, None)
-    assert (found["usable"], found["vehicle"]) == (False, None)
-    assert found["lines"][:2] == ["SERVOn_FUNCTION is not in the log", ALL_OUT]
-    assert "RCOU.C1 and its like are outputs to servos and to motors" in found["lines"][2]
-
-
 @pytest.mark.parametrize("suffix", ["bin", "log"])
 def test_parameters_of_a_dataflash_log(tmp_path, suffix):
     pytest.importorskip("pymavlink")
@@ -328,77 +269,3 @@ def test_parameters_of_a_ulog_and_their_changes(tmp_path):
         assert len(read["BAD"]) == 1
     lines = mixing_of_log("ulog", read_flight(path).parameters, ()).lines
     assert "CA_SV_CS_COUNT changes in the log: its last value, 3, is used" in lines
-
-
-def vehicle_file(path, **keys):
-    path.write_text(yaml.safe_dump(RATES | {"reader": "ulog"} | keys))
-    return path
-
-
-def test_a_vehicle_file_leaves_the_mixing_to_the_log_and_overrides_it(tmp_path):
-    pytest.importorskip("pyulog")
-    servos = {"control[0]": wave(-0.4, 0.9, 1.1), "control[1]": wave(-0.7, 0.2, 0.7)}
-    torques = {f"xyz[{i}]": wave(-0.3, 0.1 + 0.1 * i, 1.0 + i) for i in range(3)}
-    topics = {"actuator_servos": servos, "vehicle_torque_setpoint": torques}
-    log = write_px4(tmp_path / "a.ulg", PX4_ELEVONS, topics)
-    first, second = "actuator_servos.control[0]", "actuator_servos.control[1]"
-    vehicle, lines = load_vehicle_for_logs(vehicle_file(tmp_path / "bare.yaml"), [log])
-    assert vehicle.command_columns == [first, second]
-    assert vehicle.surfaces == {"left_elevon": {first: 1.0}, "right_elevon": {second: 1.0}}
-    assert lines == [
-        f"{log}: surface {i} is the {side} elevon: CA_SV_CS{i}_TYPE {5 + i}"
-        for i, side in enumerate(("left", "right"))
-    ]
-    roll, pitch = ({"column": f"vehicle_torque_setpoint.xyz[{i}]", "scale": 2.0} for i in (0, 1))
-    vehicle, _ = load_vehicle_for_logs(vehicle_file(tmp_path / "axes.yaml", commands=[roll, pitch]), [log])
-    assert [command.scale for command in vehicle.commands] == [2.0, 2.0]
-    assert vehicle.surfaces == {
-        "left_elevon": {roll["column"]: -1.0, pitch["column"]: 1.0},
-        "right_elevon": {roll["column"]: 1.0, pitch["column"]: 1.0},
-    }
-    vehicle, _ = load_vehicle_for_logs(
-        vehicle_file(tmp_path / "own.yaml", surfaces={"mine": {first: 0.3, second: -0.2}}), [log]
-    )
-    assert (vehicle.command_columns, vehicle.surfaces) == (
-        [first, second],
-        {"mine": {first: 0.3, second: -0.2}},
-    )
-    whole = vehicle_file(tmp_path / "whole.yaml", commands=[second], surfaces={"mine": {second: 1.0}})
-    assert load_vehicle_for_logs(whole, [log])[1] == []
-
-
-def test_logs_of_two_mixings_and_a_log_without_one_are_refused(tmp_path):
-    pytest.importorskip("pyulog")
-    servos = {"actuator_servos": {"control[0]": wave(-0.4, 0.9, 1.1), "control[1]": wave(-0.7, 0.2, 0.7)}}
-    one = write_px4(tmp_path / "one.ulg", PX4_ELEVONS, servos)
-    other = write_px4(tmp_path / "other.ulg", with_value(PX4_ELEVONS, CA_SV_CS0_TYPE=3), servos)
-    bare = write_px4(tmp_path / "bare.ulg", (), servos)
-    path = vehicle_file(tmp_path / "bare.yaml")
-    with pytest.raises(
-        BadInput, match=r"other.ulg: its parameters give another mixing than those of .*one.ulg"
-    ):
-        load_vehicle_for_logs(path, [one, other])
-    with pytest.raises(BadInput, match="CA_SV_CS_COUNT is not in the log") as refused:
-        load_vehicle_for_logs(path, [bare])
-    assert len(str(refused.value).splitlines()) == 1
-    table = vehicle_file(tmp_path / "table.yaml", reader="table")
-    with pytest.raises(BadInput, match="commands: required key is missing"):
-        load_vehicle_for_logs(table, [synthetic.write_csv(tmp_path / "a.csv", {"t_s": T_S})])
-
-
-def test_identify_fits_a_log_whose_mixing_is_in_its_parameters(tmp_path):
-    """The whole way: the wing of the tests, its two surfaces as the servos of PX4."""
-    pytest.importorskip("pyulog")
-    flown = synthetic.fly(240.0)
-    half_sum = 0.5 * (flown["roll_command"] + flown["pitch_command"])
-    half_difference = 0.5 * (flown["roll_command"] - flown["pitch_command"])
-    rates = {"t_s": flown["t_s"]} | {f"xyz[{i}]": flown[f"{axis}_rad_s"] for i, axis in enumerate("pqr")}
-    servos = {"t_s": flown["t_s"], "control[0]": half_difference, "control[1]": half_sum}
-    log = synthetic.write_ulog(
-        tmp_path / "wing.ulg", rates, GYRO_TOPIC, {"actuator_servos": servos}, PX4_ELEVONS
-    )
-    done = run("identify", log, "--vehicle", vehicle_file(tmp_path / "v.yaml"), "--out", tmp_path / "m.json")
-    assert done.exit_code == 0
-    assert "surface 0 is the left elevon: CA_SV_CS0_TYPE 5" in done.stdout
-    model = json.loads((tmp_path / "m.json").read_text())
-    assert set(model["vehicle"]["surfaces"]) == {"left_elevon", "right_elevon"}

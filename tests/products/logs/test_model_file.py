@@ -86,31 +86,3 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, changed):
         assert any(line.startswith(f"{key}: ") and ", allowed: " in line for line in lines), lines
         found[f"{i} {'.'.join(map(str, place))}"] = lines
     assert not changed(found)
-
-
-def test_what_is_just_allowed_of_delays_and_covariances(tmp_path):
-    """A sample of delay either way, a covariance conditioned to 1e12, as its refusals say."""
-    settings = {"delays_s": [-0.05, 0.05]}
-    noise = [[2e-12, 0, 0], [0, 1, 0], [0, 0, 1.9]]
-    found = load_model(written(tmp_path, (("settings",), settings), (("noise",), noise)))
-    assert (list(found.settings.command_delays_s), found.residual_covariance[0][0]) == (
-        [-0.05, 0.05],
-        2e-12,
-    )
-    noise[0][0] = 1.8e-12
-    with pytest.raises(
-        BadInput, match="noise: is singular or nearly so, allowed: a covariance, conditioned to"
-    ):
-        load_model(written(tmp_path, (("noise",), noise)))
-    for wrong in ({"delays_s": [-0.06]}, {"delays_s": [0.0501]}):
-        with pytest.raises(BadInput, match="up to a sample"):
-            load_model(written(tmp_path, (("settings",), wrong)))
-
-
-@pytest.mark.parametrize(("key", "values"), [("spread", [0.1, -0.2, 0.3]), ("gain_sd", [0.3, -0.4])])
-def test_a_negative_deviation_of_what_was_fitted_is_refused(tmp_path, key, values):
-    with pytest.raises(
-        BadInput, match="fitted: gain_sd or spread has a negative number, allowed: at least 0"
-    ):
-        load_model(written(tmp_path, (("fitted", key), values)))
-    assert load_model(written(tmp_path, (("fitted", key), [0.0] * len(values)))).rate_hz == 20.0

@@ -8,7 +8,6 @@ from typer.testing import CliRunner
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
-from beaver_ftc_logs.recording import nearest_names_text
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 
@@ -61,14 +60,3 @@ def test_an_unknown_kind_of_recording_is_refused(tmp_path):
     done = CliRunner().invoke(app, ["run", "elevator-partial-loss", "--out", str(tmp_path), "--as", "rosbag"])
     assert done.exit_code == 2
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(("count", "more"), [(9, ""), (10, ""), (11, ", and 1 more"), (0, None)])
-def test_ten_names_are_all_that_is_listed(count, more):
-    names = [f"rate{i}" for i in range(count)]
-    said = nearest_names_text("Rate3", names)
-    assert said == "none" if more is None else said.endswith(more)
-    if count:
-        assert said.split(", ")[0] == "rate3"
-        assert len(said.removesuffix(more).split(", ")) == min(count, 10)
-        assert (" more" in said) == (count > 10)

@@ -93,30 +93,3 @@ def test_another_table_wants_a_model(tmp_path):
     done = CliRunner().invoke(app, ["diagnose", str(path), "--out", str(tmp_path)])
     assert isinstance(done.exception, BadInput)
     assert "--model is missing" in str(done.exception)
-
-
-def test_the_diagnosis_is_given_what_the_log_has_of_each_sample(run, monkeypatch):
-    """Measured rates, the flow, commands, attitude, and the altitude on which declared turbulence depends."""
-    folder, flight = run
-    given = []
-
-    class SeenError(Exception):
-        pass
-
-    def seen(diagnosis, arrays, rate_hz):
-        given.extend([*arrays, rate_hz])
-        raise SeenError
-
-    monkeypatch.setattr("beaver_ftc_logs.stepped.replay_samples", seen)
-    with pytest.raises(SeenError):
-        replay_run_log(folder / "log.parquet")
-    names = [
-        ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
-        ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
-        ["aileron_cmd_rad", "elevator_cmd_rad", "rudder_cmd_rad", "flap_cmd_rad"],
-        ["phi_rad", "theta_rad", "psi_rad"], ["altitude_m"],
-    ]  # fmt: skip
-    assert len(given) == len(names) + 1
-    for columns, array in zip(names, given, strict=False):
-        assert array.T.tolist() == [flight.log[name].tolist() for name in columns]
-    assert given[-1] == flight.scenario.rate_hz

@@ -36,33 +36,6 @@ def test_figures_by_labels():
     }
 
 
-def test_labels_that_are_never_known_in_the_same_row_judge_nothing():
-    """By the same path as `diagnose --score`: each surface is labelled, but no row has both labels."""
-    model = small.model()
-    samples = small.flight(model, 4)
-    samples.labels[::2, 0], samples.labels[1::2, 1] = np.nan, np.nan
-    found = scoring.score_diagnosis(samples, small.rows([(4, "left", [1.0, 0.5])], step_s=0.1), model.groups)
-    assert found == {
-        "rows": 0, "settings": [], "classes": None, "healthy_or_faulty": None, "side": None,
-        "mean_error": None, "held_by_bounds": None,
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize(("count", "is_one"), [(1, True), (0, False)])
-def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one):
-    labels = np.ones((200 + 200 * (not count), 1))
-    labels[5] = 0.5
-    found = scoring.score_against_labels(rows(labels, labels, labels), labels)
-    assert ([0.5] in found["settings"]) is is_one
-    assert found["rows"] == len(labels)
-
-
-def test_the_nearest_setting_is_the_first_of_two():
-    settings = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
-    estimate = np.array([[0.9, 0.9], [0.4, 1.0], [0.5, 0.5], [0.6, 0.3]])
-    assert scoring.nearest_setting(estimate, settings).tolist() == [0, 1, 0, 2]
-
-
 FAILURE = (
     LoggedFailure(12.0, "right_aileron"),
     LoggedFailure(13.99, "rudder"),
@@ -115,41 +88,3 @@ def test_a_failure_that_is_not_found_and_a_flight_without_any():
         0,
         0.0,
     )
-
-
-RIGHT = {
-    "the other of the group": ({"left_aileron": 1.0}, ["right_aileron"], True),
-    "both": ({"left_aileron+right_aileron": 1.0}, ["right_aileron"], True),
-    "a kind of either side": ({"left_aileron": 1.0}, ["aileron"], True),
-    "another": ({"elevator": 0.6, "rudder": 0.4}, ["rudder"], False),
-    "one more": ({"elevator+rudder": 1.0}, ["rudder"], False),
-    "longest counts": ({"elevator": 0.4, "rudder": 0.6}, ["rudder"], True),
-    "unknown does not": ({"unknown": 0.9, "rudder": 0.1}, ["rudder"], True),
-    "unknown alone": ({"unknown": 1.0}, ["rudder"], None),
-    "no surface": ({"rudder": 1.0}, ["engine"], None),
-    "nothing failed": ({"rudder": 1.0}, [], None),
-}
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_whether_the_group_is_the_right_one(name):
-    named, surfaces, right = RIGHT[name]
-    assert scoring._is_main_name_right(named, surfaces, GROUPS) is right
-
-
-def test_a_score_is_by_labels_where_there_are_any():
-    model = small.model()
-    samples = small.flight(model, 100, lost=((1, 40, 80, 0.5),))
-    rows = small.rows([(100, "left", [1.0, 0.5])], step_s=0.1)
-    assert "classes" in scoring.score_diagnosis(samples, rows, model.groups)
-    tail = small.model(small.TAIL)
-    bare = small.flight(tail, 100, logged_failures=small.FAILURE)
-    assert scoring.score_diagnosis(bare, rows, tail.groups)["failure"] == "elevator+left_aileron"
-
-
-def test_rows_before_the_first_sample_have_its_label():
-    model = small.model()
-    samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))
-    given = small.rows([(3, "left", [1.0, 0.5])])  # at 10, 10.5, 11
-    early = LogRows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
-    assert scoring.score_diagnosis(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)

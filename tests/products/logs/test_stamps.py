@@ -1,4 +1,4 @@
-"""A log whose clock jumps: a gap costs nothing, a stamp out of order is said with its row."""
+"""A log whose clock jumps: a gap costs nothing, and what is left out is said."""
 
 import json
 
@@ -8,14 +8,12 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
-from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.recording import rows_with_increasing_time
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import limited, synthetic
 
 JUMP_S = 1e6
 ROWS = 1500
-SHORT = {"p_rad_s": "p", "q_rad_s": "q", "r_rad_s": "r", "roll_command": "roll", "pitch_command": "pitch"}
 
 
 def fast(jump_s=JUMP_S, seed=5):
@@ -26,45 +24,18 @@ def fast(jump_s=JUMP_S, seed=5):
     return columns
 
 
-def dataflash(path, columns):
-    rows = [
-        ("RATE", {"TimeUS": round(t_s * 1e6) + 1_000_000} | {SHORT[name]: columns[name][i] for name in SHORT})
-        for i, t_s in enumerate(columns["t_s"])
-    ]
-    return synthetic.write_dataflash(path, rows)
-
-
-def alfa(folder, change):
-    """An ALFA folder at five times its rate, each stamp, s from the first, changed: change(t_s, row)."""
-    synthetic.write_alfa(folder, duration_s=ROWS / synthetic.RATE_HZ)
-    for path in folder.glob("*.csv"):
-        header, *lines = path.read_text().splitlines()
-        origin = 1_538_768_543_780_097_959
-        for row, line in enumerate(lines):
-            stamp, rest = line.split(",", 1)
-            t_s = change((int(stamp) - origin) * 1e-9 / 5.0, row)
-            lines[row] = f"{origin + round(t_s * 1e9)},{rest}"
-        path.write_text("\n".join([header, *lines]) + "\n")
-    return folder
-
-
 WRITERS = {
-    "csv": (synthetic.VEHICLE, synthetic.write_csv),
     "parquet": (synthetic.VEHICLE, synthetic.write_parquet),
     "ulg": (synthetic.vehicle("vehicle_rates"), synthetic.write_ulog),
-    "log": (synthetic.vehicle("RATE", {"pitch_command": "pitch_comman"}), synthetic.write_ardupilot),
-    "bin": (synthetic.vehicle("RATE", SHORT), dataflash),
+    "bin": (synthetic.vehicle("RATE", synthetic.SHORT), synthetic.write_rates),
 }
 
 
 def test_a_jump_of_the_clock_costs_no_memory(tmp_path):
     """Every reader through both commands, in one process of 3 GB: the jump in the time base alone wants 4."""
     pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
-    end_s = ROWS / 2 / 50.0
-    folder = alfa(tmp_path / "alfa", lambda t_s, row: t_s + JUMP_S * (t_s >= end_s))
-    flights = [("alfa", folder)]
-    for suffix in ("parquet", "ulg", "bin"):
-        vehicle, write = WRITERS[suffix]
+    flights = [("alfa", synthetic.write_alfa(tmp_path / "alfa", columns=fast()))]
+    for suffix, (vehicle, write) in WRITERS.items():
         (tmp_path / f"{suffix}.yaml").write_text(vehicle)
         flights.append((tmp_path / f"{suffix}.yaml", write(tmp_path / f"flight.{suffix}", fast())))
     commands = []
@@ -102,61 +73,7 @@ def test_a_time_in_another_unit_is_told(wing, tmp_path):
         load_flights_for_fit([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
 
 
-def test_each_side_of_a_gap_is_sampled_as_if_alone(wing, tmp_path):
-    columns = fast(1e4)
-    whole = load_flights_for_fit([synthetic.write_csv(tmp_path / "whole.csv", columns)], wing)[0]
-    halves = [slice(0, ROWS // 2), slice(ROWS // 2, None)]
-    parts = [
-        load_flights_for_fit([synthetic.write_csv(tmp_path / f"{i}.csv", columns, half)], wing)[0]
-        for i, half in enumerate(halves)
-    ]
-    np.testing.assert_array_equal(whole.t_s, np.concatenate([part.t_s for part in parts]))
-    np.testing.assert_allclose(whole.rates, np.vstack([part.rates for part in parts]), atol=1e-12)
-    np.testing.assert_array_equal(whole.stretch_number, np.repeat([0, 1], [len(part.t_s) for part in parts]))
-    assert len(whole.t_s) < ROWS
-
-
 DAMAGED = 51  # the row, counted from 1, whose stamp is off
-
-
-@pytest.mark.parametrize("off_s", [JUMP_S, -0.5])
-@pytest.mark.parametrize("suffix", ["ulg", "log", "bin"])
-def test_a_damaged_stamp_costs_its_row_and_is_said(tmp_path, suffix, off_s):
-    pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
-    from beaver_ftc_logs.samples import resample
-    from beaver_ftc_logs.vehicle import load_vehicle
-
-    vehicle, write = WRITERS[suffix]
-    (tmp_path / "vehicle.yaml").write_text(vehicle)
-    columns = fast(0.0)
-    whole = read_flight(write(tmp_path / f"whole.{suffix}", columns))
-    columns["t_s"][DAMAGED - 1] += off_s
-    damaged = read_flight(write(tmp_path / f"damaged.{suffix}", columns))
-    topic = next(iter(whole.columns)).split(".")[0]
-    for name, column in damaged.columns.items():
-        for field in ("t_s", "values"):
-            of_all = getattr(whole.columns[name], field)
-            np.testing.assert_array_equal(getattr(column, field), np.delete(of_all, DAMAGED - 1))
-    samples = resample(damaged, load_vehicle(tmp_path / "vehicle.yaml"))
-    said = f"{topic}: row {DAMAGED}: its stamp is out of order, the row is left out"
-    assert [note for note in samples.notes if "out of order" in note] == [said]
-
-
-def test_a_damaged_stamp_of_a_topic_of_alfa(tmp_path):
-    folder = alfa(tmp_path / "alfa", lambda t_s, row: t_s + JUMP_S * (row == DAMAGED - 1))
-    whole = alfa(tmp_path / "whole", lambda t_s, row: t_s)
-    column, of_all = (read_flight(path).columns["p_rad_s"] for path in (folder, whole))
-    np.testing.assert_array_equal(column.t_s, np.delete(of_all.t_s, DAMAGED - 1))
-    np.testing.assert_array_equal(column.values, np.delete(of_all.values, DAMAGED - 1))
-    assert "mavros-imu-data_raw: row 51: its stamp is out of order" in column.note
-
-
-@pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_a_damaged_stamp_of_a_table_is_refused(tmp_path, suffix):
-    columns = fast(0.0)
-    columns["t_s"][DAMAGED - 1] -= 0.5
-    with pytest.raises(BadInput, match="row 51: time does not increase, allowed: increasing seconds"):
-        read_flight(WRITERS[suffix][1](tmp_path / f"flight.{suffix}", columns))
 
 
 def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
@@ -182,29 +99,6 @@ def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
     assert said in (tmp_path / "out" / "flight" / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("t_s", "kept", "says"),
-    [
-        ([1, 2, 3, 4], [0, 1, 2, 3], ""),
-        ([1, 2, 2, 3], [0, 1, 3], ""),  # a stamp twice: the first, and no word
-        ([1, 2, 9e9, 3, 4], [0, 1, 3, 4], "x: row 3: its stamp is out of order, the row is left out"),
-        ([7, 1, 2, 7], [1, 2, 3], "x: row 1: its stamp is out of order, the row is left out"),
-        ([1, 2, 3, 2.5, 4], [0, 1, 2, 4], "x: row 4: its stamp is out of order, the row is left out"),
-        ([1, 2, np.nan, 3], [0, 1, 3], "x: row 3: its stamp is out of order, the row is left out"),
-        (
-            [1, 2, 3, 4, 1, 2, 3],
-            [0, 1, 2, 3],
-            "x: row 5: its stamp is out of order, the row is left out, as are 2 more of 7",
-        ),
-        ([np.nan, np.nan], [], "x: row 1: its stamp is out of order, the row is left out, as is 1 more of 2"),
-    ],
-)
-def test_which_rows_are_in_order(t_s, kept, says):
-    found, note = rows_with_increasing_time("x", np.array(t_s, dtype=float))
-    assert found.tolist() == kept
-    assert note == says
-
-
 def test_no_row_more_than_needed_is_left_out():
     """Against all subsequences of short logs."""
     rng = np.random.default_rng(2)
@@ -215,10 +109,3 @@ def test_no_row_more_than_needed_is_left_out():
         masks = ((np.arange(256)[:, None] >> np.arange(8)) & 1).astype(bool)
         longest = max(mask.sum() for mask in masks if (np.diff(t_s[mask]) > 0).all())
         assert len(kept) == longest
-
-
-def test_the_text_of_a_verdict_has_its_notes(wing, wing_model, tmp_path):
-    samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "one.csv", synthetic.fly(20.0))], wing)[0]
-    found = verdict_document(samples, wing_model, diagnose(samples, wing_model))
-    assert found["notes"] == []
-    assert "a remark" in as_text(found | {"notes": ["a remark"]})

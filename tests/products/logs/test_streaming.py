@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
-    detector_names,
     diagnose_with_detector,
     loop_detector_context,
     loop_detector_inputs,
-    rows_of_verdicts,
 )
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
@@ -59,36 +56,6 @@ def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     step = np.array([0.0, 0.3, 0.0])
     changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
     np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past_coefficients)[1], atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["multiple-models", "sliding-least-squares"])
-def test_a_rival_finds_a_large_loss(flown, wing_model, name):
-    rows = diagnose_with_detector(name, flown, wing_model)
-    late = rows.t_s > 90.0
-    assert rows.faulty[late].mean() > 0.8
-    assert np.mean(rows.isolated_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
-    assert rows.faulty[(rows.t_s > 30) & (rows.t_s < 60)].mean() < 0.3
-
-
-def test_every_detector_gives_rows(flown, wing_model):
-    for name in detector_names():
-        rows = diagnose_with_detector(name, flown, wing_model)
-        assert len(rows.t_s) == len(flown.t_s)
-        assert (
-            (rows.effectiveness_low <= rows.effectiveness) & (rows.effectiveness <= rows.effectiveness_high)
-        ).all()
-
-
-def test_verdicts_become_rows(flown, wing_model):
-    said = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
-    unknown = Verdict(True, None, "unanticipated", statistic=3.0)
-    rows = rows_of_verdicts(
-        [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
-    )
-    assert rows.faulty.tolist() == [0, 1, 1, 0]
-    assert rows.isolated_surfaces.tolist() == ["", "left", "unknown", ""]
-    assert rows.effectiveness[1].tolist() == [1.0, pytest.approx(0.6)]
-    assert rows.effectiveness_low.tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 
 
 def test_an_unknown_detector(flown, wing_model):

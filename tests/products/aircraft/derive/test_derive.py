@@ -22,18 +22,17 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
-from beaver_ftc.plant.adapter import Plant, bare, translated
+from beaver_ftc.plant.adapter import Plant, bare
 from beaver_ftc.plant.model_file import copy_of
-from beaver_ftc.plant.trial import probe
 from beaver_ftc.plant.trim import trim as trim_plant
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive import derivation, first_use
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out
-from beaver_ftc_aircraft.derive.fit import Columns, errors_of, pursue, signals_of_use
+from beaver_ftc_aircraft.derive.fit import Columns, errors_of, pursue
 from beaver_ftc_aircraft.derive.outline import not_affine, usual_start
-from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, places, sample
+from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, sample
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.vehicle import Vehicle
@@ -134,16 +133,6 @@ def test_the_error_is_that_of_the_evaluator_that_flies(unseen):
         assert np.abs(believed - seen.rate[k]) == pytest.approx(errors_of(aircraft, seen)[k], abs=1e-9)
 
 
-def test_every_state_is_in_the_box_it_was_drawn_for(unseen):
-    """The boxes as the file has them hold the states that were drawn in them."""
-    seen, aircraft = unseen
-    where = places(seen, aircraft)[:, 3:6]
-    boxes = aircraft.file.model_error_map.boxes
-    ends = np.array([[box.alpha_rad, box.beta_rad, box.airspeed_mps] for box in boxes])[seen.box]
-    within = (where >= ends[..., 0] - 1e-3) & (where <= ends[..., 1] * 1.001 + 1e-3)
-    assert within.mean() > 0.999
-
-
 def test_a_healthy_flight_raises_no_alarm(derived):
     healthy = flight(derived)
     assert healthy.detection_time_s is None
@@ -176,18 +165,6 @@ def under_an_autopilot(folder, name):
     while not vehicle.over:
         autopilot.hear(end.take(autopilot.next(), "it", 0.0))
     return vehicle.flight.land()
-
-
-def test_it_flies_under_an_autopilot(derived):
-    _, folder, name = derived
-    landed = under_an_autopilot(folder, name)
-    assert landed.passed, landed
-
-
-def test_it_does_not_stand_on_the_ground(derived):
-    _, folder, name = derived
-    with pytest.raises(BadInput, match=f"{name}'s file has no `ground` to stand on, allowed: false"):
-        load_text(FLIGHT.replace("NAME", name) + "initial: {on_ground: true}", folder=folder)
 
 
 def test_what_leaves_the_envelope_raises_no_alarm(derived):
@@ -251,29 +228,6 @@ def test_pursuit_finds_the_terms_that_made_the_data():
     assert dict(zip(taken, values, strict=True)) == pytest.approx({3: 2.0, 9: -0.5, 0: 0.1})
 
 
-@pytest.mark.parametrize(("size", "kept"), [(1e-13, False), (1e-3, True)])
-def test_rounding_is_no_signal(unseen, size, kept):
-    """Terms of what JSBSim leaves of a thrust that is zero would fit, and fly wrong where that differs."""
-    seen, aircraft = unseen
-    explaining = {**seen.signals, "thrust": size * seen.rate[:, 1]}
-    assert ("thrust" in signals_of_use(replace(seen, signals=explaining), aircraft, 6)) == kept
-
-
-def test_the_power_lever_reaches_an_engine_that_asks_flightgear_for_it(tmp_path):
-    """Its systems read FlightGear's lever and manifold pressure: in the copy they are there."""
-    model = instrumented.instrument(instrumented.source_of("p51d"), tmp_path, {})
-    fdm = bare(model)
-    with translated(model):
-        fdm.run_ic()
-        fdm["fcs/actuated-throttle-norm"] = 0.3
-        fdm.run()
-        fdm.run()
-        assert fdm["/controls/engines/engine/throttle"] == pytest.approx(0.3)
-        pressure = fdm["propulsion/engine/map-inhg"]
-        fdm.run()
-        assert fdm["/engines/engine/mp-inhg"] == pytest.approx(pressure) != 0.0
-
-
 def test_other_stops_leave_a_deflection_its_moment(tmp_path):
     """Its aerodynamics see a share of the travel. The search for trim moves the stops, and has to find the
     trim of the aircraft that flies."""
@@ -287,32 +241,6 @@ def test_other_stops_leave_a_deflection_its_moment(tmp_path):
     assert seen == pytest.approx([0.5, 0.5])
 
 
-def test_a_retracted_gear_drags_as_little_as_in_the_aircraft_itself(tmp_path):
-    """Against plain JSBSim with the gear up; down, it is more than half of the C310's drag."""
-    source = instrumented.source_of("c310")
-    copy = bare(instrumented.instrument(source, tmp_path, {}, gear_up=True))
-    plain = bare(source)
-    down = drag_of(plain)
-    plain["gear/gear-cmd-norm"] = plain["gear/gear-pos-norm"] = 0.0
-    assert drag_of(copy) == pytest.approx(drag_of(plain), rel=1e-9)
-    assert down > 2.0 * drag_of(copy)
-
-
-def drag_of(fdm):
-    fdm["ic/vt-fps"], fdm["ic/h-sl-ft"] = 237.0, 5000.0
-    fdm.run_ic()
-    return fdm["forces/fwx-aero-lbs"]
-
-
-def test_what_flightgear_gives_is_there_in_the_copy_and_said(tmp_path):
-    """Its model does not run without five properties of FlightGear's pushback and gear."""
-    source = source_of("jsbsim:dr1")
-    absent = try_out(source)
-    assert "/sim/model/pushback/kp" in absent
-    assert len(absent) == 5
-    probe(instrumented.instrument(source.model, tmp_path, {}, absent))
-
-
 def test_a_models_own_output_file_is_left_nowhere(tmp_path, monkeypatch):
     """JSBSim opens its CSV in the root directory when the model is loaded, output disabled or not."""
     monkeypatch.chdir(tmp_path)
@@ -322,33 +250,6 @@ def test_a_models_own_output_file_is_left_nowhere(tmp_path, monkeypatch):
     bare(copy_of(source_of("jsbsim:ball").model, tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
     assert not list(data_root().glob("BallOut*"))
-
-
-def test_every_file_of_the_copy_is_needed(derived):
-    """Of the engines and systems that JSBSim's aircraft share it has those that it names: without any of
-    them it does not load."""
-    made, folder, name = derived
-    copied = set((folder / name).rglob("*.xml")) - {made.aircraft.jsbsim}
-    own = {"Systems/ftc-aileron.xml", "Systems/ftc-elevator.xml", "Systems/ftc-rudder.xml"}
-    assert {str(path.relative_to(folder / name)) for path in copied} >= own
-    for path in copied:
-        path.rename(path.with_suffix(".away"))
-        try:
-            with pytest.raises(SimulationFailed):
-                bare(made.aircraft.jsbsim)
-        finally:
-            path.with_suffix(".away").rename(path)
-    bare(made.aircraft.jsbsim)
-
-
-def test_an_aircraft_with_a_file_is_derived_over_the_envelope_asked_for(tmp_path, quick):
-    file = tmp_path / "envelope.yaml"
-    file.write_text("airspeed_mps: [40, 50]\nalpha_deg: [0, 12]\naltitude_m: 3000\nsideslip_deg: 4\n")
-    outermost = derive("beaver", tmp_path, file).aircraft.file.model_error_map.boxes[-1]
-    assert outermost.airspeed_mps == pytest.approx((40, 50), abs=0.01)
-    assert np.degrees(outermost.alpha_rad) == pytest.approx((0, 12), abs=0.01)
-    assert np.ptp(np.degrees(outermost.beta_rad)) == pytest.approx(8, abs=0.01)
-    assert outermost.density_kg_m3[0] < 0.909 < outermost.density_kg_m3[1]  # ISA at 3000 m
 
 
 def test_what_cannot_be_derived_is_refused_in_a_line(tmp_path, quick):

@@ -1,6 +1,5 @@
 """What a derivation prints, of a document with everything in it."""
 
-from beaver_ftc.aircraft import load
 from beaver_ftc_aircraft.derive import derived
 from beaver_ftc_aircraft.derive.derived import WHY_NOT_USED
 
@@ -48,10 +47,3 @@ def test_a_derivation_as_text():
     short = derived.text_of({**DOCUMENT, **none}).splitlines()
     assert len(short) == 12
     assert short[-1].startswith(" written in")
-
-
-def test_a_file_beside_itself_has_found_each_of_its_terms():
-    beaver = load()
-    told = derived.differences(beaver, beaver)
-    assert [of["term"] for of in told] == [term.name for term in beaver.moments if term.value]
-    assert all(of["own"] == of["found"] != 0.0 for of in told)

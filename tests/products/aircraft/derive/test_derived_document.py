@@ -77,18 +77,3 @@ def test_what_is_derived_of_a_model(stranger, changed):
 def test_what_is_derived_of_an_aircraft_with_a_file_over_an_envelope_of_its_own(filed, changed):
     for part, said in parts_of(filed).items():
         assert not changed(said, part=part)
-
-
-def test_a_page_on_an_aircraft_of_which_little_is_to_be_said(stranger, changed):
-    found, _ = stranger
-    assert not changed(derived.page_of(replace(found, notes=(), further={}, took_s=2.0)).splitlines())
-
-
-def test_a_loss_that_no_deflection_so_small_shows_is_said_with_the_deflection_it_needs(stranger, monkeypatch):
-    """At 3 deg a total loss shows half a bound too little: at 4.5 deg it would show."""
-    lost = {"axis": "p", "per_rad_rad_s2": 1.0, "bound_rad_s2": 0.1}
-    losses = {"aileron": lost | {"certain_loss": 1.5}, "elevator": lost | {"certain_loss": 1.0}}
-    monkeypatch.setattr(derived, "smallest_losses", lambda made: losses)
-    page = derived.page_of(stranger[0]).splitlines()
-    assert "| aileron | p | 1 | 0.1 | none: a total one needs 4.5 deg | 4.5 deg |" in page
-    assert "| elevator | p | 1 | 0.1 | 100% | 3 deg |" in page

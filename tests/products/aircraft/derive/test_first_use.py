@@ -2,15 +2,12 @@
 
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc_aircraft.derive import first_use
-from telling import numbers
 
 TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
 
@@ -53,17 +50,6 @@ def test_another_inertia_of_the_model_is_said(trainer):
     assert "q" in [line[0] for line in first_use.kept_or_compared(read(trainer))]
 
 
-def test_it_is_compared_once_for_each_state_of_the_files(trainer, monkeypatch):
-    asked = []
-    monkeypatch.setattr(first_use, "compared", lambda aircraft: asked.append(aircraft) or ["off"])
-    aircraft = read(trainer)
-    assert [first_use.kept_or_compared(aircraft) for _ in range(3)] == [["off"]] * 3
-    assert len(asked) == 1
-    change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
-    first_use.kept_or_compared(aircraft)
-    assert len(asked) == 2
-
-
 @pytest.mark.parametrize("left", [b"", b'["of', b"\xff"])
 def test_of_a_cache_that_was_cut_off_it_is_compared_again(trainer, monkeypatch, left):
     asked = []
@@ -96,69 +82,3 @@ def test_a_rudder_that_rolls_more_than_it_yaws_leads_the_yaw_axis_all_the_same(t
     aircraft = read(trainer)
     assert aircraft.dominant_axis == (0, 1, 2)
     assert aircraft.primary == ("aileron", "elevator", "rudder")
-
-
-def test_where_nothing_can_be_kept_it_is_said_all_the_same(trainer, monkeypatch):
-    """A full disk, or another process that was first: no reason not to fly."""
-
-    def full(path, content):
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr(first_use, "compared", lambda aircraft: ["off"])
-    monkeypatch.setattr(first_use, "write_whole", full)
-    assert first_use.kept_or_compared(read(trainer)) == ["off"]
-
-
-BOUNDS = SimpleNamespace(
-    constant_rad_s2=SimpleNamespace(p=0.011, q=0.023, r=0.037),
-    inertia_coupling=SimpleNamespace(p=0.2, q=0.5, r=0.7),
-)
-RATES = numbers(4, 3, seed=1)
-
-
-def plane(error_map):
-    return SimpleNamespace(
-        mass="mass", model_error_rad_s2=[0.1, 0.3, 0.9],
-        file=SimpleNamespace(model_error_map=error_map, jsbsim="plane.xml"),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("mapped", [False, True])
-def test_what_a_file_declares_is_that_of_a_states_box_and_level(monkeypatch, mapped):
-    """Beside what every scenario declares: a constant, and a share of each product of two rates."""
-    coefficients = {"mass": SimpleNamespace(Pqr=-0.31, Qpr=0.53, Rpq=-0.71)}
-    monkeypatch.setattr(first_use, "inertia_coefficients", coefficients.get)
-    monkeypatch.setattr(first_use, "Bounds", lambda: BOUNDS)
-    own, box, level = np.abs(numbers(2, 3, 5, seed=2)), np.array([1, 0, 1, 0]), np.array([4, 2, 0, 3])
-    boxes = [
-        SimpleNamespace(
-            **{f"error_{axis}_rad_s2": [of[i].tolist(), [9.0] * 5] for i, axis in enumerate("pqr")}
-        )
-        for of in own
-    ]
-    samples = SimpleNamespace(x=RATES, box=box, level=level)
-    error_map = SimpleNamespace(boxes=boxes) if mapped else None
-    found = first_use._declared(plane(error_map), samples)
-    for k, (p, q, r) in enumerate(np.abs(RATES)):
-        coupled = 0.2 * 0.31 * q * r, 0.5 * 0.53 * p * r, 0.7 * 0.71 * p * q
-        errors = own[box[k], :, level[k]] if mapped else [0.1, 0.3, 0.9]
-        np.testing.assert_allclose(found[k], np.add([0.011, 0.023, 0.037], coupled) + errors)
-
-
-def test_each_axis_is_said_where_it_is_worst_beyond_what_is_declared(monkeypatch):
-    errors = np.array([[0.5, 0.2, 0.30], [0.9, 0.1, 0.31], [0.7, 0.3, 0.2]])
-    declared = np.array([[0.1, 0.4, 0.29], [0.8, 0.2, 0.1], [0.2, 0.3, 0.4]])
-    monkeypatch.setattr(first_use, "errors_of", lambda *_: errors)
-    monkeypatch.setattr(first_use, "_declared", lambda *_: declared)
-    y = np.array([[0.02, -0.05, 41.0, 1.0], [0.07, 0.03, 52.34, 2.0], [0.1, -0.1, 33.0, 3.0]])
-    found = [line.partition(", so")[0] for line in first_use._lines(plane(None), SimpleNamespace(y=y))]
-    assert found == [
-        "p: the terms are 0.7 rad/s2 off plane.xml at 33 m/s, angle of attack 5.7, sideslip -5.7 deg; "
-        "0.2 is declared",
-        "r: the terms are 0.31 rad/s2 off plane.xml at 52.3 m/s, angle of attack 4.0, sideslip 1.7 deg; "
-        "0.1 is declared",
-    ]
-    nothing = np.empty((0, 3))
-    monkeypatch.setattr(first_use, "errors_of", lambda *_: nothing)
-    monkeypatch.setattr(first_use, "_declared", lambda *_: nothing)
-    assert [*first_use._lines(plane(None), SimpleNamespace(y=y))] == []

@@ -6,18 +6,14 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import bare
-from beaver_ftc.plant.model_file import package
 from beaver_ftc.scenario.schema import load_text
-from beaver_ftc_aircraft.derive import derivation, outline
+from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive.derivation import source_of
-from beaver_ftc_aircraft.derive.derived import document_of, page_of, text_of
 
 from . import foreign
 
 MOTOR = '<electric_engine name="motor"> <power unit="WATTS"> {} </power> </electric_engine>'
-PROPELLER = package() / "engine" / "prop_75in2f.xml"
 
 
 @pytest.fixture
@@ -116,79 +112,6 @@ def test_what_writes_or_listens_is_left_out_of_the_copy_and_said(tmp_path, prepa
         source_of(str(foreign.write(tmp_path, child)))
 
 
-def law(value, output):
-    """A channel of the author's own that holds a property."""
-    held = f"<function> <value> {value} </value> </function> <output> {output} </output>"
-    return f'<channel name="law"> <fcs_function name="fcs/law"> {held} </fcs_function> </channel>'
-
-
-TINY = """<propeller name="tiny"> <ixx> 0.001 </ixx> <diameter unit="IN"> 10 </diameter>
-  <numblades> 2 </numblades>
-  <table name="C_THRUST" type="internal"> <tableData> 0 0.0123
-  1.2 -0.0011 </tableData> </table>
-  <table name="C_POWER" type="internal"> <tableData> 0 0.0082
-  1.2 -0.0007 </tableData> </table> </propeller>"""
-HELD = (
-    "its own flight control holds fcs/throttle-pos-norm[0] at {}, wherever its lever fcs/throttle-cmd-norm is"
-)
-REASONS = {
-    "empty tanks": (
-        foreign.powered("eng_io320", fuel=0),
-        r"its engines do not carry it, its tanks are empty; full, they let its engines give \d{4} N, 1\d\.",
-    ),
-    "a throttle of its own, closed": (
-        foreign.controlled(foreign.powered(), law(0, "fcs/throttle-pos-norm")),
-        re.escape(f"its engines do not carry it, {HELD.format(0)}: it is flown gliding"),
-    ),
-    "a lever of its own": (
-        foreign.controlled(foreign.powered(), law(0.05, "fcs/throttle-cmd-norm")),
-        re.escape(HELD.format(0.05)),
-    ),
-    "a throttle of its own, open": (
-        foreign.controlled(foreign.powered(), law(0.3, "fcs/throttle-pos-norm")),
-        re.escape(f"its power goes no further: {HELD.format(0.3)}"),
-    ),
-    "a weak engine": (
-        foreign.powered("weak"),
-        r"its engines do not carry it, at full power its engines give \d+ N, \d\.\d% of its weight, at 57",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", REASONS)
-def test_why_engines_do_not_carry_it_is_found_and_said(case, tmp_path, prepared):
-    text, says = REASONS[case]
-    path = foreign.write(tmp_path, text)
-    (path.parent / "Engines").mkdir()
-    (path.parent / "Engines" / "weak.xml").write_text(MOTOR.format(14000))
-    notes = prepared(path)["notes"]
-    assert any(re.search(says, note) for note in notes), notes
-
-
-def test_a_propeller_that_diverges_is_named(tmp_path, prepared):
-    text = re.sub(r"<tank .*</tank>", "", foreign.powered("motor", "tiny"), flags=re.S)
-    for name, value in (
-        ("wingarea", 4.2),
-        ("wingspan", 5.9),
-        ("chord", 0.72),
-        ("ixx", 0.037),
-        ("iyy", 0.0125),
-        ("izz", 0.095),
-        ("emptywt", 4.4),
-    ):
-        text = re.sub(rf"(<{name} [^>]*>)[^<]*", rf"\g<1> {value} ", text, count=1)
-    path = foreign.write(tmp_path, text)
-    (path.parent / "Engines").mkdir()
-    (path.parent / "Engines" / "motor.xml").write_text(MOTOR.format(370))
-    (path.parent / "Engines" / "tiny.xml").write_text(TINY)
-    says = (
-        r"^navion: in frames of 10 ms the speed and the moment of its propeller are no finite numbers, in "
-        r"frames of 0.1 ms they are: its <ixx> is too small for the power of its engine, allowed: engines "
-    )
-    with pytest.raises(BadInput, match=says):
-        derivation.derive(str(path), tmp_path / "out")
-
-
 GEAR = {
     "property": "<product> <property> gear/gear-pos-norm </property> <value> 0.35 </value> </product>",
     "p": "<product> <p> gear/gear-pos-norm[0] </p> <v> 0.35 </v> </product>",
@@ -207,32 +130,6 @@ def test_a_gear_is_retracted_however_it_is_read(how, tmp_path, prepared):
         "its landing gear is retracted in the copy: with it, its power does not hold it level"
     ]
     assert found["off"].share < 1e-3
-
-
-@pytest.mark.parametrize("n", [1, 21, 60])
-def test_properties_of_flightgear_in_any_number_are_0(n, tmp_path, prepared):
-    names = [f"/controls/lamp/state-{i}" for i in range(n)]
-    lamps = "".join(f"<property> {name} </property>" for name in names)
-    sums = f"<function> <sum> {lamps} <value> 0 </value> </sum> </function>"
-    channel = f'<channel name="lamps"> <fcs_function name="fcs/lamps"> {sums} </fcs_function> </channel>'
-    found = prepared(foreign.write(tmp_path, foreign.controlled(foreign.NAVION, channel)))
-    assert found["notes"][0] == f"JSBSim alone gives it no {', '.join(names)}: 0 in the copy"
-
-
-TOLD = {
-    "a glider's lever": (foreign.NAVION, "/controls/engines/engine/throttle"),
-    "the lever of an engine it has not": (foreign.powered(), "/controls/engines/engine[3]/throttle"),
-    "the manifold pressure of a motor": (foreign.powered(), "/engines/engine/mp-inhg"),
-}
-
-
-@pytest.mark.parametrize("case", TOLD)
-def test_what_flightgear_tells_of_an_engine_that_has_it_not_is_0(case, tmp_path, prepared):
-    text, name = TOLD[case]
-    reads = f"<function> <property> {name} </property> </function>"
-    channel = f'<channel name="lever"> <fcs_function name="fcs/lever"> {reads} </fcs_function> </channel>'
-    notes = prepared(foreign.write(tmp_path, foreign.controlled(text, channel)))["notes"]
-    assert re.match(r"JSBSim alone gives it no .*: 0 in the copy$", notes[0])
 
 
 @pytest.fixture(scope="module")
@@ -274,38 +171,3 @@ def test_laws_and_schemes_that_need_a_surface_for_each_axis_say_so(key, name, wi
     changed = f"name: w\naircraft: ./wing\nchanges: [{{at_s: 3, {word}: {name}}}]\n"
     with pytest.raises(BadInput, match=rf"changes\[0\].{word}: {name} needs a surface for each"):
         load_text(changed, folder=folder)
-
-
-def test_where_files_come_from_is_in_all_that_is_said(wing):
-    made, _ = wing
-    files = {f"Engines/{name}.xml": "the jsbsim package" for name in ("electric147kW", "prop_75in2f")}
-    document = document_of(made)
-    assert document["files"] == files
-    assert document["copy_off"] == {"share": 0.0, "where": "0.01%"}
-    assert " files      Engines/electric147kW.xml from the jsbsim package, Engines/prop" in text_of(document)
-    assert "| `Engines/electric147kW.xml` | the jsbsim package |" in page_of(made)
-
-
-def test_a_map_of_surfaces_is_read_from_the_envelope_file(tmp_path, prepared):
-    file = tmp_path / "envelope.yaml"
-    file.write_text(
-        "surfaces: {aileron: fcs/posAil_rad, elevator: [fcs/posElev_rad], rudder: fcs/posRud_rad}\n"
-    )
-    path = foreign.write(tmp_path, foreign.renamed())
-    assert prepared(path, file)["off"].share < 1e-3
-    assert outline.read_envelope(file).surfaces["aileron"] == ("fcs/posAil_rad",)
-    for wrong, says in (("flap: fcs/x", "flap"), ("aileron: []", "aileron"), ("aileron: ../x y", "aileron")):
-        file.write_text(f"surfaces: {{{wrong}}}\n")
-        with pytest.raises(BadInput, match=says):
-            outline.read_envelope(file)
-
-
-def test_engines_in_a_file_of_their_own_are_counted(tmp_path):
-    path = foreign.write(tmp_path, foreign.NAVION.replace("<propulsion/>", '<propulsion file="P"/>'))
-    (path.parent / "P.xml").write_text(
-        re.search(r"<propulsion>.*</propulsion>", foreign.powered(), re.S).group(0)
-    )
-    assert instrumented.engines_of(path) == 1
-    (path.parent / "P.xml").unlink()
-    with pytest.raises(BadInput, match=r"navion.xml: needs P for its propulsion, which is not there"):
-        instrumented.engines_of(path)

@@ -1,6 +1,5 @@
 """A copy turns as the model of its author does, whatever his ailerons and elevators are called and do."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +33,6 @@ MODELS = {
     "normalised otherwise": foreign.elevator(-0.3, 0.4, (-0.5, 1.0)),
     "equal stops": foreign.elevator(-0.4, 0.4),
 }
-NAMED = {"aileron": ("fcs/posAil_rad",), "elevator": ("fcs/posElev_rad",), "rudder": ("fcs/posRud_rad",)}
 
 
 def pair_of(folder, text, named=None, views=True):
@@ -111,68 +109,6 @@ def test_the_comparison_finds_a_copy_that_takes_names_at_their_word(case, tmp_pa
     assert all(found[other].share < 1e-6 for other in others)
 
 
-def test_a_moment_that_the_copy_lacks_refuses_the_aircraft_with_its_cause(tmp_path, quick_trim):
-    """The author's trim tab goes with the elevator command, inside of what the aerodynamics read of it."""
-    tab = foreign.scale("fcs/elevator-cmd-norm", -0.2, 0.2, "fcs/elevator-servo")
-    sees = "<sum> <property> fcs/elevator-pos-rad </property> <property> aero/tab </property> </sum>"
-    reads = '<fcs_function name="aero/tab"> <function> <property> fcs/elevator-servo </property> </function> </fcs_function>'  # noqa: E501
-    text = foreign.controlled(foreign.NAVION, tab, f'<channel name="tab"> {reads} </channel>')
-    path = foreign.write(tmp_path, foreign.seen_as(text, "fcs/elevator-pos-rad", sees))
-    with pytest.raises(BadInput, match=r"^navion: its copy would fly otherwise, off by .* with elevator at"):
-        derivation.derive(str(path), tmp_path / "out")
-
-
-@pytest.fixture
-def quick_trim(monkeypatch):
-    """Nothing is sampled: what a test is about comes before."""
-    monkeypatch.setattr(derivation, "_derived", lambda *of: pytest.fail("it was sampled"))
-
-
-def test_what_moves_along_is_noted_with_how_much_that_is(tmp_path):
-    """A spoiler by the aileron command: known not to move in the copy."""
-    spoiler = foreign.scale("fcs/aileron-cmd-norm", -0.1, 0.1, "fcs/roll-spoiler")
-    sees = foreign.shares({LEFT: 1.0, "fcs/roll-spoiler": 1.0})
-    text = foreign.seen_as(foreign.controlled(foreign.NAVION, spoiler), LEFT, sees)
-    own, copy, found = pair_of(tmp_path, text)
-    pair = derivation.Pair(own, copy, found, frozenset({"fcs/roll-spoiler"}))
-    notes = []
-    off = derivation._compared(Source("navion", own), pair, (44.0, 68.0), notes, str)
-    assert off.share == pytest.approx(0.1 / 0.8, rel=0.1)  # of a roll to which the rudder adds
-    (note,) = notes
-    assert re.match(r"its copy is off by 1\d\.\d\d% in roll with aileron at ", note)
-    assert "since fcs/roll-spoiler is elsewhere in the copy" in note
-    with pytest.raises(BadInput, match="fcs/roll-spoiler is elsewhere in the copy, allowed:"):
-        derivation._compared(
-            Source("navion", own), derivation.Pair(own, copy, found, frozenset()), (44.0, 68.0), [], str
-        )
-    named = {"aileron": (LEFT, "fcs/roll-spoiler")}
-    assert max(of.share for of in differences(*pair_of(tmp_path / "named", text, named), (44.0, 68.0))) < 1e-3
-
-
-def test_names_of_the_authors_own_are_said_with_the_map_that_gives_them(tmp_path):
-    path = foreign.write(tmp_path, foreign.renamed())
-    own, _ = derivation._own(Source("navion", path), tmp_path / "own")
-    with pytest.raises(BadInput) as caught:
-        find_surfaces(path, own, {})
-    says = str(caught.value)
-    for name in ("fcs/posAil_rad", "fcs/posElev_rad", "fcs/posRud_rad", "fcs/elevator-pos-rad"):
-        assert name in says
-    assert "`surfaces: {aileron: fcs/posAil_rad, elevator: fcs/posElev_rad, rudder: fcs/posRud_rad}`" in says
-    with pytest.raises(
-        BadInput, match=r"^surfaces.rudder: navion's aerodynamics do not read 'fcs/none', allowed: fcs/pos"
-    ):
-        find_surfaces(path, own, NAMED | {"rudder": ("fcs/none",)})
-    found = find_surfaces(path, own, NAMED)
-    assert found.travel == {"aileron": (-0.3, 0.3), "elevator": (-0.45, 0.35), "rudder": (-0.4, 0.4)}
-    assert (
-        max(
-            of.share
-            for of in differences(*pair_of(tmp_path / "named", foreign.renamed(), NAMED), (44.0, 68.0))
-        )
-        < 1e-3
-    )
-
-
 def test_a_rudder_of_another_name_is_not_left_out_in_silence(tmp_path):
     text = foreign.NAVION.replace("fcs/rudder-pos-rad", "fcs/posRud_rad")
     path = foreign.write(tmp_path, text)
@@ -195,24 +131,6 @@ def test_one_property_by_two_commands_is_no_surface(tmp_path):
         find_surfaces(path, own, {})
 
 
-DEFLECTIONS = np.linspace(-0.3, 0.2, 41)
-CURVES = [
-    (1.7 * DEFLECTIONS, 1.0, 1.7),
-    (1.0 * DEFLECTIONS, 1.0, 1.0),
-    (0.0 * DEFLECTIONS, 1.0, 0.0),
-    (0.1 + 2.0 * DEFLECTIONS, 1.0, ((-0.3, -0.5), (0.2, 0.5))),
-    (np.where(DEFLECTIONS > 0, 3.0, 1.0) * DEFLECTIONS, 1.0, ((-0.3, -0.3), (0.0, 0.0), (0.2, 0.6))),
-    (np.abs(DEFLECTIONS), ((-0.3, 0.3), (0.0, 0.0), (0.2, 0.2)), ((-0.3, 0.3), (0.0, 0.0), (0.2, 0.2))),
-]
-
-
-@pytest.mark.parametrize(("values", "usual", "view"), CURVES)
-def test_what_is_read_is_a_gain_or_points(values, usual, view):
-    found = view_of(DEFLECTIONS, values, usual)
-    assert isinstance(found, type(view))
-    assert np.array(found) == pytest.approx(np.array(view), abs=1e-9)
-
-
 def test_two_values_of_one_deflection_are_no_function():
     """One goes on where the other stands at its stop."""
     command = np.linspace(-1.0, 1.0, 41)
@@ -220,42 +138,6 @@ def test_two_values_of_one_deflection_are_no_function():
     assert view_of(command, np.clip(command, -0.5, 0.5), 1.0) == pytest.approx(
         np.array([(-1.0, -0.5), (-0.5, -0.5), (0.5, 0.5), (1.0, 0.5)])
     )
-
-
-def test_points_go_on_straight_beyond_the_stops(tmp_path):
-    """The search for trim moves the stops."""
-    _, copy, found = pair_of(tmp_path, MODELS["differential"])
-    fdm, seen = bare(copy), []
-    for end in ("min", "max"):
-        fdm[f"actuators/aileron/position-{end}-rad"] = 10.0 if end == "max" else -10.0
-    for deflection in (found.travel["aileron"][1], 2.0 * found.travel["aileron"][1]):
-        turned(fdm, {"fcs/actuated-aileron-cmd-rad": deflection})
-        seen.append(fdm["fcs/effective-left-aileron-pos-rad"])
-    assert seen == pytest.approx([0.3, 0.6])
-
-
-def test_a_share_of_the_travel_without_an_angle_has_a_supposed_one(tmp_path):
-    text = foreign.NAVION.replace("fcs/elevator-pos-rad", "fcs/elevator-pos-norm")
-    _, _, found = pair_of(tmp_path, text)
-    assert found.travel["elevator"] == pytest.approx((-0.45 * 0.35, 0.35 * 0.35))
-    assert found.notes == ("elevator: nothing says its travel as an angle; 0.35 rad is supposed",)
-
-
-STILL = {
-    (0.0, 0.0): "its own flight control does not move it to both sides; 0.35 rad is supposed",
-    (-0.3, 0.01): "its own flight control does not move it to both sides; 0.35 rad is supposed",
-    (-0.3, 0.03): None, (-2.0, 1.9): None,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("ends", STILL)
-def test_travel_is_from_stop_to_stop_or_supposed_and_noted(ends, tmp_path):
-    channel = foreign.scale("fcs/elevator-cmd-norm", *ends, "fcs/elevator-pos-rad")
-    text = foreign.controlled(foreign.NAVION, channel, without="fcs/elevator-pos-rad")
-    _, _, found = pair_of(tmp_path, text)
-    travel = (-0.35, 0.35) if STILL[ends] else tuple(np.clip(ends, -1.2, 1.2))
-    assert found.travel["elevator"] == pytest.approx(travel)
-    assert found.notes == ((f"elevator: {STILL[ends]}",) if STILL[ends] else ())
 
 
 @pytest.mark.parametrize(("name", "off"), [("787-8", 0.0), ("X15", 0.0), ("T38", 0.0), ("f16", 0.5)])

@@ -6,7 +6,7 @@ from math import cos, degrees, exp, radians, sin
 import numpy as np
 import pytest
 from tools.gtm import flights
-from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES, STEP_S
+from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
 from tools.gtm.specification import SURFACES, Specification, State
 
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
@@ -153,27 +153,6 @@ def test_velocities_are_continuous_through_damage_and_what_follows_is_the_same(b
     assert (jump < [0.5, 0.5, 0.5, 0.1, 0.1, 0.1]).all()
 
 
-def test_damage_acts_in_the_frame_it_is_set(bench):
-    fdm = bench.fdm
-    bench.damage(0)
-    bench.place(800.0, (160.0, 3.0, 9.0), (0.3, 0.08, 1.5), (0.1, -0.05, 0.06))
-    fdm.set_dt(STEP_S)
-    fdm.run()
-    names = [f"velocities/{axis}-rad_sec" for axis in "pqr"] + [f"velocities/{axis}-fps" for axis in "uvw"]
-    accelerations = [f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"]
-    fdm.suspend_integration()
-    fdm.run()
-    whole = [fdm[name] for name in names], [fdm[name] for name in accelerations], fdm["inertia/weight-lbs"]
-    bench.damage(4)
-    fdm.run()
-    broken = [fdm[name] for name in names], [fdm[name] for name in accelerations], fdm["inertia/weight-lbs"]
-    fdm.resume_integration()
-    bench.damage(0)
-    assert broken[0] == pytest.approx(whole[0], abs=1e-12)
-    assert abs(broken[1][0] - whole[1][0]) > 0.5
-    assert (whole[2], broken[2]) == pytest.approx((57.75, 56.94))
-
-
 @pytest.mark.parametrize(
     ("dt", "between_samples_s"), [(0.001, 0.005), (0.002, 0.006), (0.005, 0.005), (0.01, 0.01)]
 )
@@ -249,72 +228,3 @@ def test_an_engine_fails_like_a_surface(bench, side, failures, percent):
         fdm[f"failures/{side}_engine/{name}"] = number
     fdm["fcs/throttle-cmd-norm"] = fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
     assert found == pytest.approx([percent, 60.0], abs=1e-6)
-
-
-def test_forces_and_moments_are_the_coefficients_in_their_own_dimensions(bench):
-    """Area 5.9018 ft2, span 6.8488 ft about roll and yaw, chord 0.9153 ft about pitch."""
-    fdm = bench.fdm
-    bench.place(800.0, (150.0, 7.0, 12.0), (0.1, 0.05, 0.0), (0.2, -0.1, 0.3))
-    force_lbf = fdm["aero/qbar-psf"] * 5.9018
-    for name, coefficient, length_ft in (
-        ("force/X-lbs", "CX", 1.0), ("force/Y-lbs", "CY", 1.0), ("force/Z-lbs", "CZ", 1.0),
-        ("moment/L-lbsft", "Cl", 6.8488), ("moment/M-lbsft", "Cm", 0.9153), ("moment/N-lbsft", "Cn", 6.8488),
-    ):  # fmt: skip
-        value = fdm[f"aero/coefficient/{coefficient}"]
-        assert value != 0.0
-        assert fdm[f"aero/{name}"] == pytest.approx(force_lbf * length_ft * value, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("levers", "common", "case", "gear"),
-    [((0.31, 0.12), 0.27, 0, 1.0), ((0.0, 0.83), 0.0, 2, 0.0), ((0.17, -0.06), 0.4, 4, 1.0)],
-)
-def test_engines_push_and_turn_it_about_the_centre_of_gravity_that_is_left(
-    bench, specified, levers, common, case, gear
-):
-    """Each engine along its own line, at rest in time at the sum of both levers; below its ram drag, nothing.
-
-    The moments of the air are about the reference point of the tables, all about where a case leaves the
-    centre of gravity; the gear moves it 0.0025 ft aft and 0.015 ft down.
-    """
-    fdm, velocity, omega = bench.fdm, np.array([151.0, 7.0, 13.0]), np.array([0.4, -0.7, 1.1])
-    for side, lever in zip(("left", "right"), levers, strict=True):
-        fdm[f"fcs/{side}_engine-cmd-norm"] = lever
-    fdm["fcs/throttle-cmd-norm"], fdm["gear/down"] = common, gear
-    bench.damage(case)
-    bench.place(800.0, velocity, (0.1, 0.05, 0.0), omega)
-    omega = np.array([fdm[f"velocities/{axis}-rad_sec"] for axis in "pqr"])
-    cg = specified.mass(case)[1] + gear * np.array([-0.0025, 0.0, 0.015])
-    load, pressure = fdm["aero/qbar-psf"] * 5.9018, fdm["atmosphere/P-psf"]
-    c = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
-    air = load * np.array([6.8488, 0.9153, 6.8488]) * c[3:]
-    air += np.cross(np.array([-4.775025, 0.0, -0.9401]) - cg, load * c[:3])
-    forces, moments, thrusts, rotors = [], [], [], np.zeros(3)
-    for side, lever in zip(("left", "right"), levers, strict=True):
-        push, place, turning = specified._engine(side, 100.0 * (lever + common), pressure, load)
-        forces.append(push)
-        moments.append(np.cross(place - cg, push))
-        thrusts.append(float(np.linalg.norm(push)))
-        rotors += turning
-    found = {
-        kind: np.array([fdm[f"moments/{axis}-{kind}-lbsft"] for axis in "lmn"])
-        for kind in ("aero", "external")
-    }
-    pushed = np.array([fdm[f"forces/fb{axis}-external-lbs"] for axis in "xyz"])
-    each = [fdm[f"engine/{side}_engine/thrust-lbs"] for side in ("left", "right")]
-    inertia = [fdm[f"inertia/i{name}-slugs_ft2"] for name in ("xx", "yy", "zz")]
-    weight, share = fdm["inertia/weight-lbs"], fdm["aero/thrust-coefficient"]
-    for side in ("left", "right"):
-        fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
-    fdm["fcs/throttle-cmd-norm"] = fdm["gear/down"] = 0.0
-    bench.damage(0)
-    assert each == pytest.approx(thrusts, rel=1e-9)
-    assert pushed == pytest.approx(sum(forces), rel=1e-9)
-    assert share == pytest.approx(sum(thrusts) / load)
-    assert found["aero"] == pytest.approx(air, rel=1e-5)
-    assert found["external"] == pytest.approx(sum(moments) + np.cross(omega, rotors), rel=1e-5)
-    assert (thrusts[0] == 0.0) == (levers[0] + common == 0.0)
-    assert inertia == pytest.approx(
-        np.diag(specified.mass(case)[2]) + gear * np.array([0.0441, 0.0, 0.006994])
-    )
-    assert weight == pytest.approx(specified.mass(case)[0])

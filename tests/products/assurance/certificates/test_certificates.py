@@ -11,26 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
-from scipy.spatial.transform import Rotation
-from scipy.stats import norm
 from tools.drawn.certificates import altered, places
 from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
-from beaver_ftc.diagnosis.readout import read_sensor_monitor
-from beaver_ftc.plant.instruments import SENSORS
-from beaver_ftc.results import writer
-from beaver_ftc_assurance.certificates import certificate as certificate_module
-from beaver_ftc_assurance.certificates import chance, check_certificate, instruments_say
+from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
+from beaver_ftc.results.writer import run
+from beaver_ftc_assurance.certificates import check_certificate
 from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import failures
-from beaver_ftc_assurance.certificates.instruments_say import TESTS
 from flying import SINES
 from samples import samples
-from telling import apart, fill
 
 CHECKER = Path(__file__).parents[4] / "tools/check_certificate.py"
 GYRO = {"noise_std_deg_s": 0.02, "bias_deg_s": 0.05, "scale_error": 1e-3}
@@ -187,45 +179,6 @@ def test_chance_excludes_what_moves_nothing_where_it_raised_the_alarm():
     assert all(refusals("chance", with_digest(before)))
 
 
-def looked(name):
-    """Of an alarm of instruments: the statement, the log, its row, and a look's time."""
-    certificate, log = flown(name)
-    (said,) = certificate["statements"]
-    k = said["frame"]
-    return said, log, k, log["t_s"][1]
-
-
-def attitude(log, k):
-    return Rotation.from_euler("ZYX", [log[f"{angle}_rad"][k] for angle in ("psi", "theta", "phi")])
-
-
-def test_an_altimeter_is_held_against_the_velocity_upwards():
-    """Exact instruments leave room for the wind, and for what a step leaves out."""
-    said, log, k, h = looked("an altimeter")
-    alpha, beta, V = (log[name][k - 1] for name in ("alpha_rad", "beta_rad", "airspeed_mps"))
-    along = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
-    foretold = log["altitude_m"][k - 1] - h * attitude(log, k - 1).apply(along)[2]
-    (reading, *others, most), *_ = said["looks"]
-    assert (said["test"], k) == ("altitude", 100)
-    assert reading == pytest.approx(log["altitude_m"][k] + 3.0, abs=1e-6)
-    assert others == pytest.approx([foretold], abs=1e-6)
-    assert h * 1.0 < most < h * (1.0 + 4.0 / 3.0 * h * 30.0)
-
-
-def test_a_roll_angle_is_held_against_the_last_attitude_turned_by_the_gyros():
-    """Exact instruments leave the Earth's rate."""
-    said, log, k, h = looked("a roll angle")
-    rates = np.array([log[f"{axis}_measured_rad_s"][k - 1] for axis in "pqr"])
-    size = np.linalg.norm(rates)
-    turned = attitude(log, k - 1) * Rotation.from_rotvec(2.0 * np.arctan(0.5 * h * size) * rates / size)
-    now = log["psi_rad"][k], log["theta_rad"][k], log["phi_rad"][k] + np.radians(0.1)
-    rotation = 2.0 * (turned.inv() * Rotation.from_euler("ZYX", now)).as_quat()[0]
-    (reading, foretold, most), *_ = said["looks"]
-    assert (said["test"], k) == ("turning p", 100)
-    assert reading - foretold == pytest.approx(abs(rotation), abs=1e-12)
-    assert most == pytest.approx(h * 4e-5, rel=1e-4)
-
-
 def test_an_alarm_of_instruments_is_that_of_the_log():
     """Larger by what nothing allows, or of another reading, it is refused."""
     for name in ("an altimeter", "a roll angle"):
@@ -255,46 +208,6 @@ def test_that_a_reading_is_missing_is_what_the_log_says():
     assert refusals("no vane", certificate, other)[1]
 
 
-def test_of_several_missing_readings_the_log_says_the_first():
-    said = {"frame": 1, "missing": [3, 5], "because": "two", "sides": [2.0, 1.0]}
-    logged = {"frame": 1, "missing": [3, 5], "sides": [1.0, 0.0]}
-    rows = {"detected": np.array([0.0, 1.0])}
-    assert instruments_say.with_missing_column(said, rows) == said
-    for readings, expected in (([np.nan, 3.0], logged), ([3.0, 5.0], said)):
-        assert (
-            instruments_say.with_missing_column(said, rows | {"watch_missing": np.array(readings)})
-            == expected
-        )
-
-
-def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
-    """With gyros as noisy, by plain sums over the rows of a block: no loss explains what it shows."""
-    certificate, log = flown("blocks")
-    said = next(one for one in certificate["statements"] if one["what"] == "aileron loss_of_effectiveness")
-    (length, begin, _), dt, limit, value = said["block"], log["t_s"][1], 0.0, 0.0
-    for one in said["terms"]:
-        rows = range(begin + one["frame"] * length, begin + (one["frame"] + 1) * length)
-        for axis, d in zip("pqr", one["d"], strict=True):
-            x, model, bound = (
-                log[f"{axis}_{of}"] for of in ("measured_rad_s", "design_rad_s2", "eta_bar_rad_s2")
-            )
-            value += one["weight"] * d * (x[rows[-1]] - x[rows[0] - 1] - dt * sum(model[rows]))
-            limit += one["weight"] * abs(d) * dt * sum(bound[rows])
-    assert length == 20
-    assert value == pytest.approx(said["sides"][0], rel=1e-12)
-    assert limit < said["sides"][1] < value  # which has noise and effects besides
-
-
-def test_before_a_block_is_whole_no_type_is_held_against_one():
-    """The flight ends in the first block after the alarm."""
-    given = {"name": "early", "duration_s": 0.15, "reference": SINES, **FLIGHTS["blocks"]}
-    flight = bf.fly(given | {"faults": [STUCK | {"at_s": 0.05}]})
-    certificate = json.loads(as_text(flight.certificate()))
-    assert flight.metrics["detection"]["detected"]
-    assert [one["what"] for one in certificate["statements"]][:1] == [None]
-    assert all("block" not in one for one in certificate["statements"])
-
-
 def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
     (tmp_path / "text.json").write_text("no certificate")
     (tmp_path / "list.json").write_text("[1, 2]")
@@ -304,31 +217,6 @@ def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
         assert checked.returncode == 1
         assert checked.stderr.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")
         assert checked.stderr.count("\n") == 1
-
-
-def test_many_constants_are_written_as_one_at_its_worst(monkeypatch):
-    """What each takes off the evidence, added up, is what their sum does."""
-    certificate, _ = flown("chance")
-    monkeypatch.setattr(chance, "MAX_WRITTEN_CONSTANTS", 99)
-    flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS["chance"]})
-    summed, one_by_one = certificate["statements"][0], flight.certificate()["statements"][0]
-    assert summed["tolerance"] == [1.0]
-    assert len(one_by_one["tolerance"]) > 6
-    assert np.array(summed["sides"]) == pytest.approx(np.array(one_by_one["sides"]), rel=1e-5)
-
-
-def test_in_moving_air_the_axes_that_go_together_are_weighed_together():
-    """Both at once, with the gust that the vanes saw and what calm air would foretell."""
-    certificate, _ = flown("chance, in moving air")
-    (alarm,) = (said for said in certificate["statements"] if said["what"] is None)
-    assert alarm["axes"] == [0, 2]
-    assert any(its["drift"][0][1] for its in alarm["frames"])
-    assert all("air" in its for its in alarm["frames"])
-    apart = copy.deepcopy(certificate)
-    (said,) = (said for said in apart["statements"] if said["what"] is None)
-    for its in said["frames"]:
-        its["drift"][0][1] = its["drift"][1][0] = 0.0
-    assert all(refusals("chance, in moving air", with_digest(apart)))
 
 
 def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
@@ -388,14 +276,6 @@ def test_whatever_number_is_altered_the_checker_refuses_it(name):
         other = altered(certificate, known[i])
         assert refusals(name, other)[0], known[i]
         assert all(refusals(name, with_digest(other))), known[i]
-
-
-@pytest.mark.parametrize("name", ["gyros", "blocks"])
-def test_what_gyros_may_be_off_by_is_declared_on_the_axes_that_statements_look_at(name):
-    certificate, _ = flown(name)
-    terms = [term for said in certificate["statements"] for term in said.get("terms", [])]
-    axes = {axis for term in terms for axis, d in zip("pqr", term["d"], strict=True) if d}
-    assert certificate["declared"]["B"] == pytest.approx(dict.fromkeys(axes, np.radians(0.05)))
 
 
 def test_the_fault_that_is_there_cannot_be_excluded():
@@ -460,17 +340,6 @@ def test_what_a_course_takes_from_log_and_scenario_is_refused_by_name(kind, fiel
     assert refusals("any type", with_digest(other))[0] == [f"aileron {kind} excluded: {says}"]
 
 
-def test_a_level_of_chance_is_no_smaller_than_the_declared_rate_of_false_alarms_allows():
-    certificate, _, scenario = proved("chance")
-    rate_per_h = yaml.safe_load(scenario)["fdi"]["statistical"]["false_alarms_per_h"]
-    least = norm.isf(rate_per_h * certificate["dt_s"] / 3600.0)
-    too_small = "alarm: level: the declared rate allows no smaller one"
-    for level, refused in ((0.9999 * least, True), (1.0001 * least, False)):
-        other = copy.deepcopy(certificate)
-        other["statements"][0]["level"] = level
-        assert (refusals("chance", with_digest(other))[0][0] == too_small) == refused
-
-
 EARLY = 30  # a row before any fault
 EMPTY = {name: {} for name in "cbgoBm"}
 
@@ -523,22 +392,6 @@ def test_a_statement_that_its_own_numbers_make_true_is_refused(road, event):
     assert not any("the stated sides" in why for why in refused)
 
 
-def test_the_effect_of_a_fault_is_that_of_the_log():
-    """A stuck aileron at another deflection would be excluded; h, Z and r are recomputed, stated or not."""
-    certificate, _ = flown("any type")
-    altered_fields = set()
-    for what in ("aileron float", "aileron loss_of_effectiveness"):
-        for name in "hZr":
-            other = copy.deepcopy(certificate)
-            said = next(one for one in other["statements"] if one["what"] == what)
-            for term in said["terms"]:
-                if name in term:
-                    term[name] = [2.0 * value + 1.0 for value in term[name]]
-                    altered_fields.add(name)
-            assert other == certificate or all(refusals("any type", with_digest(other))), (what, name)
-    assert {"h", "Z"} <= altered_fields
-
-
 @pytest.mark.parametrize("where", ["document", "statement", "term"])
 def test_no_field_is_there_that_is_not_known(where):
     certificate, _ = flown("loss")
@@ -554,53 +407,6 @@ def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
     imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names)
     assert others == {"numpy", "pyarrow", "yaml"}  # the log's and the scenario's reader
-
-
-@pytest.mark.parametrize(
-    ("place", "error", "says"),
-    [
-        ("metrics", ZeroDivisionError("of the test"), "ZeroDivisionError: of the test"),
-        ("figures", OSError(28, "of the test"), "no space left on device"),
-        ("certificate", PermissionError(13, "of", "the test"), "PermissionError: [Errno 13] of: 'the test'"),
-    ],
-)
-def test_whatever_fails_while_results_are_written_the_log_is_kept(
-    place, error, says, tmp_path, monkeypatch, capsys
-):
-    """One line says what failed; nothing half written is left."""
-
-    def fails(*_, **__):
-        raise error
-
-    modules = {"metrics": writer, "figures": writer, "certificate": certificate_module}
-    names = {"metrics": "metrics", "figures": "write_report_files", "certificate": "certificate"}
-    monkeypatch.setattr(modules[place], names[place], fails)
-    monkeypatch.chdir(tmp_path)
-    Path("mine.yaml").write_text(
-        json.dumps({"name": "mine", "duration_s": 0.2, "faults": [LOSS | {"at_s": 0.1}]})
-    )
-    asked = ["--certificate", *["--no-report"] * (place != "figures")]
-    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", *asked])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 3
-    written = {path.name for path in Path("runs/mine").iterdir()}
-    assert {"log.parquet", "scenario.yaml"} <= written
-    lost = {"metrics": "metrics.json", "figures": "report.html", "certificate": "certificate.json"}[place]
-    assert ("metrics.json" in written) == (place != "metrics")
-    assert lost not in written
-    said = capsys.readouterr().err.strip().splitlines()
-    words = f"the flight and its log are kept, but {lost} could not be written: {says}"
-    assert len([line for line in said if words in line]) == 1
-
-
-def test_a_fault_in_the_first_row_has_a_certificate():
-    given = {"name": "zero", "duration_s": 0.5, "reference": SINES, "fdi": SOUND}
-    proof = bf.fly(given | {"faults": [STUCK | {"at_s": 0}]}).proof()
-    certificate = json.loads(as_text(proof.certificate))
-    assert certificate["statements"][0]["frame"] == 1
-    assert [*failures(certificate, proof.log, proof.scenario)] == []
-    assert [*doubts(certificate, proof.log, proof.scenario)] == []
 
 
 def test_by_the_command_line(tmp_path, monkeypatch, capsys):
@@ -643,53 +449,23 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("turned", [1.0, -1.0])
-def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned):
-    """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
-    the filter nearest to its bound keeps of those before."""
-    watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=2, size=0.3)
-    watch["output"]["worst_test_index"], watch["output"]["top_ratio"] = (
-        TESTS.index("alpha"),
-        1.2,
+def test_a_run_writes_the_certificate_of_its_flight(tmp_path):
+    scenario = bf.load(
+        {"name": "test", "duration_s": 3.0, "reference": SINES, "faults": [STUCK]} | {"fdi": SOUND}
     )
-    redundancy, config = watch["redundancy"], watch["redundancy"]["config"]
-    test = redundancy["test"][TESTS.index("alpha")]
-    test["r"], test["B"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
-    test["residual"] = turned * 0.9
-    apart(
-        looked=[
-            config["sample_time_s"],
-            test["bound_per_s"],
-            test["bound_per_sample"],
-            test["gust_gain"],
-            *config["gust_change"],
-        ]
-    )
-    said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
-    (now, then, most), (before, nothing, most_before) = said["looks"]
-    foretold = float(redundancy["memory"]["predicted_reading"][SENSORS.index("alpha")])
-    assert said["test"] == "alpha"
-    assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
-    assert now - then == pytest.approx(0.9)
-    assert most == pytest.approx(
-        config["sample_time_s"] * test["bound_per_s"]
-        + test["bound_per_sample"]
-        + test["gust_gain"] * config["gust_change"][1]
-    )
-    assert before - nothing == pytest.approx(8.0 - 0.9)
-    assert most_before == pytest.approx(4.7 - most)
-    assert said["sides"] == pytest.approx([8.0, 4.7])
+    run(scenario, tmp_path, report=False, certified=True)
+    assert (tmp_path / "test/certificate.json").read_text() == as_text(bf.fly(scenario).certificate())
 
 
-def test_an_engines_reading_is_held_against_its_command_alone():
-    """There is no filter: one look, with the error of the reading itself, and rounding."""
-    watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=3, size=0.3)
-    number, redundancy = TESTS.index("manifold_pressure"), watch["redundancy"]
-    watch["output"]["worst_test_index"], watch["output"]["top_ratio"] = number, 1.2
-    redundancy["memory"]["engine_commands"] = 1800.0, 20.0
-    redundancy["memory"]["reading_bound"][SENSORS.index("manifold_pressure")] = 0.4
-    redundancy["test"]["residual"][number] = -0.5
-    said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
-    assert said["test"] == "manifold_pressure"
-    assert said["looks"] == [pytest.approx([20.0, 19.5, 0.4 + 1e-6], abs=1e-12)]
-    assert said["sides"] == pytest.approx([0.5, 0.4 + 1e-6], abs=1e-12)
+@pytest.mark.parametrize("kind", range(N_TYPES))
+def test_the_checker_defines_every_type_as_its_row_does(kind):
+    """It is written apart from the rows."""
+    row, words, travel = TYPES[kind], DESCRIPTIONS_IN_TYPE_ORDER[kind], (-0.2, 0.7)
+    if row.frames_test:
+        found = check_certificate.COURSES[words]
+        assert found == (row.frames_test.replace(" ", "_"), row.stop_direction)
+        return
+    relation = row.deflection_relation
+    expected = relation.command_gain, relation.theta_is_share, row.has_constant_parameter
+    found = check_certificate.RELATIONS[words](*travel)
+    assert found == (*expected, *relation.theta_span(*travel))

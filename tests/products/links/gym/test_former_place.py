@@ -6,7 +6,7 @@ from importlib import import_module
 import gymnasium
 import pytest
 
-from beaver_ftc_links.gym import BeaverEnv, BeaverVectorEnv
+from beaver_ftc_links.gym import BeaverEnv
 
 FORMER = "beaver_ftc.integrations.gym"
 
@@ -17,10 +17,6 @@ def former(monkeypatch):
     monkeypatch.delitem(sys.modules, FORMER, raising=False)
     with pytest.warns(DeprecationWarning, match=r"has moved to beaver_ftc_links\.gym"):
         return import_module(FORMER)
-
-
-def test_the_former_module_has_the_same_classes(former):
-    assert (former.BeaverEnv, former.BeaverVectorEnv) == (BeaverEnv, BeaverVectorEnv)
 
 
 def test_the_line_documented_before_makes_the_environment(former):

@@ -1,8 +1,5 @@
 """The Gymnasium environment: the checker's rules, and that it is the same aircraft as in a flight."""
 
-import pickle
-from copy import deepcopy
-
 import numpy as np
 import pytest
 
@@ -79,27 +76,6 @@ def test_an_action_held_over_frames_is_the_same_given_frame_by_frame():
     assert info["metrics"]["frames"] == 200
 
 
-@pytest.mark.parametrize("copied", [deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_a_copy_is_in_the_same_state_and_goes_on_by_itself(copied):
-    noisy = scenario(duration_s=2, sensors={"q": {"noise_std_deg_s": 0.1}}, faults=[FAULT])
-    env = gymnasium.make("beaver_ftc/Beaver-v0", scenario=noisy, render_mode=None)
-    copied(env).reset(seed=7)  # before an episode has begun
-    env.reset(seed=7)
-    for k in range(20):
-        env.step(_action(k))
-    other = copied(env)
-    for k in range(20, 40):
-        mine, its = env.step(_action(k)), other.step(_action(k))
-        assert np.array_equal(mine[0], its[0])
-        assert mine[1:4] == its[1:4]
-    assert np.array_equal(env.reset()[0], other.reset()[0])  # the seeds to come, too
-
-
-def test_there_is_nothing_to_render():
-    with pytest.raises(BadInput, match="render_mode: 'human' is not known, allowed: None"):
-        BeaverEnv(render_mode="human")
-
-
 def test_a_seed_replaces_the_scenarios():
     noisy = scenario(duration_s=2, sensors={"q": {"noise_std_deg_s": 0.1}})
     first, again, other = (BeaverEnv(noisy).reset(seed=seed)[0] for seed in (5, 5, 6))
@@ -114,23 +90,6 @@ def test_episodes_after_a_seeded_one_differ_and_follow_from_the_seed():
     assert np.array_equal(*seen)
     assert not np.array_equal(seen[0][0], seen[0][1])
     assert not np.array_equal(seen[0][1], seen[0][2])
-
-
-def test_a_step_across_the_chunks_of_the_log_is_the_frames_it_has(monkeypatch):
-    monkeypatch.setattr("beaver_ftc.loop.loop.CHUNK_ROWS", 256)
-    monkeypatch.setattr("beaver_ftc.loop.simulation.CHUNK_ROWS", 256)
-    one, many = (
-        BeaverEnv(scenario(duration_s=4, substeps=2, faults=[{**FAULT, "at_s": 2.54, "end_s": 2.6}]), frames)
-        for frames in (1, 41)
-    )
-    one.reset()
-    many.reset()
-    action = np.zeros(4)
-    for _ in range(9):
-        singles = [one.step(action) for _ in range(41)]
-        seen, reward, *_ = many.step(action)
-        assert np.array_equal(seen, singles[-1][0])
-        assert reward == pytest.approx(sum(single[1] for single in singles), rel=1e-12)
 
 
 @pytest.mark.parametrize("action", [[0.0, np.nan, 0.0, 0.0], [0.0, 0.0], [[0.0] * 4]])
@@ -158,17 +117,3 @@ def test_a_departure_ends_the_episode_and_costs():
 def test_stepping_before_reset_is_said():
     with pytest.raises(gymnasium.error.ResetNeeded):
         BeaverEnv(scenario(duration_s=1)).step(np.zeros(4))
-
-
-def test_a_clone_goes_its_own_way_from_the_same_state():
-    env = BeaverEnv("elevator-loss-in-turbulence", frames_per_step=4)
-    env.reset(seed=3)
-    for share in (0.1, 0.1, -0.2):
-        env.step(np.full(4, share))
-    other = env.clone()
-    away = env.clone()
-    away.step(np.ones(4))
-    for share in (0.0, 0.3):
-        for mine, its in zip(env.step(np.full(4, share)), other.step(np.full(4, share)), strict=True):
-            assert np.array_equal(mine, its)
-    assert np.array_equal(env.reset()[0], other.reset()[0]), "episodes to come are the same, too"

@@ -55,19 +55,6 @@ def test_it_is_gymnasiums_own_step_for_step_and_over_the_end_of_episodes(three):
     assert over == 2
 
 
-def test_what_is_handed_out_is_not_written_to_afterwards(three):
-    first, _ = three.reset(seed=1)
-    kept = first.copy()
-    three.step(np.full((3, 4), 0.1))
-    assert np.array_equal(first, kept)
-
-
-@pytest.mark.parametrize("seeds", [[3, 4, 5], 3])
-def test_one_seed_is_the_first_ones(three, seeds):
-    single = [BeaverEnv(scenario(**FLOWN)).reset(seed=seed)[0] for seed in (3, 4, 5)]
-    assert np.array_equal(three.reset(seed=seeds)[0], single)
-
-
 def test_actions_of_another_shape_are_said_and_it_goes_on(three):
     three.reset()
     with pytest.raises(BadInput, match=r"actions: shape \(2, 4\), allowed: finite numbers of shape \(3, 4\)"):
@@ -91,32 +78,6 @@ def test_a_process_that_dies_is_said():
         two.step(np.zeros((2, 4)))
 
 
-def test_what_goes_wrong_in_a_process_is_raised_here_and_ends_them_all():
-    two = BeaverVectorEnv(2, scenario=scenario(**FLOWN), workers=2)
-    two.reset()
-    with pytest.raises(BadInput, match="allowed: 4 finite numbers"):
-        two.step([[np.nan] * 4, [0.0] * 4])
-    assert not two._workers[0].process.is_alive()
-
-
-def test_one_process_alone_is_this_one(three):
-    alone = BeaverVectorEnv(3, scenario=scenario(**FLOWN), frames_per_step=FRAMES, workers=1)
-    alone.reset(seed=1)
-    three.reset(seed=1)
-    actions = np.full((3, 4), 0.02)
-    for ours, theirs in zip(alone.step(actions)[:4], three.step(actions)[:4], strict=True):
-        assert np.array_equal(ours, theirs)
-
-
-def test_seeds_of_numpy_are_seeds(three):
-    wanted, _ = three.reset(seed=3)
-    for seed in (np.int64(3), np.array([3, 4, 5]), [np.uint8(3), 4, np.int64(5)]):
-        assert np.array_equal(three.reset(seed=seed)[0], wanted)
-    for seed in (-1, 1.5, "3", [3, 4, -5]):
-        with pytest.raises((gymnasium.error.Error, BadInput), match="seed: "):
-            three.reset(seed=seed)
-
-
 @pytest.mark.parametrize(
     "bad", [np.full((3, 4), 1j), np.full((3, 4), "0"), [[0.0] * 4, [0.0] * 3, [0.0] * 4], None]
 )
@@ -125,15 +86,3 @@ def test_actions_that_are_no_numbers_are_refused(three, bad):
     with pytest.raises(BadInput, match=r"actions: .*, allowed: finite numbers of shape \(3, 4\)"):
         three.step(bad)
     assert np.isfinite(three.step(np.zeros((3, 4)))[0]).all()
-
-
-def test_a_step_after_the_end_asks_for_a_reset():
-    env = BeaverEnv(scenario(**FLOWN), frames_per_step=50)
-    seeds = env.reset(seed=np.int64(3)), env.reset(seed=3)
-    assert np.array_equal(seeds[0][0], seeds[1][0])
-    assert env.step(np.zeros(4))[3]
-    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over"):
-        env.step(np.zeros(4))
-    env.reset()
-    with pytest.raises(BadInput, match=r"action: .*, allowed: finite numbers"):
-        env.step(np.full(4, 1j))

@@ -3,12 +3,10 @@ it."""
 
 import json
 from multiprocessing import Pipe
-from types import SimpleNamespace
 
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc_links.sitl import page as page_module
 from beaver_ftc_links.sitl.page import Shown, Watched
 from beaver_ftc_links.sitl.vehicle import Vehicle
 from beaver_ftc_live.page.session import ready_for_hands
@@ -79,60 +77,3 @@ def test_the_autopilot_flies_not_the_page(vehicle):
         answer = page.ask(n=n, **request)
         assert not answer["ok"]
         assert answer["says"] == f"{request['do']}: not under an autopilot, allowed: break, repair, blow"
-
-
-def test_a_flight_begun_anew_is_shown_anew(vehicle):
-    page = Page(vehicle)
-    fly(vehicle, 50)
-    page.told("f")
-    vehicle.begin(100)
-    assert len(page.told("hello")) == 1
-    vehicle.begin(200)
-    (hello,) = page.told("hello")
-    assert hello["rate_hz"] == 200
-    fly(vehicle, 5)
-    assert page.told("hello") == []
-
-
-def test_an_address_is_said_and_a_server_that_has_gone_does_not_matter(vehicle):
-    page = Page(vehicle)
-    page.pipe.send((0, "at http://127.0.0.1:1/x"))
-    page.told("f")
-    assert page.said == ["live: http://127.0.0.1:1/x"]
-    page.pipe.close()
-    page.shown._next_s = 0.0
-    page.shown.tick()
-    page.shown._next_s = 0.0
-    page.shown.tick()
-    fly(vehicle, 5)
-    assert vehicle.flight.frames == 6
-
-
-def test_what_the_scenario_breaks_is_told_as_well():
-    faults = [{"type": "stuck", "actuator": "rudder", "at_s": 0.2, "end_s": 0.5}]
-    base = bf.load("fault-free").with_({"expect": {}, "faults": faults})
-    vehicle = Vehicle(ready_for_hands(base), pulses=True)
-    page = Page(vehicle)
-    told = []
-    for _ in range(3):
-        fly(vehicle, 20)
-        page.told("f")
-        events = page.shown._watched.events
-        told.append(
-            [(each["kind"], each["says"]) for each in events if each["kind"] in ("broken", "repaired")]
-        )
-    assert told[0] in ([], [("broken", "rudder: stuck")])
-    assert told[1] == [("broken", "rudder: stuck")]
-    assert told[2] == [("broken", "rudder: stuck"), ("repaired", "rudder: stuck")]
-
-
-def test_a_page_is_told_sixty_times_a_second_and_not_with_each_frame(vehicle, monkeypatch):
-    now = [50.0]
-    monkeypatch.setattr(page_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    page, told, followed = Page(vehicle), [], []
-    monkeypatch.setattr(page.shown, "_serve", lambda: told.append(now[0]))
-    monkeypatch.setattr(page.shown._pace, "follow", lambda *of: followed.append(of))
-    for now[0] in (50.0, 50.016, 50.0167, 50.02, 50.0333, 50.034):
-        page.shown.tick()
-    assert told == [50.0, 50.0167, 50.034]
-    assert followed == [(now_s, vehicle.flight.frames) for now_s in told]

@@ -1,6 +1,5 @@
 """The flight under an autopilot: as in process, at any rate of packets, its faults and its instant."""
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,11 @@ from tools.autopilots.small import Small
 
 import beaver_ftc as bf
 from beaver_ftc.design import standard_air
-from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.px4 import quaternion, rotation
-from beaver_ftc_links.sitl.vehicle import Flown, Vehicle, at_rate, without_reference
+from beaver_ftc_links.sitl.vehicle import Vehicle, at_rate
 
 NO_PULSE = 0
 
@@ -93,17 +91,6 @@ def test_the_flight_follows_the_rate_of_the_packets(packets_hz):
     assert np.array_equal(log.to_numpy(), sim.log.to_numpy(), equal_nan=True)
 
 
-def test_a_plug_in_sees_whole_frames_however_they_are_flown():
-    flown = at_rate(scenario(duration_s=0.5), 100).with_({"substeps": 4})
-    whole, parts = (Flown(flown, detector=RlsMonitor()) for _ in range(2))
-    for k in range(40):
-        command = whole.trim_rad + 0.01 * np.sin(k)
-        whole.pilot(4, command, None)
-        for runs in (1, 2, 1):
-            parts.pilot(runs, command, None)
-    assert np.array_equal(whole.log.to_numpy(), parts.log.to_numpy(), equal_nan=True)
-
-
 def test_the_example_finds_its_fault_under_the_small_autopilot():
     """`examples/autopilot`, sooner."""
     file = Path(__file__).parents[4] / "examples" / "autopilot" / "under-an-autopilot.yaml"
@@ -115,36 +102,6 @@ def test_the_example_finds_its_fault_under_the_small_autopilot():
         autopilot.hear(end.take(autopilot.next(), "it", 0.0))
     flight = vehicle.flight.land()
     assert flight.passed, flight
-
-
-def test_packets_inside_a_frame_see_the_truth_move():
-    vehicle = Vehicle(scenario(), pulses=True)
-    vehicle.begin(1200)
-    seen = []
-    for _ in range(12):
-        vehicle.fly([2000, 1500, 0, 1500], 1200)
-        seen.append(vehicle.instant())
-    times = [now.t_s for now in seen]
-    assert times == pytest.approx([k / 1200 for k in range(1, 13)])
-    rolling = [now.gyro[0] for now in seen]
-    assert all(later > earlier for earlier, later in pairwise(rolling[2:]))
-
-
-def test_another_rate_in_flight_is_followed_where_it_is_whole_and_counted_where_not():
-    vehicle = Vehicle(scenario(), pulses=True)
-    vehicle.begin(100)
-    for rate_hz, t_s in ((100, 0.01), (50, 0.03), (101, 0.04), (0, 0.05), (25, 0.09)):
-        vehicle.fly([0] * 16, rate_hz)
-        assert vehicle.instant().t_s == pytest.approx(t_s)
-    assert vehicle.off_rate == 2
-
-
-def test_a_rate_that_is_said_counts_whatever_the_packets_say():
-    vehicle = Vehicle(scenario(), pulses=True, rate_hz=200)
-    vehicle.begin(1200)
-    vehicle.fly([0] * 16, 1200)
-    assert vehicle.instant().t_s == pytest.approx(0.005)
-    assert vehicle.off_rate == 1
 
 
 @pytest.mark.parametrize("packets_hz", [10, 5000])
@@ -159,17 +116,6 @@ def test_a_flight_begun_anew_is_the_first_one_again():
     first = flown_by(vehicle, packets)
     second = flown_by(vehicle, packets)
     assert np.array_equal(first.to_numpy(), second.to_numpy(), equal_nan=True)
-
-
-def test_the_law_flies_until_the_autopilot_may():
-    vehicle = Vehicle(scenario(), pulses=True, hold_s=0.2)
-    vehicle.begin(100)
-    for _ in range(60):
-        vehicle.fly([2000, 1500, 0, 1500], 100)
-    log = vehicle.flight.land().log
-    own = log["t_s"] < 0.2 + 1e-9  # the command computed at 0.2 s is in force from the next frame on
-    assert (log["aileron_cmd_rad"][own] > -0.5).all()
-    assert (log["aileron_cmd_rad"][~own & (log["t_s"] < 0.58)] == -0.52).all()
 
 
 def test_the_throttle_moves_the_engine():
@@ -230,60 +176,6 @@ def test_what_the_autopilot_is_told_is_one_motion():
     assert np.array_equal(attitude, [now.true_attitude for now in seen[1:]])
 
 
-def test_every_instrument_that_is_told_is_told_with_its_own_error():
-    """Eleven of them, each with a bias of another size; what none of them measures stays true."""
-    biases = {
-        "p": 0.5, "q": -0.75, "r": 1.25, "phi": 2.0, "theta": -1.5, "psi": 3.0, "beta": 0.8, "ax": 0.11,
-        "ay": -0.13, "az": 0.17, "V": 1.7, "qdyn": 40.0, "altitude": 7.0,
-    }  # fmt: skip
-    found = []
-    for size in (0.0, 1.0):
-        faults = [
-            {"type": "bias", "sensor": name, "magnitude": size * bias, "at_s": 0.0}
-            for name, bias in biases.items()
-        ]
-        vehicle = Vehicle(scenario(faults=faults if size else faults[:0]), pulses=True)
-        vehicle.fly([0] * 16, 100)
-        found.append(vehicle.instant())
-    sound, broken = found
-    differences = {name: np.subtract(getattr(broken, name), getattr(sound, name)) for name in sound._fields}
-    degrees = {name: np.radians(biases[name]) for name in ("p", "q", "r", "phi", "theta", "psi", "beta")}
-    expected = {
-        "t_s": 0.0, "gyro": [degrees[name] for name in "pqr"], "force": [0.11, -0.13, 0.17],
-        "attitude": [degrees[name] for name in ("phi", "theta", "psi")], "airspeed_mps": 1.7,
-        "beta_rad": degrees["beta"], "qdyn_pa": 40.0, "altitude_m": 7.0, "position": [0.0] * 3,
-        "velocity": [0.0] * 3, "latitude_deg": 0.0, "longitude_deg": 0.0, "height_m": 0.0,
-        "true_attitude": [0.0] * 3,
-    }  # fmt: skip
-    assert {name: difference.tolist() for name, difference in differences.items()} == {
-        name: pytest.approx(value, abs=1e-9) for name, value in expected.items()
-    }
-
-
-@pytest.mark.parametrize(
-    ("substeps", "packets_hz", "rate_hz", "flown"),
-    [
-        (1, 20, 20, 1), (1, 400, 400, 1), (5, 100, 100, 5), (1, 401, 200.5, 2), (3, 800, 400, 4),
-        (4, 1200, 400, 6), (2, 1000, 1000 / 3, 3), (1, 4000, 400, 10), (10, 4000, 400, 10),
-        (11, 4000, 400, 20),
-    ],
-)  # fmt: skip
-def test_fast_packets_are_a_whole_part_of_a_frame_of_the_diagnosis(substeps, packets_hz, rate_hz, flown):
-    """No more than 400 Hz, and as many steps of the model as asked for, or more."""
-    given = scenario(
-        substeps=substeps,
-        **{
-            "control.law": "lqr",
-            "reference": {"p": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}]},
-        },
-    )
-    found = at_rate(given, packets_hz)
-    assert (found.rate_hz, found.substeps) == (pytest.approx(rate_hz), flown)
-    assert (found.control.law, found.control.options) == ("nominal", {})
-    assert found.reference == scenario().reference
-    assert found.faults == given.faults
-
-
 @pytest.mark.parametrize("packets_hz", [19.9, 4000.5])
 def test_rates_beyond_the_limits_are_refused(packets_hz):
     with pytest.raises(BadInput) as refused:
@@ -300,16 +192,6 @@ def test_a_broken_gyro_breaks_what_the_autopilot_is_told():
         vehicle.fly([0] * 16, 100)
         told[name] = vehicle.instant().gyro
     assert np.subtract(told["broken"], told["sound"]) == pytest.approx([0, np.radians(3), 0], abs=1e-12)
-
-
-def test_what_only_our_law_can_be_asked_for_is_left_out():
-    base = bf.load("elevator-partial-loss")
-    left, said = without_reference(base)
-    assert said == ["expect.post_fault_rms_deg_s is left out: the reference is the autopilot's own"]
-    assert left.expect.post_fault_rms_deg_s is None
-    assert left.expect.isolated_as == "elevator"
-    with pytest.raises(BadInput, match="changes: there are none under an autopilot, allowed: faults"):
-        without_reference(base.with_({"changes": [{"at_s": 5, "law": "lqr"}]}))
 
 
 def test_quaternions_and_the_standard_air():

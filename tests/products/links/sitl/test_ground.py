@@ -1,7 +1,5 @@
 """From the ground and back: at rest on the wheels, a circuit under the small autopilot, what is refused."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from tools.autopilots import peers
@@ -12,14 +10,12 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.ground import lay
-from beaver_ftc_links.sitl import vehicle as vehicle_module
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Mavlink
 from beaver_ftc_links.sitl.px4 import Px4, rotation
 from beaver_ftc_links.sitl.telling import Teller
 from beaver_ftc_links.sitl.vehicle import Flown, Vehicle
-from trainer import trainer
 
 NOTHING = [0] * 16
 G_MPS2 = 9.806  # at 45 N, as JSBSim's Earth has it
@@ -142,29 +138,6 @@ def test_the_small_autopilot_takes_off_climbs_turns_and_lands(over):
     assert not sim._diagnoses
 
 
-def test_what_breaks_on_the_ground_is_found_in_the_air():
-    fault = {"type": "loss_of_effectiveness", "actuator": "aileron", "magnitude": 0.3, "at_s": 2.0}
-    vehicle = Vehicle(scenario(faults=[fault]), pulses=True, rate_hz=50)
-    pilot = Circuit()
-    flown_by_ardupilot(vehicle, pilot.outputs, 50, lambda flown: pilot.phase == "turn")
-    document, up_s = vehicle.flight.land().metrics, vehicle.flight.listens_from_s
-    assert up_s > 20.0
-    assert document["detection"]["time_s"] > up_s
-    assert document["isolation"]["fault"] == "aileron"
-
-
-def test_in_declared_turbulence_the_diagnosis_begins_above_2000_ft():
-    """As its declaration is meant; until then it does not listen, and no other wheel or gust wakes it."""
-    air = {"environment": {"turbulence": "dryden", "severity": "light"}, "fdi.bounds.turbulence": "light"}
-    sim = Flown(scenario(300.0, **air), ground_m=300.0)
-    assert not any("turbulence" in warning for warning in scenario(300.0, **air).warnings())
-    heights = {300.0: False, 900.0: False, 920.0: True, 905.0: False, 911.0: False}
-    for height_m, listens in heights.items():
-        sim._frame["truth"]["value"][[5, 12]] = 40.0, height_m
-        sim._start_or_stop_diagnosis()
-        assert sim._diagnoses == listens, height_m
-
-
 def test_what_cannot_begin_on_the_ground():
     base = scenario()
     with pytest.raises(
@@ -184,47 +157,3 @@ def test_what_cannot_begin_on_the_ground():
         BadInput, match=r"altitude_m: 300 is at or below the ground at 299, allowed: above 305\.65,"
     ):
         Vehicle(low, pulses=True, ground_m=299.0)
-
-
-def test_an_aircraft_that_knows_no_ground_does_not_stand():
-    from beaver_ftc.scenario.airframe import checked_against, given_initial
-
-    with checked_against(trainer()), pytest.raises(ValueError, match="contradictory") as error:
-        given_initial({"on_ground": True})
-    (problem,) = error.value.errors()
-    says = "trainer's file has no `ground` to stand on, allowed: false"
-    assert problem["ctx"]["conflicts"] == [(("on_ground",), says)]
-
-
-def test_a_diagnosis_that_begins_again_is_said_to_run_since_it_first_did(monkeypatch):
-    taken = []
-    monkeypatch.setattr(vehicle_module, "take_diagnosis", lambda *given: taken.append(given))
-    flown = SimpleNamespace(_fresh=["fresh"], _frame="frame", _diagnoses=False, listens_from_s=None)
-    for flown._now_s, flown._next in (3.0, 300), (9.0, 900):
-        Flown._begin_diagnosis(flown)
-    assert (flown.listens_from_s, flown._diagnoses) == (3.0, True)
-    assert taken == [("frame", "fresh", 300), ("frame", "fresh", 900)]
-
-
-@pytest.mark.parametrize(
-    ("diagnoses", "height_m", "airspeed_mps", "alarmed", "becomes"),
-    [
-        (True, 1.99, 30.0, False, False), (True, 2.0, 30.0, False, True), (True, 2.0, 5.0, True, True),
-        (False, 5.0, 30.0, False, False), (False, 5.01, 30.0, False, True),
-        (False, 5.01, 20.0, False, False), (False, 5.01, 30.0, True, False),
-    ],
-)  # fmt: skip
-def test_a_diagnosis_ends_two_metres_up_and_begins_again_at_five(
-    monkeypatch, diagnoses, height_m, airspeed_mps, alarmed, becomes
-):
-    """Of wheels 1.5 m below what is measured, flying faster than the slowest that the envelope has."""
-    now = SimpleNamespace(height_m=height_m + 1.5, airspeed_mps=airspeed_mps)
-    monkeypatch.setattr(vehicle_module, "FrameReadout", lambda frame: now)
-    made = SimpleNamespace(
-        _frame=None, _standing_m=1.5, _lowest_m=2.0, _slowest_mps=20.0, _diagnoses=diagnoses,
-        alarmed=alarmed,
-    )  # fmt: skip
-    made._stop_diagnosis = lambda: setattr(made, "_diagnoses", False)
-    made._begin_diagnosis = lambda: setattr(made, "_diagnoses", True)
-    Flown._start_or_stop_diagnosis(made)
-    assert made._diagnoses is becomes

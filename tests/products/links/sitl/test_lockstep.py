@@ -10,7 +10,7 @@ from tools.autopilots import peers, trial
 from tools.autopilots.reader import read
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_links.sitl.ardupilot import Ardupilot, Packet
+from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Mavlink
 from beaver_ftc_links.sitl.px4 import Px4, gps, quaternion, sensor, state
@@ -160,30 +160,6 @@ def test_each_message_comes_at_its_rate_and_what_is_waited_for_last(px4):
     assert first == {113: [25, 50], 115: [*range(5, 61, 5)]}
 
 
-def test_time_passes_while_it_starts_and_our_law_flies_until_it_is_armed(px4):
-    px4.autopilot._silent, px4.autopilot._armed_after = 3, 2
-    told = px4.autopilot.hear(px4.end.connect(0.0))
-    for k in range(1, 4):
-        assert told == b""
-        assert px4.end.tick(0.004 * k - 0.001, 0.004) == b""
-        told = px4.autopilot.hear(px4.end.tick(0.004 * k, 0.004))
-    for k in range(4):
-        told = px4.autopilot.hear(px4.end.take(told, 0.1 + 0.004 * k))
-    assert [in_charge for _, _, in_charge in px4.body.given] == [False] * 5 + [True] * 2
-    assert px4.counts["frames"] == 4
-
-
-def test_once_it_answers_the_flight_waits_and_says_its_last_again(px4):
-    first = px4.end.connect(0.0)
-    sent = px4.end.take(px4.autopilot.hear(first), 0.0)
-    assert px4.end.tick(0.5, 0.004) == b""
-    again = px4.end.tick(1.2, 0.004)
-    assert again
-    assert sent.endswith(again)
-    assert px4.end.tick(1.5, 0.004) == b""
-    assert px4.body.frames == 1
-
-
 def test_a_new_connection_is_a_new_flight(px4):
     answer = px4.autopilot.hear(px4.end.connect(0.0))
     px4.end.take(answer, 0.0)
@@ -191,13 +167,6 @@ def test_a_new_connection_is_a_new_flight(px4):
     autopilot.hear(px4.end.connect(5.0))
     assert (px4.body.begun, px4.counts["resets"], autopilot.stamps) == (1, 1, [1_000_000])
     assert not px4.end.armed
-
-
-def test_what_a_command_has_done_is_acknowledged(px4):
-    px4.end.connect(0.0)
-    px4.autopilot.hear(px4.end.take(px4.autopilot.inject(102, 2, 2), 0.0))
-    assert px4.autopilot.acks == [(420, 0)]
-    assert px4.end.done == ["done"]
 
 
 @settings(max_examples=samples(8), deadline=None)
@@ -208,14 +177,6 @@ def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):
     found = getattr(trial, protocol)(Stub(), 600, seed, a_flight=120)
     assert (found.frames, found.twice, found.lost) == (600, 0, 0)
     assert len(found.meant) > 3
-
-
-def test_the_bad_line_would_notice():
-    """A body that is shown frames twice, or not at all."""
-    found = trial.Found(meant=[[0, 1, 2]], flown=[[0, 1, 1, 2]])
-    assert (found.twice, found.lost > 0) == (1, True)
-    assert trial.Found(meant=[[0, 1, 2]], flown=[[0, 2]]).lost > 0
-    assert trial.Found(meant=[[0, 1]], flown=[[0, 1]]).lost == 0
 
 
 ALOFT = Instant(
@@ -285,66 +246,3 @@ def test_what_a_field_cannot_hold_is_its_largest():
     assert (found.xacc, found.yacc, found.zacc, found.ind_airspeed) == (32767, -32768, 0, 0)
     (fix,) = line.unpack(line.pack(gps(line.messages, beyond, 1)))
     assert (fix.cog, fix.vel, fix.vn, fix.ve) == (0, 1000, 1000, 0)
-
-
-def answered(stamp_us, armed=True):
-    """What the autopilot says to the instant with this stamp."""
-    from pymavlink.dialects.v20 import common
-
-    message = common.MAVLink_hil_actuator_controls_message(stamp_us, [0.5] * 16, 128 * armed, 0)
-    return message.pack(common.MAVLink(None))
-
-
-def test_an_answer_that_comes_later_is_late_and_noise_is_counted(px4):
-    """At 250 Hz the stamps are 4 ms apart; of the frame just before it is one sent again."""
-    px4.end.connect(0.0)
-    for frame in range(3):
-        assert px4.end.take(answered(1_000_000 + 4000 * frame, armed=frame == 1), 0.0)
-    assert [in_charge for *_, in_charge in px4.body.given] == [False, True, True]  # armed once, for good
-    for frame in (2, 1, 0, 4):
-        assert px4.end.take(answered(1_000_000 + 4000 * frame), 0.0) == b""
-    found = {name: px4.counts[name] for name in ("frames", "repeated", "late", "malformed")}
-    assert found == {"frames": 3, "repeated": 1, "late": 3, "malformed": 0}
-    for _ in range(2):
-        noisy = answered(1_000_000 + 4000 * (3 + _))
-        assert px4.end.take(b"noise" + noisy, 0.0)
-    assert px4.counts["malformed"] == px4.end._mav.malformed > 1
-    px4.body.over = True
-    assert px4.end.take(answered(1_000_000 + 4000 * 5), 0.0) == b""
-    assert px4.counts["frames"] == 5
-
-
-def test_while_it_starts_a_frame_passes_with_each_step_and_none_after_the_end(px4):
-    px4.end.connect(10.0)
-    assert px4.end.tick(10.019, 0.02) == b""
-    assert px4.end.tick(10.021, 0.02)
-    assert px4.end.tick(10.04, 0.02) == b""
-    assert px4.body.given == [((), 250.0, False)]
-    px4.body.over = True
-    assert px4.end.tick(11.0, 0.02) == b""
-    px4.body.over = False
-    px4.end.take(answered(1_004_000), 11.0)
-    assert px4.end.tick(11.99, 0.02) == b""
-    assert list(kinds_of(px4.end.tick(12.0, 0.02))) == [107]
-
-
-@pytest.mark.parametrize(("last", "again", "number", "peer", "anew"), [
-    (-1, -1, 7, "a", True), (5, -1, 6, "b", True), (5, -1, 6, "a", False), (64, -1, 1, "a", False),
-    (65, -1, 1, "a", True), (65, -1, 0, "a", True), (65, -1, 2, "a", False), (65, 2, 2, "a", True),
-    (65, 65, 65, "a", False), (65, 3, 2, "a", False), (0, -1, 0, "a", False),
-])  # fmt: skip
-def test_when_a_count_begins_anew(last, again, number, peer, anew):
-    endpoint = Ardupilot(None, Link())
-    endpoint._last, endpoint._again, endpoint._peer = last, again, "a"
-    assert endpoint._is_restart(Packet(400, number, ()), peer) is anew
-
-
-@pytest.mark.parametrize(("of", "number", "now_s", "may"), [
-    (None, 9, 0.0, True), ("a", 1, 3.01, True), ("a", 0, 3.01, True), ("a", 2, 9.0, False),
-    ("a", 1, 3.0, False),
-])  # fmt: skip
-def test_another_may_fly_after_more_than_a_second_of_silence(of, number, now_s, may):
-    endpoint = Ardupilot(None, Link())
-    endpoint._peer = of
-    endpoint._link.hear(2.0)
-    assert endpoint._may_take_over(Packet(400, number, ()), now_s) is may

@@ -85,23 +85,6 @@ def test_a_reversed_throttle_is_closed_by_a_long_pulse():
     assert settings == [high, low]
 
 
-@pytest.mark.parametrize(
-    ("throttle", "count", "refused"), [(3, 3, ""), (3, 2, "3"), (7, 6, "7"), (None, 2, ""), (None, 1, "2")]
-)
-def test_packets_hold_every_output_that_the_file_names(throttle, count, refused):
-    """The throttle's too, which no surface uses."""
-    channels = {name: of for name, of in ELEVONS.items() if name == "surfaces" or throttle}
-    aircraft = trainer(channels=channels | ({"throttle": {"channel": throttle}} if throttle else {}))
-    found = Outputs(aircraft, np.zeros((3, aircraft.n)), *_flat(aircraft), pulses=False)
-    if refused:
-        with pytest.raises(
-            BadInput, match=f"channels: {refused} is asked for, allowed: 1 to {count} of these"
-        ):
-            found.check(count)
-    else:
-        found.check(count)
-
-
 @given(
     pulse=st.floats(501, 2499), trim=st.floats(1001, 1999), low=st.floats(900, 1000), reverse=st.booleans()
 )

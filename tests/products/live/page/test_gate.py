@@ -1,7 +1,6 @@
 """Who is let in, and what each may ask."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -11,35 +10,7 @@ from starlette.datastructures import Headers
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
-from beaver_ftc_live.page.gate import BURST, MESSAGES_PER_S, TOKENS_OPEN, Gate, Seat, as_name
-from beaver_ftc_live.page.server import Pages
-
-
-def token_of(address):
-    return address.rpartition("=")[2]
-
-
-def test_a_token_works_once():
-    gate = Gate(8000)
-    token = token_of(gate.link(gate.flyer))
-    session = gate.flyer.redeem(token)
-    assert gate.flyer.knows(session)
-    assert gate.flyer.redeem(token) is None
-    assert [gate.flyer.was_used(token) for _ in range(3)] == [True, False, False]  # said once
-
-
-def test_a_guests_token_works_again_and_for_that_guest_alone():
-    gate = Gate(8000, guests=3)
-    links = [gate.link(seat) for seat in gate.guests]
-    tokens = [token_of(link) for link in links]
-    for seat, token in zip(gate.guests, tokens, strict=True):
-        first, again = seat.redeem(token), seat.redeem(token)
-        assert first == again
-        for other in (gate.flyer, *gate.guests):
-            assert other.knows(first) == (other is seat)
-            assert (other.redeem(token) is not None) == (other is seat)
-    assert len({*tokens, *links}) == 6
-    assert len({gate.flyer.room, *(seat.room for seat in gate.guests)}) == 4
+from beaver_ftc_live.page.gate import BURST, MESSAGES_PER_S, Gate, Seat
 
 
 @pytest.mark.parametrize("wrong", ["", "x", "é", "a" * 10_000])
@@ -51,29 +22,6 @@ def test_nothing_else_opens(wrong, guests):
         assert seat.redeem(wrong) is None
         assert not seat.knows(wrong)
         assert not seat.knows(None)
-
-
-def test_two_servers_share_nothing():
-    one, other = Gate(8000).flyer, Gate(8001).flyer
-    assert one.room != other.room
-    assert not other.knows(one.redeem(one.token()))
-
-
-def test_old_invitations_lapse():
-    seat = Seat()
-    first = seat.token()
-    for _ in range(TOKENS_OPEN):
-        seat.token()
-    assert seat.redeem(first) is None
-
-
-def test_a_path_is_of_one_seat():
-    gate = Gate(8000, guests=2)
-    for seat in (gate.flyer, *gate.guests):
-        assert all(gate.seat_of(seat.room + rest) is seat for rest in ("", "/", "/socket", "/static/a/b"))
-    one = gate.guests[0].room
-    for path in ("", "/", "//", "/x", one[:-1], one + "x", "/" + one, f"/x{one}/", f"/static{one}"):
-        assert gate.seat_of(path) is None
 
 
 def may(seat, do):
@@ -100,27 +48,6 @@ def test_who_may_ask_what():
     assert [may(one, "break"), may(two, "break")] == [True, False]
 
 
-def test_guests_that_are_not_there_are_not_invited():
-    gate = Gate(8000, guests=2)
-    for number in (3, 0, -1):
-        with pytest.raises(BadInput, match=f"^guest: {number} is not there, allowed: 1 to 2$"):
-            gate.invite(number, on=True)
-    with pytest.raises(BadInput, match="allowed: 1 to 0"):
-        Gate(8000).invite(None, on=True)
-    assert not any(seat.is_invited for seat in gate.guests)
-
-
-def test_what_inviting_says():
-    gate = Gate(8000, guests=2)
-    gate.guests[1].name = "Ada"
-    said = [gate.invite(guest, on) for guest in (1, 2, None) for on in (True, False)]
-    assert said[:2] == ["guest 1 may break", "guest 1 may only look on"]
-    assert said[2:] == [
-        "Ada (guest 2) may break", "Ada (guest 2) may only look on", "all guests may break",
-        "all guests may only look on",
-    ]  # fmt: skip
-
-
 @given(st.lists(st.floats(0, 30), min_size=1, max_size=200))
 def test_a_guest_cannot_keep_the_flight_busy(times_s):
     """Whenever it asks: in any time t no more than a burst and the pace times t are let through."""
@@ -135,24 +62,6 @@ def test_a_guest_cannot_keep_the_flight_busy(times_s):
     for i, first in enumerate(let):
         for j in range(i, len(let)):
             assert j - i + 1 <= BURST + MESSAGES_PER_S * (let[j] - first) + 1e-6
-
-
-def test_whoever_flies_is_not_held_up():
-    seat = Seat()
-    for _ in range(1000):
-        seat.check_pace(0.0)
-    assert not seat.number
-
-
-@pytest.mark.parametrize(
-    ("address", "name"),
-    [
-        ("192.0.2.7", "192.0.2.7"), ("2001:DB8:0:0::7", "[2001:db8::7]"), ("::1", "[::1]"),
-        ("::ffff:192.0.2.7", "192.0.2.7"),
-    ],
-)  # fmt: skip
-def test_an_address_as_browsers_say_it(address, name):
-    assert as_name(address) == name
 
 
 @pytest.mark.parametrize(
@@ -179,13 +88,6 @@ def test_it_is_called_by_the_address_it_was_given(names, any_own, host, own):
     assert not gate.is_own_page(Headers({"host": host, "origin": "http://evil.example"}), "192.0.2.9")
 
 
-def test_browsers_leave_the_port_of_http_out():
-    gate = Gate(80, ("192.0.2.7",))
-    assert gate.link(gate.flyer).startswith(f"http://192.0.2.7{gate.flyer.room}/")
-    assert gate.is_own_page(Headers({"host": "192.0.2.7", "origin": "http://192.0.2.7"}))
-    assert not gate.is_own_page(Headers({"host": "192.0.2.7", "origin": "http://192.0.2.7:8000"}))
-
-
 @pytest.mark.parametrize(
     ("host", "origin", "own"),
     [
@@ -202,32 +104,3 @@ def test_browsers_leave_the_port_of_http_out():
 def test_only_its_own_page_by_its_own_name(host, origin, own):
     headers = {"host": host} | ({"origin": origin} if origin else {})
     assert Gate(8000).is_own_page(Headers(headers)) is own
-
-
-def test_the_pilot_is_told_of_the_class_and_a_guest_of_its_own_rights():
-    def seat(number):
-        return SimpleNamespace(number=number, pages=0, shown=lambda: {"rights": number})
-
-    pages = Pages()
-    told = [pages.add(None, seat(number)) for number in (0, 3, 5)]
-    pages.tell_class(SimpleNamespace(guests=[], roster=lambda: {"class": "none"}))
-    pages.tell_class(SimpleNamespace(guests=[3, 5], roster=lambda: {"class": 2}))
-    assert [[json.loads(one) for one in page._waiting] for page in told] == [
-        [{"class": 2}], [{"rights": 3}], [{"rights": 5}],
-    ]  # fmt: skip
-
-
-def test_one_page_is_told_by_its_number_and_all_by_0_and_who_is_called_what():
-    pages, asked = Pages(), []
-    seats = [SimpleNamespace(number=number, pages=0, label=f"seat {number}") for number in (0, 4)]
-    told = [pages.add(None, seats[k]) for k in (0, 1, 1)]
-    assert [seat.pages for seat in seats] == [1, 2]
-    pages.tell(told[1].number, b"a")
-    pages.tell(0, b"b")
-    assert [list(page._waiting) for page in told] == [[b"b"], [b"a", b"b"], [b"b"]]
-    for seat in seats:
-        pages.call(seat, lambda *said: asked.append(said))
-    assert asked == [(0, f"called {page.number} seat 4") for page in told[1:]]
-    for _ in range(2):  # gone once, however often it is said
-        pages.remove(told[2])
-    assert ([seat.pages for seat in seats], len(pages)) == ([1, 1], 2)

@@ -8,7 +8,6 @@ import urllib.request
 
 import pytest
 from live_cockpit import browser, ended, own_address, started
-from live_site import EVERYTHING
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -53,91 +52,6 @@ def until(link, *kinds, having=lambda told: True, timeout_s=600.0):
         if told["k"] in kinds and having(told):
             return told
     raise AssertionError(f"no {kinds}")
-
-
-def ask(link, n=1, **request):
-    link.send(json.dumps({"n": n, **request}))
-    return until(link, "ack", having=lambda told: told["n"] == n)
-
-
-LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
-
-
-def test_a_class_breaks_what_it_is_let_and_the_record_says_who(cockpit):
-    one = Seat(cockpit.links[0])
-    with cockpit.seat.open() as flyer, one.open() as guest:
-        assert until(guest, "you") == {"k": "you", "number": 1, "name": "", "is_invited": False}
-        for do, more in EVERYTHING.items():
-            assert ask(guest, do=do, **more)["ok"] == (do == "name")
-        hidden = "</script><i onload=x>"
-        assert ask(guest, do="name", name=hidden)["says"] == f"you are {hidden} (guest 1)"
-        roster = until(flyer, "class", having=lambda told: told["guests"][0]["name"] == hidden)
-        assert [seat["pages"] for seat in roster["guests"]] == [1, 0, 0, 0]
-        assert until(flyer, "s")["broken"] == []
-        assert ask(flyer, do="let", guest=1, on=True)["ok"]
-        assert until(guest, "you", having=lambda told: told["is_invited"])
-        assert ask(guest, do="break", fault=LOSS)["ok"]
-        (fault,) = until(flyer, "s", having=lambda told: told["broken"])["faults"]
-        assert fault == {**LOSS, "profile": "abrupt", "by": f"{hidden} (guest 1)"}
-        assert ask(flyer, do="break", fault={"type": "stuck", "actuator": "rudder"})["ok"]
-        told = until(flyer, "e", having=lambda told: told["events"][0]["kind"] == "broken")["events"][0]
-        assert "by" not in told
-        assert ask(flyer, do="let", on=False)["ok"]
-        for do in ("break", "repair", "blow"):
-            assert not ask(guest, do=do, **EVERYTHING[do])["ok"]
-        assert ask(flyer, do="save")["ok"]
-        saved = until(guest, "e", having=lambda told: told["events"][-1]["kind"] == "saved")
-        assert "/" not in saved["events"][-1]["says"]  # no folder of whoever flies
-        drawn = until(guest, "e", having=lambda told: told["events"][-1]["says"].endswith("report.html"))
-        assert drawn["events"][-1]["says"] == f"{saved['events'][-1]['says']}/report.html"
-        assert ask(flyer, do="fresh")["ok"]
-    (folder,) = cockpit.out.iterdir()
-    by = {
-        fault["actuator"]: fault.get("by")
-        for fault in json.loads((folder / "metrics.json").read_text())["faults"]
-    }
-    assert by == {"elevator": f"{hidden} (guest 1)", "rudder": None}
-    report = (folder / "report.html").read_text()
-    assert hidden not in report
-    assert "</script><i" not in report
-    secrets = [cockpit.seat.cookie, one.cookie, *(part for link in (cockpit.address, *cockpit.links)
-               for part in (link.rpartition("=")[2], link.split("/")[3]))]  # fmt: skip
-    for path in cockpit.out.rglob("*"):
-        kept = path.read_bytes() if path.is_file() else b""
-        assert not [each for each in secrets if each.partition("=")[2].encode() in kept and "=" in each]
-        assert not [each for each in secrets if each.encode() in kept]
-
-
-def test_a_guest_comes_back_by_the_same_link_and_is_the_same_guest(cockpit):
-    first, again = Seat(cockpit.links[1]), Seat(cockpit.links[1])
-    assert first.cookie == again.cookie
-    with cockpit.seat.open() as flyer:
-        with first.open() as guest:
-            ask(guest, do="name", name="Ada")
-            with again.open() as other:  # a second browser by the same link is the same guest
-                assert until(other, "you", having=lambda told: told["name"] == "Ada")["number"] == 2
-                two = until(flyer, "class", having=lambda told: told["guests"][1]["pages"] == 2)
-                assert two["guests"][1]["name"] == "Ada"
-                ask(flyer, do="let", guest=2, on=True)
-                assert ask(other, do="repair")["ok"]
-        assert until(flyer, "class", having=lambda told: told["guests"][1]["pages"] == 0)
-        with first.open() as guest:
-            told = until(guest, "you")
-            assert (told["name"], told["is_invited"]) == ("Ada", True)
-    with cockpit.seat.open() as flyer:  # the page of whoever flies, closed and opened again
-        roster = until(flyer, "class")["guests"]
-        assert (roster[1]["name"], roster[1]["is_invited"]) == ("Ada", True)
-        ask(flyer, do="let", on=False)
-
-
-def test_a_browser_that_was_closed_is_given_a_new_address_in_the_terminal(cockpit):
-    with pytest.raises(urllib.error.HTTPError, match="403"):
-        browser()[0].open(cockpit.address)
-    for line in iter(cockpit.process.stdout.readline, ""):
-        if line.startswith("live: http"):
-            break
-    with Seat(line.split()[1]).open() as flyer:
-        assert until(flyer, "class")
 
 
 def test_a_guest_who_takes_nothing_holds_nobody_up(cockpit):
@@ -232,15 +146,6 @@ def test_an_address_that_cannot_be_had_is_said_in_a_line(host, says):
 
 
 @pytest.mark.parametrize(
-    ("host", "alone"),
-    [("127.0.0.1", True), ("::1", True), ("localhost", True), ("127.3.2.1", True), ("0.0.0.0", False),
-     ("::", False), ("192.0.2.77", False)],
-)  # fmt: skip
-def test_which_addresses_are_this_machines_alone(host, alone):
-    assert serve.is_loopback(host) is alone
-
-
-@pytest.mark.parametrize(
     ("host", "names"),
     [
         ("127.0.0.1", ("127.0.0.1", "localhost")), ("127.3.2.1", ("127.3.2.1", "localhost")),
@@ -269,9 +174,3 @@ def test_a_port_in_use_is_said_whatever_the_address(host):
         says = f"^--port: {port} cannot be had .Address already in use., allowed: another, 0 for any$"
         with pytest.raises(BadInput, match=says), serve._listening(Place(port, host)):
             pytest.fail("two servers have one port")
-
-
-def test_a_machine_without_a_way_to_others_is_told_to_name_its_address(monkeypatch):
-    monkeypatch.setattr(serve, "NO_SENSOR", ((socket.AF_INET, "255.255.255.255"),))
-    with pytest.raises(BadInput, match="allowed: the address that they know it by"):
-        serve._outward()

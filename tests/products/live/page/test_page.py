@@ -2,15 +2,10 @@
 
 import functools
 import http.server
-import os
 import threading
-from pathlib import Path
 
-import numpy as np
 import pytest
 from live_browser import CHROMIUM, COMPILED_WITHIN_S, shows, until
-
-import beaver_ftc as bf
 
 SCREENS = {
     "laptop": (1280, 720),
@@ -69,19 +64,6 @@ def test_the_aircraft_moves_and_is_drawn(page):
     assert len(picture) > 5000  # a picture of one colour is a tenth of it
 
 
-def test_frames_are_drawn_as_the_screen_asks(page):
-    """Each time it asks, however often that is here; half of that passes."""
-    page.wait_for_timeout(1000)
-    asked, drawn = page.evaluate("""() => new Promise((done) => {
-        const before = cockpit.drawn.frames;
-        let asked = 0;
-        const count = () => ++asked < 60
-            ? requestAnimationFrame(count) : done([asked, cockpit.drawn.frames - before]);
-        requestAnimationFrame(count);
-    })""")
-    assert drawn > asked / 2
-
-
 def test_a_broken_surface_is_detected_named_and_repaired(page):
     break_elevator(page)
     assert shows(page, "#verdict", "elevator")
@@ -93,23 +75,6 @@ def test_a_broken_surface_is_detected_named_and_repaired(page):
         assert shows(page, "#events", word)
     page.keyboard.press("0")
     until(page, "cockpit.flight.frame.effectiveness.every((x) => x === 1)")
-
-
-def test_what_is_saved_flies_again_to_the_bit(page, cockpit):
-    break_elevator(page)
-    page.keyboard.down("d")
-    page.wait_for_timeout(400)
-    page.keyboard.up("d")
-    until(page, "cockpit.flight.frame.stick === null && cockpit.value('t_s') > 2")
-    page.locator("#save").click()
-    until(page, "document.querySelector('#says').textContent.startsWith('saved')")
-    folder = max(cockpit.out.iterdir())
-    kept = bf.open_run(folder).log
-    again = bf.fly(folder / "scenario.yaml").log
-    assert np.array_equal(kept.to_numpy(), again.to_numpy(), equal_nan=True)
-    own = bf.fly("fault-free").log["p_reference_rad_s"][: len(kept)]
-    assert (kept["p_reference_rad_s"] - own).abs().max() > np.radians(4.9)  # the stick has moved
-    assert kept["elevator_effective_rad"].ne(kept["elevator_cmd_rad"]).any()
 
 
 def test_the_game_tells_nothing_before_the_answer(page):
@@ -146,21 +111,6 @@ def test_the_autopilot_is_sent_to_an_altitude(page):
     until(page, "cockpit.flight.hello.autopilot.length === 0")
 
 
-def test_speed_and_pause(page):
-    page.locator("#speed").select_option("20")
-    start = page.evaluate("cockpit.value('t_s')")
-    until(page, f"cockpit.value('t_s') > {start + 10}")
-    page.locator("#pause").click()
-    until(page, "cockpit.flight.state.paused")
-    page.wait_for_timeout(300)
-    held = page.evaluate("cockpit.value('t_s')")
-    page.wait_for_timeout(500)
-    assert page.evaluate("cockpit.value('t_s')") == held
-    page.locator("#pause").click()
-    page.locator("#speed").select_option("1")
-    until(page, f"cockpit.value('t_s') > {held}")
-
-
 def test_with_the_keyboard_alone(page):
     page.locator("#tab-break").focus()
     page.keyboard.press("ArrowRight")
@@ -175,117 +125,6 @@ def test_with_the_keyboard_alone(page):
     assert page.locator("#help-text").is_visible()
     page.keyboard.press("Escape")
     assert not page.locator("#help-text").is_visible()
-
-
-def test_a_gamepads_stick_steers(page):
-    """A faked one: full stick is 5 deg/s, nearly centred is centred; unplugged, it asks for nothing."""
-    page.evaluate(
-        """window.pads = [null, {connected: true, axes: [0.5, -1, 0.05]}];
-        Object.defineProperty(navigator, "getGamepads", {value: () => window.pads})"""
-    )
-    until(page, "cockpit.flight.frame.stick !== null")
-    rates = page.evaluate("cockpit.flight.frame.stick")
-    assert np.degrees(rates) == pytest.approx([2.5, -5.0, 0.0])
-    page.locator("#tab-fly").click()
-    assert shows(page, "#stick-says", "roll 2.5, pitch -5, yaw 0")
-    until(page, "cockpit.value('p_reference_rad_s') !== null")
-    page.evaluate("window.pads = []")
-    until(page, "cockpit.flight.frame.stick === null")
-
-
-def test_law_and_diagnosis_are_changed_at_once(page):
-    break_elevator(page)
-    assert shows(page, "#verdict", "elevator")
-    page.locator("#tab-flight").click()
-    page.locator("[name=law]").select_option("lqr")
-    page.locator("[name=scheme]").select_option("none")
-    page.locator("#change").click()
-    until(page, "cockpit.flight.state.flying.law === 'lqr' && !cockpit.flight.frame.detected")
-    assert shows(page, "#flying", "law lqr, diagnosis none")
-    assert shows(page, "#alarm", "no diagnosis ran: fdi.scheme is none")
-    page.locator("[name=scheme]").select_option("adaptive-estimators")
-    page.locator("#change").click()
-    assert shows(page, "#alarm", "ALARM")
-    assert shows(page, "#candidates", "elevator")  # named it is not: it was broken when the watch began
-    before = page.evaluate("cockpit.flight.state.flying")
-    page.locator("#renew").click()
-    until(page, "document.querySelectorAll('#events b').length >= 9")
-    until(page, "document.querySelector('#alarm').textContent.startsWith('ALARM')")
-    assert page.evaluate("cockpit.flight.state.flying") == before
-
-
-def test_a_sensor_is_broken_and_named(page):
-    page.locator("#sensor").select_option("q")
-    page.locator("#sensor-break").click()
-    assert shows(page, "#verdict", "sensor q")
-    assert shows(page, "#alarm", "ALARM")
-    assert shows(page, "#sensors legend", "✕ q")
-    page.locator("#sensor-repair").click()
-    until(page, "cockpit.flight.state.broken.length === 0")
-
-
-def test_a_minute_of_flight_drops_no_frame(page, cockpit):
-    """Of the flight: its log has every frame; what the page is shown comes in order."""
-    page.evaluate(
-        """window.seen = []; window.watch = setInterval(() => {
-        const t = cockpit.value("t_s"); if (t !== window.seen.at(-1)) window.seen.push(t); }, 1)"""
-    )
-    page.locator("#speed").select_option("5")
-    until(page, "cockpit.value('t_s') > 61")
-    seen = np.array(page.evaluate("(clearInterval(window.watch), window.seen)"))
-    page.locator("#speed").select_option("1")
-    page.locator("#save").click()
-    until(page, "document.querySelector('#says').textContent.startsWith('saved')")
-    t_s = bf.open_run(max(cockpit.out.iterdir())).log["t_s"].to_numpy()
-    assert np.array_equal(np.round(100 * t_s), np.arange(t_s.size))
-    assert t_s[-1] > 61
-    assert (np.diff(seen) > 0).all()
-    assert np.isin(np.round(100 * seen), np.arange(t_s.size)).all()
-
-
-def test_what_is_broken_is_said_without_colour(page):
-    assert page.inner_text("#legend") == "click a surface to break it"
-    break_elevator(page)
-    until(page, "document.querySelector('#legend').textContent === '✕ broken: elevator'")
-    assert shows(page, "fieldset[data-surface=elevator] legend", "broken")
-    assert "broken" not in page.inner_text("fieldset[data-surface=rudder] legend")
-
-
-def test_a_fault_of_the_scenario_is_shown_while_it_is_there(page):
-    """It comes at 12 s: badge, frame and button say nothing before, and nothing once all is repaired."""
-    pressed = page.locator("#surfaces [aria-pressed=true]")
-    page.locator("#tab-flight").click()
-    met = page.evaluate("cockpit.flight.met")
-    page.locator("[name=scenario]").select_option("rudder-stuck")
-    page.locator("#fresh [type=submit]").click()
-    until(page, f"cockpit.flight.met > {met} && cockpit.value('t_s') > 0.5")
-    assert page.inner_text("#legend") == "click a surface to break it"
-    assert page.locator("fieldset.broken").count() == pressed.count() == 0
-    page.locator("#speed").select_option("20")
-    until(page, "cockpit.flight.state.broken.includes('rudder')")
-    page.locator("#speed").select_option("1")
-    assert page.evaluate("cockpit.value('t_s')") >= 12
-    until(page, "document.querySelector('#legend').textContent === '✕ broken: rudder'")
-    page.locator("#tab-break").click()
-    assert shows(page, "fieldset.broken legend", "broken: stuck")
-    assert [button.get_attribute("aria-label") for button in pressed.all()] == ["rudder: jam"]
-    assert page.evaluate("cockpit.flight.frame.effectiveness") == [1, 1, 0, 1]
-    page.locator("#repair-all").click()
-    until(page, "document.querySelector('#legend').textContent === 'click a surface to break it'")
-    assert page.locator("fieldset.broken").count() == pressed.count() == 0
-    met = page.evaluate("cockpit.flight.met")
-    page.locator("#tab-flight").click()
-    page.locator("[name=scenario]").select_option("fault-free")
-    page.locator("#fresh [type=submit]").click()
-    until(page, f"cockpit.flight.met > {met} && cockpit.flight.hello.scenario === 'fault-free'")
-
-
-def test_the_page_says_which_faults_the_diagnosis_knows(page):
-    until(page, "document.querySelector('#knows').textContent === 'knows every fault type'")
-    watched(page)
-    page.locator("fieldset[data-surface=elevator] >> text=jam").click()
-    until(page, "/^Named: elevator, /.test(document.querySelector('#verdict').textContent)")
-    assert shows(page, "#verdict", "stuck")
 
 
 def test_everything_that_can_be_pressed_has_a_name(page):
@@ -327,28 +166,6 @@ def test_nothing_is_cut_off(page, screen):
         box = page.locator(name).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= width + 1
-
-
-def resident_bytes(pid):
-    """Memory of a process and of those it started."""
-    own = int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return own + sum(map(resident_bytes, children))
-
-
-def test_memory_does_not_grow_without_end(page, cockpit):
-    page.locator("#speed").select_option("20")
-    until(page, "cockpit.value('t_s') > 60")  # the charts' window is full three times over
-    before = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
-    resident = resident_bytes(cockpit.process.pid)
-    start = page.evaluate("cockpit.value('t_s')")
-    until(page, f"cockpit.value('t_s') > {start + 240}")
-    page.locator("#speed").select_option("1")
-    after = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
-    assert after - before < 3e6
-    assert (
-        resident_bytes(cockpit.process.pid) - resident < 40e6
-    )  # 24 000 rows of the log are 20 MB, in a file
 
 
 def test_a_strangers_page_on_another_port_cannot_talk_to_it(context, cockpit, tmp_path):

@@ -1,8 +1,6 @@
 """The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
 
-import gc
 import json
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -99,115 +97,6 @@ def test_a_wrong_fault_is_refused_in_words(session):
     assert session.state()["broken"] == []
 
 
-def by_surface(session, values):
-    return dict(zip(session.surfaces, values, strict=True))
-
-
-def test_what_breaks_later_is_not_broken_from_the_start(tmp_path):
-    """The scenario's own faults, at 0.2 s and from 0.3 to 0.5 s: each is shown while it is there."""
-    jam = {"type": "stuck", "actuator": "rudder", "at_s": 0.3, "end_s": 0.5}
-    faults = [{**LOSS, "at_s": 0.2}, jam, {"type": "bias", "sensor": "q", "magnitude": 1, "at_s": 9.0}]
-    session = Session(bf.load({"name": "later", "faults": faults}), tmp_path)
-    seen = {}
-    while session.sim.t_s < 0.6:
-        now = {fault["type"] for fault in session.state()["faults"]}
-        seen.setdefault(tuple(session.state()["broken"]), session.sim.frames)
-        assert len(now) == len(session.state()["broken"])
-        flown(session, 1)
-    assert seen == {(): 2, ("elevator",): 20, ("elevator", "rudder"): 30}
-    assert session.state()["broken"] == ["elevator"]
-    own = [(event["t"], event["says"]) for event in session.events if event["kind"] in ("broken", "repaired")]
-    assert own == [
-        (0.2, "elevator: loss of effectiveness (magnitude 0.4)"),
-        (0.3, "rudder: stuck"),
-        (0.5, "rudder: stuck"),
-    ]
-
-
-def test_repair_all_leaves_nothing_broken(session):
-    for fault in (
-        LOSS,
-        {"type": "stuck", "actuator": "rudder"},
-        {"type": "noise", "sensor": "p", "magnitude": 1},
-    ):
-        asked(session, do="break", fault=fault)
-    flown(session, 5)
-    assert session.state()["broken"] == ["elevator", "p", "rudder"]
-    assert {fault["type"] for fault in session.state()["faults"]} == {
-        "loss_of_effectiveness", "stuck", "noise"
-    }  # fmt: skip
-    asked(session, do="repair", actuator="rudder")
-    assert session.state()["broken"] == ["elevator", "p"]
-    asked(session, do="repair")
-    assert (session.state()["broken"], session.state()["faults"]) == ([], [])
-    flown(session, 2)
-    assert session.frame()["effectiveness"] == [1.0] * 4
-    assert [event["says"] for event in told(session, "repaired")] == ["rudder", "everything"]
-
-
-def test_a_repair_is_told_once_whatever_the_scenario_breaks_later(tmp_path):
-    """Of three faults of the scenario one is repaired by hand; the others come and go by themselves."""
-    faults = [
-        {**LOSS, "at_s": 0.1}, {"type": "stuck", "actuator": "rudder", "at_s": 0.4, "end_s": 0.6},
-        {"type": "bias", "actuator": "aileron", "bias_deg": 1, "at_s": 0.5},
-    ]  # fmt: skip
-    session = flown(Session(bf.load({"name": "later", "faults": faults}), tmp_path), 20)
-    asked(session, do="repair", actuator="elevator")
-    flown(session, 60)
-    assert [event["says"] for event in told(session, "repaired")] == ["elevator", "rudder: stuck"]
-    assert [event["says"].partition(":")[0] for event in told(session, "broken")] == [
-        "elevator", "rudder", "aileron",
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("fault", "left"),
-    [
-        ({"type": "stuck"}, 0.0),
-        ({"type": "float"}, 0.0),
-        ({"type": "hardover", "direction": -1}, 0.0),
-        ({"type": "loss_of_effectiveness", "magnitude": 0.25}, 0.75),
-        ({"type": "bias", "bias_deg": 2}, 1.0),
-    ],
-)
-def test_a_surface_that_does_not_follow_its_command_has_no_effectiveness(session, fault, left):
-    asked(session, do="break", fault={**fault, "actuator": "rudder"})
-    flown(session, 1)
-    expected = dict.fromkeys(session.surfaces, 1.0) | {"rudder": left}
-    assert by_surface(session, session.frame()["effectiveness"]) == expected
-
-
-@pytest.mark.parametrize(
-    ("given", "knows"),
-    [
-        ({}, "all"),
-        ({"fdi": {"fault_class": "published"}}, "published"),
-        ({"fdi": {"scheme": "rls-monitor"}}, "all"),
-    ],
-)
-def test_the_diagnosis_knows_what_can_be_broken_unless_told_otherwise(tmp_path, given, knows):
-    session = Session(bf.load({"name": "one", **given}), tmp_path)
-    says = {"all": "knows every fault type", "published": "knows partial loss alone"}
-    assert session.hello()["fault_class"] == knows
-    assert session.state()["knows"] == ("" if "scheme" in given.get("fdi", {}) else says[knows])
-    asked(session, do="fresh", scheme="adaptive-estimators")
-    assert session.state()["knows"] == says[knows]
-    asked(session, do="fresh", fault_class="published")
-    assert session.state()["knows"] == says["published"]
-    asked(session, do="change", scheme="none")
-    assert session.state()["knows"] == ""
-
-
-def test_a_jam_is_named_as_one(session):
-    flown(session, 400)
-    asked(session, do="break", fault={"type": "stuck", "actuator": "elevator"})
-    flown(session, 900)
-    frame = session.frame()
-    where = session.columns.index("elevator_effective_rad")
-    assert (frame["isolated"], frame["type"]) == ("elevator", "stuck")
-    assert frame["estimate"] == pytest.approx(frame["v"][where], abs=np.radians(0.2))
-
-
 # What is asked of a new flight, and what of its scenario is then other than the default.
 FRESH = {
     "law": ("lqr", {"control.law": "lqr"}),
@@ -239,65 +128,6 @@ def test_a_new_flight_is_what_was_asked_for_and_declared(session, key):
     again = session.scenario.with_({"name": "fault-free"})
     asked(session, do="fresh")  # and stays so
     assert session.scenario.with_({"name": "fault-free"}) == again
-
-
-def test_turbulence_that_is_asked_for_raises_no_alarm_and_can_be_ended(session):
-    asked(session, do="fresh", turbulence="moderate")
-    flown(session, 1500)
-    assert not session.frame()["detected"]
-    asked(session, do="fresh", turbulence="none")
-    given = session.scenario
-    assert (given.environment.turbulence, given.environment.severity) == ("none", None)
-    assert given.fdi.bounds.turbulence == "none"
-
-
-def test_the_score_goes_on_from_round_to_round(session):
-    for won in (1, 2):
-        asked(session, do="game", move="second")
-        flown(session, 20)
-        asked(session, do="break", fault={"type": "bias", "actuator": "rudder", "bias_deg": 0.01})
-        flown(session, 20)
-        asked(session, do="game", move="answer", answer="rudder")
-        flown(session, 1005)
-        assert session.state()["game"]["score"] == [won, 0]
-        assert session.state()["game"]["winner"] == "you"
-
-
-def test_more_faults_than_a_scenario_holds_are_refused_in_words(session, monkeypatch):
-    monkeypatch.setattr("beaver_ftc.loop.simulation.MOST_FAULTS", 3)
-    for _ in range(3):
-        asked(session, do="break", fault=LOSS)
-    with pytest.raises(BadInput, match="this flight has had 3, allowed: a new flight"):
-        asked(session, do="break", fault=LOSS)
-    assert len(session.state()["faults"]) == 3
-
-
-def test_a_new_flight_gives_back_the_memory_of_the_one_before(session):
-    """Changes of sensors tie a flight's parts together, so that only a collector would find it."""
-    gc.collect()
-    gc.disable()
-    tracemalloc.start()
-    try:
-        for _ in range(12):
-            asked(session, do="change", sensors="tactical-grade")
-            flown(session, 2)
-            asked(session, do="fresh")
-        grown, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-        gc.enable()
-    log = session.sim.values.nbytes * 8192  # of a flight in progress; some are kept for flights to come
-    assert grown < 6 * log
-
-
-def test_one_gust_at_a_time(session):
-    asked(session, do="blow", velocity_mps=[0, 3, 0])
-    with pytest.raises(BadInput, match="one at a time"):
-        asked(session, do="blow", velocity_mps=[0, 3, 0])
-    assert session.state()["gust"]
-    flown(session, 205)
-    assert not session.state()["gust"]
-    asked(session, do="blow", velocity_mps=[0, 3, 0])
 
 
 def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
@@ -347,21 +177,13 @@ def test_the_rates_of_a_level_turn():
     assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
 
 
-def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session, tmp_path):
-    with pytest.raises(BadInput, match="this flight has none"):
-        asked(session, do="aim", altitude_m=1850)
-    asked(session, do="fresh", autopilot=True)
-    flown(session, 500)
-    start_m = session.sim.log["altitude_m"].iloc[-1]
-    asked(session, do="aim", altitude_m=start_m + 40, heading_deg=30)
-    flown(session, 6000)
-    log = session.sim.log
-    assert log["altitude_m"].iloc[-1] == pytest.approx(start_m + 40, abs=8)
-    assert np.degrees(log["psi_rad"].iloc[-1]) == pytest.approx(30, abs=5)
-    with pytest.raises(BadInput, match="airspeed_mps"):
-        asked(session, do="aim", airspeed_mps=500)
-    asked(session, do="save")
-    (folder,) = tmp_path.iterdir()
-    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
-    asked(session, do="fresh", autopilot=False)
-    assert session.hello()["autopilot"] == []
+def test_what_the_session_was_given_can_be_flown_again_and_files_cannot(session):
+    given = bf.load({"name": "mine", "seed": 77})
+    own = Session(given, session._out)
+    asked(own, do="fresh", scenario="fault-free")
+    assert own.hello()["scenario"] == "fault-free"
+    assert "mine" in own.hello()["scenarios"]
+    asked(own, do="fresh", scenario="mine", law="lqr")
+    assert (own.scenario.seed, own.scenario.control.law, own.hello()["law"]) == (77, "lqr", "lqr")
+    with pytest.raises(BadInput, match="scenario: 'fault-fre' is not known, did you mean fault-free"):
+        asked(own, do="fresh", scenario="fault-fre")

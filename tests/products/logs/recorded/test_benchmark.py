@@ -1,7 +1,6 @@
 """The benchmark on recorded flights, on data sets of our own making."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -92,45 +91,3 @@ def test_the_command_writes_both_files(compared):
     document, out = compared
     assert document["sets"][0]["set"] == "wing"
     assert {path.name for path in out.iterdir()} == {"flights.json", "flights.md", "flights.png"}
-
-
-def _flight(failure, false_alarms=0, delay=None, right=True):
-    return {
-        "failure": failure, "failure_s": None if failure is None else 50.0, "healthy_s": 50.0,
-        "false_alarms": false_alarms, "detected": delay is not None, "delay_s": delay, "named": {},
-        "right_group": right if delay is not None else None,
-    }  # fmt: skip
-
-
-def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_others(monkeypatch):
-    """Three flights; the flight's name says which recording, model and rows belong to it."""
-    names = ["first", "second", "third"]
-    flights = [SimpleNamespace(samples=SimpleNamespace(name=name)) for name in names]
-    recordings = [SimpleNamespace(name=name) for name in reversed(names)]
-    folds = [([one for one in flights if one is not kept], kept, kept.samples.name) for kept in flights]
-    stubs = {
-        "fit_parts": list,
-        "validation_folds": lambda stretches: folds,
-        "fit_model": lambda fitted, *of: ([one.samples.name for one in fitted], *of),
-        "add_ranges_and_threshold": lambda fitted, model: (len(fitted), *model),
-        "_diagnose_each": lambda recording, kept, model: [
-            (method, (recording.name, kept.samples.name)) for method in ("ours", "other")
-        ],
-        "_score_against_log": lambda kept, rows, model: {
-            "of": kept.samples.name, "rows": rows, "model": model
-        },
-        "summarize_failures": lambda scores: {"flights": [one["of"] for one in scores]},
-    }  # fmt: skip
-    for name, stub in stubs.items():
-        monkeypatch.setattr(benchmark, name, stub)
-    data_set = benchmark.DataSet("mine", SimpleNamespace(name="wing"), tuple(recordings), tuple(flights))
-    found = benchmark._compare_methods(data_set)
-    assert [(one["left_out"], one["method"]) for one in found["flights"]] == [
-        (name, method) for name in names for method in ("ours", "other")
-    ]
-    for one in found["flights"]:
-        others = [name for name in names if name != one["left_out"]]
-        assert one["rows"] == (one["left_out"], one["left_out"])
-        assert one["model"] == (2, others, data_set.vehicle, None)
-    assert found["rows"] == [{"method": method, "flights": names} for method in ("ours", "other")]
-    assert (found["scored_by"], found["left_out"]) == ("events", "each flight in turn")

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.results.metrics import faults_of, hints
+from beaver_ftc.results.metrics import hints
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import outcome_class, title, verdict_lines
+from beaver_ftc.results.verdict import outcome_class, title
 from beaver_ftc.scenario.schema import Scenario
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
@@ -75,28 +75,6 @@ def test_nothing_is_said_without_need(arguments, keys):
 def test_a_reader_is_told(arguments, keys, says):
     (said,) = _hints(*arguments, **keys)
     assert re.search(says, said)
-
-
-def test_every_type_of_fault_has_a_size_in_words():
-    faults = [
-        LOSS, STUCK | {"position_deg": 3, "at_s": 13}, RUDDER, UNKNOWN,
-        {"type": "hardover", "actuator": "flap", "direction": -1, "at_s": 1, "end_s": 2},
-        {"type": "rate_limit", "actuator": "flap", "scale": 0.1, "at_s": 2, "end_s": 3},
-        {"type": "oscillatory", "actuator": "aileron", "amplitude_deg": 2, "frequency_rad_s": 5, "at_s": 4},
-        {"type": "float", "actuator": "rudder", "at_s": 5, "end_s": 6},
-    ]  # fmt: skip
-    document = _document(faults=faults_of(Scenario.model_validate({"name": "x", "faults": faults})))
-    said = [how for what, how in verdict_lines(Metrics.of(document)) if what in ("fault", "")]
-    assert said == [
-        "flap hardover (to the lower stop) at 1.00 s to 2.00 s",
-        "flap rate limit (10 % of its rate) at 2.00 s to 3.00 s",
-        "aileron oscillatory (2 deg, 5 rad/s) at 4.00 s",
-        "rudder float at 5.00 s to 6.00 s",
-        "elevator loss of effectiveness (40 %) at 12.00 s",
-        "unanticipated (Cm_alpha3 10) at 12.00 s",
-        "elevator stuck (3 deg) at 13.00 s",
-        "rudder bias (+2 deg) at 14.00 s",
-    ]
 
 
 def _document(**changes):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.results.metrics import evaluate, margin
+from beaver_ftc.results.metrics import evaluate
 from beaver_ftc.results.model import Expectation, Metrics
 from beaver_ftc.scenario.schema import Expect
 
@@ -63,12 +63,6 @@ def test_where_a_flight_has_come_to(part, expected, actual, met):
     assert not evaluate(expect, Metrics.of({"arrival": None}))[0].passed
 
 
-def test_what_was_never_flown_or_never_left():
-    assert _found("altitude_within_m", 15.0, {"profile": None}) == (None, False)
-    assert _found("stays_in_envelope", True, {"envelope": {"exits": 0}}) == (True, True)
-    assert _found("no_departure", True, {"departure": {"time_s": 3.0}}) == (False, False)
-
-
 EARLY = {
     "isolation": {"fault": "rudder", "names": ["rudder"], "time_s": 1.5, "delay_s": 0.5, "premature": True}
 }
@@ -100,11 +94,3 @@ GONE += [{"fault": "rudder", "from_s": 4.0, "to_s": 4.5}]
 def test_why_the_diagnosis_does_not_do_what_was_expected(name, expected, metrics, met, reason):
     (found,) = evaluate(Expect.model_validate({name: expected}), Metrics.of(metrics))
     assert (found.passed, found.reason) == (met, reason)
-
-
-@pytest.mark.parametrize(
-    ("expected", "actual", "inside"),
-    [(5, -3.0, 2.0), (0.5, 0.75, -0.25), (0.5, 0.5, 0.0), (5.0, None, None), (True, 1, None), ("a", 1, None)],
-)
-def test_a_margin_is_what_is_left_to_the_limit(expected, actual, inside):
-    assert margin(Expectation("", False, expected, actual)) == inside

@@ -1,10 +1,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import Flight, Scenario, rows
 
 from beaver_ftc.results.exports import ACMI_RATE_HZ, write_acmi, write_csv
-from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.model import Metrics
 
@@ -62,27 +60,9 @@ def test_recording_follows_the_flight_at_a_rate_to_look_at(recording, log_path):
         assert float(frames[time]["TAS"]) == pytest.approx(row["airspeed_mps"], abs=1e-3)
 
 
-def test_events_are_bookmarks_in_the_first_frame_not_before_them(recording):
-    _, events = recording
-    assert [text for _, text in events] == ["fault 12.00 s", "detection 12.07 s", "isolation 12.12 s"]
-    assert [time for time, _ in events] == pytest.approx([12.0, 12.08, 12.12])
-
-
 def test_a_false_alarm_is_a_bookmark_before_the_faults(log_path, flight, tmp_path):
     alarmed = metrics(flight)
     alarmed["detection"]["time_s"] = 3.0
     write_acmi(log_path, Metrics.of(alarmed), tmp_path / "flight.acmi")
     found = [(text, pytest.approx(time)) for time, text in _parse(tmp_path / "flight.acmi")[1]]
     assert found == [("detection 3.00 s", 3.0), ("fault 12.00 s", 12.0), ("isolation 12.12 s", 12.12)]
-
-
-@pytest.mark.parametrize(("rate_hz", "every"), [(60.0, 3), (100.0, 4), (20.0, 1)])
-def test_frames_are_evenly_spaced_across_the_row_groups_of_a_log(tmp_path, rate_hz, every):
-    """Groups of 100 rows, of which 3 is no divisor; 25 frames a second at most."""
-    flight = Flight(scenario=Scenario(rate_hz=rate_hz), frames=1000)
-    with ParquetLog(tmp_path / "log.parquet", rows_per_group=100) as log:
-        log.open(flight.columns)
-        log.write(rows(flight))
-    write_acmi(tmp_path / "log.parquet", measure(flight), tmp_path / "flight.acmi")
-    frames, _ = _parse(tmp_path / "flight.acmi")
-    assert list(frames) == pytest.approx(np.arange(0, 1000, every) / rate_hz, abs=6e-4)

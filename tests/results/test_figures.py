@@ -4,7 +4,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from synthetic import Flight, Scenario, rows
 
-from beaver_ftc.results.figures import _legend_handle_of_label, draw, write_figures
+from beaver_ftc.results.figures import draw, write_figures
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.style import LOOKS, closeup_window, marks
@@ -83,16 +83,6 @@ def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
     assert closeup_window(marks(measure(quiet))) is None
 
 
-def test_views_of_a_log_without_estimators_leave_those_out(flight):
-    columns = [name for name in flight.columns if not name.startswith("fie_")]
-    assert {view.name for view in views(columns)} == EVERY - {"isolation", "candidates"}
-
-
-def test_fault_that_never_came_is_not_marked():
-    lost = Flight(detection_time_s=None, isolation_time_s=None, isolated=None, departure=(5.0, "beta"))
-    assert [mark.name for mark in marks(measure(lost))] == ["departure"]
-
-
 def test_no_two_curves_of_one_figure_look_the_same():
     for view in views(Flight().columns):
         if view.n_panel_columns > 1:
@@ -116,22 +106,3 @@ def test_a_long_legend_takes_more_lines_and_stays_below_the_panels_and_inside():
     taken, label = legend.get_window_extent(renderer), figure.axes[0].xaxis.label.get_window_extent(renderer)
     assert 0.0 <= taken.x0 < taken.x1 <= figure.bbox.width
     assert 0.0 <= taken.y0 < taken.y1 <= label.y0 + 1.0
-
-
-def test_a_legend_has_each_label_once_by_its_first_curve_but_for_what_titles_name():
-    class Panel:
-        def __init__(self, title, **curves):
-            self.get_title = lambda: title
-            self.get_legend_handles_labels = lambda: (list(curves.values()), list(curves))
-
-    grid = [
-        Panel("elevator (deg)", elevator=1, command=2, measured=3),
-        Panel("rudder", rudder=4, command=5, bound=6),
-        Panel("", measured=7, flap=8),
-    ]
-    assert list(_legend_handle_of_label(grid).items()) == [
-        ("command", 2),
-        ("measured", 3),
-        ("bound", 6),
-        ("flap", 8),
-    ]

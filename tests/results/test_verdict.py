@@ -56,37 +56,6 @@ def test_every_key_of_expect_is_said_in_words_here():
 DETECTION = {"detected": True, "time_s": 12.5, "delay_s": 0.5, "guaranteed_delay_s": None, "axis": "q"}
 
 
-@pytest.mark.parametrize(
-    ("changes", "false_alarm", "said"),
-    [
-        ({"detected": False}, False, "no alarm"),
-        ({"delay_s": None}, True, "FALSE ALARM at 12.50 s on q"),
-        ({}, True, "after 0.50 s on q"),  # the false one was of a diagnosis that a change has ended
-        ({}, False, "after 0.50 s on q"),
-        ({"guaranteed_delay_s": 0.75}, False, "after 0.50 s on q (certain within 0.75 s)"),
-        ({"axis": None}, False, "after 0.50 s by the sensor monitor"),
-    ],
-)
-def test_the_alarm_in_words(changes, false_alarm, said):
-    assert (
-        verdict._detection_text(Metrics.of({"detection": DETECTION | changes, "false_alarm": false_alarm}))
-        == said
-    )
-
-
-@pytest.mark.parametrize(
-    ("time_s", "said"),
-    [
-        (None, "no alarm; threshold 6.50 σ, peak in healthy flight 0.81 of it"),
-        (3.0, "alarm at 3.00 s; threshold 6.50 σ, peak in healthy flight 0.81 of it"),
-    ],
-)
-def test_the_statistical_detector_in_words(time_s, said):
-    found = {"time_s": time_s, "alarm_level": 6.5, "closest_approach": 0.81}
-    assert verdict._statistical_text(Metrics.of({"detection": {"statistical": found}})) == said
-    assert verdict._statistical_text(Metrics.of({"detection": {}})) == ""
-
-
 NAMED = {
     "isolated": True, "fault": "elevator", "delay_s": 0.25, "correct": True, "type_correct": None,
     "type": "stuck", "candidates": ["stuck"], "estimate": None, "estimate_deg": None,
@@ -154,95 +123,6 @@ def test_a_named_fault_in_words(changes, said):
     assert verdict._isolation_text(Metrics.of(found)) == said
 
 
-@pytest.mark.parametrize(
-    ("candidates", "said"),
-    [
-        (["rudder"], "still possible: rudder"),
-        (["aileron", "unanticipated"], "still possible: aileron or a fault outside the class"),
-        (
-            ["left_flap:stuck", "left_flap:float"],
-            "still possible: left flap; type not determined (2 remain: stuck, float)",
-        ),
-        (
-            [f"{side}_{name}:{kind}" for side in ("left", "right") for name in ("aileron", "flap", "elevator")
-             for kind in ("bias", "stuck", "rate_limit")] + ["damage"],
-            "still possible: one of 6 surfaces (4 on the wing, 2 on the tail) or damage; "
-            "type not determined (3 remain: bias, stuck, rate limit)",
-        ),
-        (
-            ["aileron", "elevator", "rudder", "flap"],
-            "still possible: aileron or elevator or rudder or flap",
-        ),
-        (
-            ["aileron", "elevator", "rudder", "flap", "slat"],
-            "still possible: one of 5 surfaces (3 on the wing, 2 on the tail)",
-        ),
-        (["sensor p", "sensor phi"], "still possible: sensor p or sensor phi"),
-    ],
-)  # fmt: skip
-def test_what_is_still_possible_is_grouped_and_counted(candidates, said):
-    assert verdict.candidates_in_words(candidates) == said
-
-
-FIRST, AGAIN, OTHER = (
-    {"fault": name, "from_s": from_s, "to_s": to_s}
-    for name, from_s, to_s in (("elevator", 12.0, 12.25), ("elevator", 14.0, 15.0), ("flap", 13.0, 13.5))
-)
-
-
-@pytest.mark.parametrize(
-    ("gone", "said"),
-    [
-        ([], ""),
-        ([FIRST], "; named before: elevator from 12.00 s to 12.25 s"),
-        (
-            [OTHER | {"type": "rate_limit", "because": "a sensor is broken"}],
-            "; named before: flap (rate limit) from 13.00 s to 13.50 s, withdrawn because a sensor is broken",
-        ),
-        (
-            [FIRST, OTHER, AGAIN],
-            "; named before: elevator 2 times, for 1.25 s in all, from 12.00 s to 15.00 s; "
-            "flap from 13.00 s to 13.50 s",
-        ),
-    ],
-)
-def test_what_was_named_before_in_words(gone, said):
-    document = {"isolation": NAMED | {"withdrawn": gone}, "faults": FAULTS}
-    assert verdict._isolation_text(Metrics.of(document)) == f"elevator after 0.25 s; correct, stuck{said}"
-    nothing = {"isolated": False, "candidates": [], "withdrawn": gone}
-    assert (
-        verdict._isolation_text(Metrics.of({"isolation": nothing, "detection": {"detected": True}}))
-        == f"none{said}"
-    )
-
-
-def test_modes_left_out_are_counted_before_the_last():
-    modes = [{"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": 2.0}]
-    assert verdict._supervisor_text(Metrics.of({"supervisor": modes})) == "nominal 0.00 s → adaptive 2.00 s"
-    said = verdict._supervisor_text(Metrics.of({"supervisor": modes, "mode_changes_left_out": 7}))
-    assert said == "nominal 0.00 s → (7 more) → adaptive 2.00 s"
-
-
-def test_engine_and_authority_in_words():
-    power = {"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26}
-    assert verdict._engine_power_text(Metrics.of({"engine_power": power})) == (
-        "took over pitch at 13.20 s, for 0.90 s in all, 20.0 to 22.3 inHg"
-    )
-    assert verdict._engine_power_text(Metrics.of({"engine_power": None})) == ""
-    least = verdict.MIN_SHOWN_BEYOND_S
-    axes = {"p": {"beyond_s": 0.5 * least}, "q": {"beyond_s": 1.89}, "r": {"beyond_s": least}}
-    assert verdict._insufficient_authority_text(Metrics.of({"authority": axes})) == (
-        f"no deflection could hold the rate: q for 1.89 s, r for {least:.2f} s"
-    )
-    assert verdict._insufficient_authority_text(Metrics.of({"authority": None})) == ""
-
-
-def test_a_probing_in_words():
-    said = "flap and elevator moved from 14.00 s to 18.50 s"
-    assert verdict._probing_text(Metrics.of({"isolation": {"probing_s": [14.0, 18.5]}})) == said
-    assert verdict._probing_text(Metrics.of({"isolation": {"probing_s": None}})) == ""
-
-
 def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
     change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
     assert verdict._change_text(ChangeInFlight.of(change)) == "law adaptive at 6.00 s"
@@ -254,13 +134,6 @@ def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
         ChangeInFlight.of({**change, **found, "isolated": "rudder", "false_alarm": True})
     )
     assert said.endswith("the diagnosis before: FALSE ALARM at 2.50 s, rudder")
-
-
-def test_stays_outside_the_envelope_are_counted_from_the_first():
-    exits = [{"start_s": 3.0, "end_s": 4.5}, {"start_s": 8.0, "end_s": 9.0}]
-    metrics = {"envelope_exits": exits, "envelope": {"exits": 2, "outside_s": 2.5}}
-    assert verdict._envelope_text(Metrics.of(metrics)) == "left 2 times, 2.50 s in all, first at 3.00 s"
-    assert verdict._envelope_text(Metrics.of({**metrics, "envelope_exits": []})) == ""
 
 
 @pytest.mark.parametrize(
@@ -278,14 +151,6 @@ def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said
     size = f" ({said[0]})" if said else ""
     expected = f"sensor {fault['sensor']} {fault['type']}{size} at 2.00 s to 5.00 s"
     assert verdict._fault_text(declared) == expected
-
-
-@pytest.mark.parametrize(
-    ("seconds", "said"),
-    [(0.125, "0.12 s"), (999.994, "999.99 s"), (1000.0, "1000.0 s"), (1000.5, "1000.5 s")],
-)
-def test_long_times_are_told_to_a_tenth(seconds, said):
-    assert verdict._seconds_text(seconds) == said
 
 
 def flown(**changes):
@@ -324,83 +189,10 @@ def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
     assert row in verdict.verdict_text(certified, "runs/x").splitlines()
 
 
-def test_in_colour_what_is_missed_is_red_and_names_stand_out():
-    lines = verdict.verdict_text(Metrics.of(flown()), "runs/a-flight", colour=True).splitlines()
-    assert "\x1b[1;31m" in lines[0]
-    assert any("\x1b[1;31mMISSED" in line for line in lines)
-    assert any("\x1b[32mmet" in line for line in lines)
-    assert "\x1b[1m" in lines[-1]
-    assert "\x1b[1;36m" not in "".join(lines), "numbers are not coloured as numbers"
-    long = flown(scenario="a" * 200, passed=True)
-    assert "\x1b[1;32m" in verdict.verdict_text(Metrics.of(long), "x", colour=True)
-
-
 def test_markup_in_a_name_is_no_markup():
     text = verdict.verdict_text(Metrics.of(flown(scenario="[red]x[/red] :smile:")), "runs/[bold]x")
     assert "[red]x[/red] :smile:" in text
     assert "runs/[bold]x" in text
-
-
-@pytest.mark.parametrize(
-    ("limit", "said"),
-    [
-        (("airspeed_mps", "at least", 38.04, True), "airspeed to at least 38.0 m/s from 20.00 s: trim"),
-        (
-            ("bank_deg", "at most", 30.0, False),
-            "bank to at most 30 deg from 20.00 s, no longer at the end: trim",
-        ),
-    ],
-)
-def test_a_limit_that_was_lifted_is_said_to_be_gone(limit, said):
-    """Only of a limit that is not in force when the flight ends is it said that it is gone."""
-    keys = ("limits", "side", "value", "in_force")
-    entry = {"time_s": 20.0, "because": "trim", **dict(zip(keys, limit, strict=True))}
-    assert ("limited", said) in list(verdict.verdict_lines(Metrics.of(flown(limits=[entry]))))
-
-
-LINK = {
-    "protocol": "sitl", "frames": 1200, "packets_hz": 400.0, "latency_ms": {"median": 0.25, "p99": 1.5},
-    "interval_ms": {"mean": 2.5, "jitter_rms": 0.125}, "repeated": 3, "late": 0, "missed": 4, "malformed": 0,
-    "strangers": 5, "off_rate": 0, "resets": 6,
-}  # fmt: skip
-AXIS = {
-    "beyond_s": 0.0, "least_rad_s2": -2.0, "greatest_rad_s2": 1.0, "healthy_least_rad_s2": -3.0,
-    "healthy_greatest_rad_s2": 2.0,
-}  # fmt: skip
-WHOLE = AXIS | {"least_rad_s2": -3.0, "greatest_rad_s2": 2.0}
-ENGINES = {"engines_least_rad_s2": -0.25, "engines_greatest_rad_s2": 0.5}
-NEARLY = {
-    "least_rad_s2": 0.0, "greatest_rad_s2": 995.0, "healthy_least_rad_s2": 0.0,
-    "healthy_greatest_rad_s2": 1000.0,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("changes", "what", "said"),
-    [
-        (
-            {"link": LINK},
-            "link",
-            "sitl, 1200 frames at 400 Hz, 3 repeated, 4 missing, 5 from other senders, 6 restarts; "
-            "latency 0.25 ms (99th percentile 1.50), interval 2.50 ms, jitter 0.12 ms RMS",
-        ),
-        (
-            {"authority": {"p": AXIS, "q": WHOLE, "r": WHOLE | ENGINES}},
-            "remaining",
-            "roll authority 60 % (-2 to 1 rad/s2); "
-            "yaw authority 100 % (-3 to 2 rad/s2, engines -0.25 to 0.5)",
-        ),
-        ({"authority": {"p": WHOLE, "q": AXIS | NEARLY, "r": {"beyond_s": 0.0}}}, "remaining", None),
-        ({"departure": {"time_s": 7.5, "signal": "beta_rad"}}, "departure", "LOST at 7.50 s: beta_rad"),
-        (
-            {"saturation_s": {"aileron": 1.25, "flap": 0.0, "rudder": 2.5}},
-            "saturation",
-            "aileron 1.25 s, rudder 2.50 s",
-        ),
-    ],
-)
-def test_the_rest_of_a_flight_in_words(changes, what, said):
-    assert dict(verdict.verdict_lines(Metrics.of(flown(**changes)))).get(what) == said
 
 
 @pytest.mark.parametrize(

@@ -684,12 +684,3 @@ def test_an_airspeed_that_is_within_what_is_expected_as_a_mean_alone():
     assert judged["actual"] == pytest.approx(mean, rel=2e-3)
     said = f"airspeed {judged['actual']:.3g} m/s (10 s mean; largest at one instant {at_once:.3g})"
     assert said in dict(verdict.verdict_lines(model.Metrics.of(flight.metrics)))["profile"]
-
-
-def leaves(section, path=""):
-    for key, value in section.items():
-        here = f"{path}.{key}" if path else key
-        if isinstance(value, dict) and value:
-            yield from leaves(value, here)
-        else:
-            yield here, value

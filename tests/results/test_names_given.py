@@ -1,11 +1,9 @@
 """Names given in flight, held against the faults they name: early, late, one after the other, two at once."""
 
 import pytest
-from synthetic import Expect, Flight, Scenario
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario as Given
 from trainer import FOLDER
 
@@ -14,20 +12,6 @@ JAM = {"actuator": "rudder", "type": "stuck", "position_deg": 8, "at_s": 9}
 RATES = {axis: [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}] for axis in "pqr"}
 ALL = {"fault_class": "all"}
 NOISY = {"bounds": {"sensors": "tactical-grade"}}
-
-
-def isolation(*faults, expect=None, **found):
-    """The section of a flight made by hand."""
-    scenario = Scenario(faults=faults, expect=Expect(**(expect or {})))
-    document = metrics(Flight(scenario=scenario, **found))
-    return document["isolation"] | {"expectations": document["expectations"]}
-
-
-@pytest.fixture(scope="module")
-def early():
-    """A model error that is not declared raises the alarm before the fault, and names its surface."""
-    changes = {"duration_s": 13.0, "uncertainty.coefficients": {"Cm_alpha": 1.1}}
-    return bf.fly(bf.load("elevator-partial-loss").with_(changes))
 
 
 @pytest.fixture(scope="module")

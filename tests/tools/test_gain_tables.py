@@ -1,6 +1,5 @@
 """How the gains of zhang2005 were chosen: the least cost wins, and the default is what wins."""
 
-import numpy as np
 import pytest
 
 from tools import gains
@@ -14,14 +13,3 @@ def test_the_least_is_chosen_and_a_default_that_is_not_is_said(monkeypatch, caps
         gains.main()
     assert ended.value.code == 1
     assert "scheme adaptation_gain: chosen 5000, default 3000. error of theta" in capsys.readouterr().out
-
-
-def test_the_fdaes_network_has_the_gain_that_the_procedure_chooses():
-    gain = gains.GAINS[0]
-    costs = {value: gains.cost(gain, value) for value in (70, gain.default, 200)}
-    assert min(costs, key=costs.get) == gain.default
-
-
-def test_a_lost_aircraft_is_no_choice():
-    law = next(gain for gain in gains.GAINS if gain.option == "parametric_gain")
-    assert gains.cost(law, 5000.0) == np.inf

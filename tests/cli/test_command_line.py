@@ -162,15 +162,6 @@ def test_reader_that_goes_away_is_no_error(short):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_a_folder_whose_name_is_not_utf_8(short):
-    folder = os.fsdecode(b"r\xe9sultats")
-    done = beaver("run", "short.yaml", "--csv", "--acmi", "--no-report", "--out", folder, cwd=short)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (short / folder / "short" / "log.parquet").exists()
-    done = beaver("compare", f"{folder}/short", "--out", folder, cwd=short)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 20000")
 
 
@@ -204,22 +195,6 @@ def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
     assert b"Traceback" not in said
     assert not (short / "runs/long").exists()
     assert (short / "runs").exists() is left
-
-
-def test_validate_reports_every_file(short):
-    (short / "bad.yaml").write_text("name: bad\nduration_s: -6\n")
-    (short / "fast.yaml").write_text("name: fast\ninitial: {airspeed_mps: 57}\n")
-    done = beaver("validate", "short.yaml", "bad.yaml", "fast.yaml", "nowhere.yaml", cwd=short)
-    assert done.returncode == 2
-    assert done.stdout.splitlines() == ["short.yaml: OK", "fast.yaml: OK"]
-    assert [line.split(": ")[0] for line in done.stderr.splitlines()] == [
-        "bad.yaml:2",
-        "fast.yaml",
-        "nowhere.yaml",
-    ]
-    document = json.loads(beaver("validate", "short.yaml", "bad.yaml", "--format", "json", cwd=short).stdout)
-    assert document["valid"] is False
-    assert [file["valid"] for file in document["files"]] == [True, False]
 
 
 def test_version_and_help(tmp_path):

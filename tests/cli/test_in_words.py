@@ -47,20 +47,6 @@ def test_a_line_of_a_sweep_now_and_then(monkeypatch, clock, terminal, step_s, sh
     assert sys.stderr.getvalue() == shown
 
 
-def test_a_log_has_a_line_of_a_study_now_and_then_and_none_of_a_short_one(clock, monkeypatch):
-    monkeypatch.setattr(sys, "stderr", log := Terminal(False))
-    with cli.progress_bar("x") as show:
-        for flown in range(101):  # one a second
-            clock["s"] = 100.0 + flown
-            show(flown / 100)
-            if flown == 5:
-                assert log.getvalue() == ""
-    first, second, *others = log.getvalue().splitlines()
-    assert first == "x: 6%"
-    assert second == "x: 36%, 64 s left"
-    assert len(others) == 2
-
-
 @pytest.mark.parametrize(
     ("error", "says", "status"),
     [

@@ -9,7 +9,6 @@ import pytest
 import typer
 
 import needs
-from beaver_ftc import commands
 from beaver_ftc.cli import failure_of
 from beaver_ftc.cli import main as command_line
 from beaver_ftc.commands import files_of_commands
@@ -59,23 +58,6 @@ def test_an_error_ends_with_the_status_of_its_kind(monkeypatch, as_started, caps
 
     assert ended(monkeypatch, command) == status
     assert "no" in capsys.readouterr().err
-
-
-def test_which_commands_fly(changed):
-    """Whether plug-ins can be registered for it, and its examples; of each package by itself."""
-    found = {}
-    for name, command in command_line.every_command().items():
-        flies, examples = "plugin" in [each.name for each in command.params], command.epilog or ""
-        package = commands.registered()[name].partition(".")[0]
-        found.setdefault(package, {})[name] = [flies, *examples.splitlines()[2:]]
-    whole = typer.main.get_command(command_line.app)
-    below = {name: each.commands for name, each in whole.commands.items() if name in commands.groups()}
-    assert {*whole.commands} == {name.partition(" ")[0] for name in commands.registered()}
-    assert {f"{group} {name}" for group, names in below.items() for name in names} == {
-        name for name in commands.registered() if " " in name
-    }
-    for package, commands_of_it in found.items():
-        assert not changed(commands_of_it, part=package)
 
 
 @needs.command("check")

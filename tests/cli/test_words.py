@@ -1,17 +1,12 @@
 """What people read: it says what is so, and leads to what they wanted."""
 
 import re
-import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import beaver_ftc as bf
 import commands
 from beaver_ftc.scenario.schema import load_text
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -102,52 +97,3 @@ def test_what_was_meant_is_said_of_a_beginning_a_lone_name_and_a_missing_dash(be
     status, _, said = _validated(beaver, f"name: x\n{written}\n")
     assert status == 2
     assert says in said
-
-
-def test_why_a_surface_that_is_named_is_kept_in_use_is_said(beaver):
-    mission = bf.load("mission-elevator-jammed").with_({"duration_s": 53, "expect": {}})
-    flight = bf.fly(mission, log=False)
-    (taken_s,) = (change.time_s for change in flight.supervisor if change.mode == "reallocated")
-    assert taken_s > flight.isolation.time_s + 1.0  # the flight is one of those that wait
-    named_s = flight.isolation.time_s
-    told = f"elevator was named at {named_s:.2f} s; its demand was reallocated at {taken_s:.2f} s"
-    assert [told in hint for hint in flight.metrics["hints"]] == [True]
-    assert told in repr(flight)
-    at_once = bf.fly(bf.load("elevator-stuck").with_({"duration_s": 14, "expect": {}}), log=False)
-    assert not any("was reallocated" in hint for hint in at_once.metrics["hints"])
-
-
-def _documented(name):
-    """Field -> shape as text, of one of the tables of docs/reference/plugins.md."""
-    page = (ROOT / "docs/reference/plugins.md").read_text()
-    table = page.partition(f"`{name}` (`beaver_ftc")[2].partition("|\n\n")[0]
-    for names, says in re.findall(r"^\| ?(`[^|]*?) ?\| ?(.*?) ?\|$", f"{table}|", re.MULTILINE):
-        fields, shapes = (
-            re.findall(r"`(\w+)`", names),
-            re.findall(r"(\((?:\d|\w+ \+ \w+|surfaces),[\w ]*\))", says),
-        )
-        if len(shapes) == len(fields):
-            yield from zip(fields, shapes, strict=True)
-
-
-@pytest.mark.parametrize("aircraft", ["beaver", "./trainer"])
-def test_arrays_of_a_plug_in_have_the_documented_shapes(aircraft, tmp_path, monkeypatch):
-    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
-    monkeypatch.chdir(tmp_path)
-    seen = {}
-
-    class Looks:
-        def reset(self, context):
-            seen["context"] = context
-
-        def step(self, measured, command):
-            seen["measured"] = measured
-            return bf.Verdict()
-
-    flown = bf.fly({"duration_s": 0.05, "aircraft": aircraft}, log=False, detector=Looks())
-    made = flown.scenario.airframe
-    sizes = {"surfaces": len(made.surfaces), "signals": len(made.signals)}
-    documented = {(name, field): shape for name in seen for field, shape in _documented(name)}
-    assert {("context", "trim_y"), ("measured", "y"), ("measured", "contribution")} <= documented.keys()
-    found = {(name, field): np.shape(getattr(seen[name], field)) for name, field in documented}
-    assert found == {of: eval(shape, {}, sizes) for of, shape in documented.items()}

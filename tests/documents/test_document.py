@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from beaver_ftc.documents.document import MAX_DEPTH, MalformedDocumentError, first_text, parse, scalar
+from beaver_ftc.documents.document import MAX_DEPTH, MalformedDocumentError, parse, scalar
 
 
 @pytest.mark.parametrize(
@@ -119,18 +119,3 @@ def test_the_line_of_a_syntax_error(text, line):
     with pytest.raises(MalformedDocumentError) as caught:
         parse(text)
     assert caught.value.problem.line == line
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("a: 1\ndescription: two words\nb: [", "two words"),
-        ("description: >\n  two\n  lines\n", "two lines\n"),
-        ("a: description\nb: c\n", ""), ("a: {description: inner}\ndescription: outer\n", "outer"),
-        ("a: [description, b]\ndescription: outer\n", "outer"), ("description: {a: b}\nc: d\n", ""),
-        ("", ""), ("a:\ndescription: after nothing", "after nothing"),
-        ("a: {b: {c: 1}}\nd: [[x], {y: z}]\ndescription: 'last'", "last"),
-    ],
-)  # fmt: skip
-def test_the_text_of_a_key_is_read_and_nothing_behind_it(text, found):
-    assert first_text(text, "description") == found

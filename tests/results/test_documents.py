@@ -138,19 +138,6 @@ def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames
     assert shown == [f"#{i / hz:.3f}" for i in range(0, frames, every)]
 
 
-def test_a_place_is_told_by_the_radius_at_the_start(tmp_path):
-    """A flight that begins 629 km up and ends on the ground: 122.173 km to the north are a degree there."""
-    rows = np.zeros((2, len(LOGGED)))
-    rows[:, 0], rows[:, LOGGED.index("altitude_m")] = [0.0, 0.04], [629_000.0, 0.0]
-    rows[:, LOGGED.index("north_m")] = math.radians(1.0) * 7_000_000.0
-    with ParquetLog(tmp_path / "log.parquet") as log:
-        log.open(LOGGED)
-        log.write(rows)
-    write_acmi(tmp_path / "log.parquet", measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
-    text = (tmp_path / "flight.acmi").read_text()
-    assert text.count("b1,T=0.00000000|46.00000000|") == 2
-
-
 def _folder(path, flight, group=1000):
     path.mkdir()
     columns = [

@@ -2,20 +2,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from beaver_ftc.results.exports import ACMI_RATE_HZ, write_acmi, write_csv
+from beaver_ftc.results.exports import ACMI_RATE_HZ, write_acmi
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.model import Metrics
 
 EARTH_RADIUS_M = 6371000.0
-
-
-def test_csv_holds_the_log_to_the_last_bit(log_path, tmp_path):
-    write_csv(log_path, tmp_path / "log.csv")
-    expected = pd.read_parquet(log_path)
-    text = (tmp_path / "log.csv").read_text()
-    assert text.split("\n", 1)[0].split(",") == list(expected.columns)
-    read = np.loadtxt(tmp_path / "log.csv", delimiter=",", skiprows=1)
-    np.testing.assert_array_equal(read, expected.to_numpy())
 
 
 def _parse(path):

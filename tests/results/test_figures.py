@@ -1,14 +1,12 @@
 import matplotlib.image
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from synthetic import Flight, Scenario, rows
+from synthetic import Flight
 
 from beaver_ftc.results.figures import draw, write_figures
-from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.style import LOOKS, closeup_window, marks
-from beaver_ftc.results.views import Panel, Trace, View, read_series, views
+from beaver_ftc.results.style import LOOKS, marks
+from beaver_ftc.results.views import read_series, views
 
 EVERY = {
     "candidates",
@@ -68,21 +66,6 @@ def test_threshold_is_drawn_on_both_sides(flight, log_path):
     assert sorted(bounds) == pytest.approx([-np.degrees(0.02), np.degrees(0.02)], rel=1e-3)
 
 
-def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
-    quiet = Flight(scenario=Scenario(faults=()), detection_time_s=None, isolation_time_s=None, isolated=None)
-    data = rows(quiet)
-    data[:, [i for i, name in enumerate(quiet.columns) if name.startswith("fie_")]] = np.nan
-    with ParquetLog(tmp_path / "log.parquet") as log:
-        log.open(quiet.columns)
-        log.write(data)
-    view = next(view for view in views(quiet.columns) if view.name == "isolation")
-    series = read_series(tmp_path / "log.parquet", view.columns)
-    assert all(
-        axes.texts[0].get_text() == view.text_without_data for axes in _panels(quiet, series, "isolation")
-    )
-    assert closeup_window(marks(measure(quiet))) is None
-
-
 def test_no_two_curves_of_one_figure_look_the_same():
     for view in views(Flight().columns):
         if view.n_panel_columns > 1:
@@ -93,16 +76,3 @@ def test_no_two_curves_of_one_figure_look_the_same():
             looks.setdefault(look, set()).add(trace.label)
         if all(len(panel.traces) > 1 for panel in view.panels):
             assert [labels for labels in looks.values() if len(labels) > 1] == [], view.name
-
-
-def test_a_long_legend_takes_more_lines_and_stays_below_the_panels_and_inside():
-    traces = tuple(Trace(f"x{i}", f"the loss of a surface of the kind {i:02}", "actual") for i in range(14))
-    view = View("likelihood", "Of many", (Panel("all of them", traces),))
-    series = {"t_s": np.arange(5.0), **{f"x{i}": np.arange(5.0) + i for i in range(14)}}
-    figure = draw(view, series, [], "x")
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    (legend,), renderer = figure.legends, canvas.get_renderer()
-    taken, label = legend.get_window_extent(renderer), figure.axes[0].xaxis.label.get_window_extent(renderer)
-    assert 0.0 <= taken.x0 < taken.x1 <= figure.bbox.width
-    assert 0.0 <= taken.y0 < taken.y1 <= label.y0 + 1.0

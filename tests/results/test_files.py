@@ -5,13 +5,11 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pytest
-from pyarrow import parquet
 from synthetic import Flight
 
 import beaver_ftc as bf
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import log, writer
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.metrics import metrics
@@ -21,17 +19,6 @@ from beaver_ftc.scenario.schema import Scenario
 
 def _open_files():
     return set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").exists() else set()
-
-
-@pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
-def test_a_row_group_of_a_million_rows_at_most_is_read(tmp_path, rows, allowed):
-    table = pa.table({"t_s": pa.array(np.zeros(rows))})
-    parquet.write_table(table, tmp_path / "log.parquet", row_group_size=rows)
-    if allowed:
-        assert log.row_count(tmp_path / "log.parquet") == rows
-        return
-    with pytest.raises(BadInput, match=r"has 1,000,001 rows in a row group, allowed: up to 1,000,000"):
-        log.row_count(tmp_path / "log.parquet")
 
 
 def test_a_folder_is_locked_once(tmp_path, monkeypatch):

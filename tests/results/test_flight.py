@@ -1,10 +1,8 @@
 """A flight in Python: what a run would have written, as tables, records and figures."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib.text
 import numpy as np
 import pandas as pd
 import pytest
@@ -31,13 +29,6 @@ def folder(tmp_path_factory, figures_in_short):
 
 
 class TestFlown:
-    def test_the_log_knows_its_units_and_the_verdict(self, flight):
-        attrs = flight.log.attrs
-        shown = {name: attrs["units"][name] for name in ("t_s", "q_rad_s", "airspeed_mps", "qdyn_pa", "mode")}
-        assert shown == {"t_s": "s", "q_rad_s": "rad/s", "airspeed_mps": "m/s", "qdyn_pa": "Pa", "mode": "1"}
-        assert (attrs["scenario"], attrs["verdict"]["isolated"]) == ("test", "elevator")
-        assert json.loads(json.dumps(attrs)) == attrs
-
     def test_without_a_log_there_is_the_verdict_alone(self, flight, tmp_path):
         bare = bf.fly(scenario(**SHORT), log=False)
         assert bare.metrics == flight.metrics
@@ -117,15 +108,6 @@ def test_the_document_of_a_flight_is_its_records_and_back(flight):
     sensor = {"actuator": None, "sensor": "q", "type": "bias", "at_s": 1.0}
     assert model.Fault.of(sensor).document() == sensor
     assert list(model.Fault.of(sensor).document()) == list(sensor)
-
-
-def test_a_figure_for_a_paper_is_a_column_wide_in_small_letters(flight):
-    figure = flight.plot("surfaces", style="paper")
-    assert figure.get_figwidth() == pytest.approx(8.4 / 2.54)
-    assert figure.dpi == 300
-    assert max(text.get_fontsize() for text in figure.findobj(matplotlib.text.Text) if text.get_text()) <= 8
-    with pytest.raises(bf.BadInput, match="style: 'poster' is not known, allowed: screen, paper"):
-        flight.plot(style="poster")
 
 
 DAMAGED = (

@@ -9,32 +9,8 @@ from trainer import FOLDER
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 4}
 JAM = {"actuator": "rudder", "type": "stuck", "position_deg": 8, "at_s": 9}
-RATES = {axis: [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}] for axis in "pqr"}
 ALL = {"fault_class": "all"}
 NOISY = {"bounds": {"sensors": "tactical-grade"}}
-
-
-@pytest.fixture(scope="module")
-def in_turn():
-    """Elevator, later rudder, real instruments: what an engineer tries first."""
-    return Given.model_validate({
-        "name": "in-turn", "duration_s": 11, "reference": RATES, "faults": [LOSS, JAM],
-        "sensors": "tactical-grade", "fdi": ALL | NOISY, "expect": {"isolated_as": ["elevator", "rudder"]},
-    })  # fmt: skip
-
-
-def test_what_two_faults_in_turn_come_to_is_said_before_and_after_the_flight(in_turn):
-    (warning,) = in_turn.warnings()
-    assert warning.startswith("faults: on several surfaces at once: the diagnosis looks for one, names the")
-    flight = bf.fly(in_turn)
-    assert flight.isolation.names == ("elevator", "unanticipated")
-    assert flight.isolation.correct is True
-    (hint,) = [said for said in flight.metrics["hints"] if "several surfaces" in said]
-    assert "then says unanticipated; fdi.pairs, which looks for two, is not available with" in hint
-    told = {"isolated_as": ["elevator", "unanticipated"]}
-    again = bf.fly(in_turn.with_({"expect": told}))
-    assert again.metrics["passed"]
-    assert again.scenario.warnings() == ()
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,3 @@
-import base64
 import io
 import json
 import re
@@ -8,11 +7,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
-from synthetic import COLUMNS, Expect, Flight, Scenario, rows
+from synthetic import Expect, Flight, Scenario, rows
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.report import render, script_style_and_data, write_report
+from beaver_ftc.results.report import render, write_report
 
 NASTY = "</script><script>throw 1</script> <b>&amp;"
 
@@ -202,26 +201,3 @@ def test_what_damage_takes_is_left_out_from_its_instant_to_its_repair(browser, f
       return n; })()"""
     drawn = [browser.evaluate(count % t) for t in (4.0, 6.0, 9.0, 11.0)]
     assert [drawn[0] - n for n in drawn] == [0, 2, 3, 1]
-
-
-@pytest.mark.parametrize(
-    ("columns", "jet"),
-    [(COLUMNS, False), ((*COLUMNS, "left_spoiler_cmd_rad"), True), ((*COLUMNS, "stabiliser_cmd_rad"), True)],
-)
-def test_a_page_has_each_run_whole_and_at_full_rate_around_its_events(tmp_path, columns, jet):
-    """60 s at 100 Hz, damage at 12 s and a name of a loss at 12.12: closely from 11.5 to 14.12."""
-    flight = Flight(frames=6000, columns=columns, guaranteed_delay_s=None)
-    case = {"actuator": None, "type": "damage", "at_s": 12.0, "end_s": 40.0, "size": {"case": "fin-off"}}
-    run = _folder(tmp_path / "a", flight, more={"faults": [case, {**case, "type": "stuck"}]})
-    (found,) = json.loads(
-        script_style_and_data([run], [json.loads((run / "metrics.json").read_text())], [NASTY])["data"]
-    )["runs"]
-    assert (found["name"], found["jet"], found["window"]) == (NASTY, jet, [11.5, 14.12])
-    assert found["damage"] == [{"part": "fin", "at_s": 12.0, "end_s": 40.0}]
-    whole, near = (np.frombuffer(base64.b64decode(level["t_s"])) for level in found["levels"])
-    assert (whole[0], whole[-1]) == (0.0, pytest.approx(59.99, abs=0.02))
-    assert 2000 < whole.size <= 4800
-    np.testing.assert_allclose(near, np.arange(900, 900 + near.size) / 100)
-    assert near[-1] == pytest.approx(16.62, abs=0.015)
-    airspeed = np.frombuffer(base64.b64decode(found["levels"][1]["airspeed_mps"]), "<f4")
-    np.testing.assert_allclose(airspeed, 45 + 0.5 * np.sin(0.2 * near), rtol=1e-6)

@@ -45,12 +45,3 @@ def test_a_continued_flight_is_the_uninterrupted_one(kind):
     assert same(ended(first).log, ended(sim).log)
     assert first.land().metrics == sim.land().metrics
     assert same(ended(kept.resume()).log, sim.log), "any number of times"
-
-
-def test_clones_go_their_own_ways():
-    sim = bf.Simulation(KINDS["published"])
-    sim.step(frames=140)
-    healthy = sim.clone()
-    healthy.inject({"actuator": "elevator", "type": "stuck", "position_deg": 3})
-    assert not same(ended(healthy).log, ended(sim).log)
-    assert same(sim.log, bf.fly(KINDS["published"]).log), "what was done to the clone changes nothing here"

@@ -1,7 +1,5 @@
 """Signal temporal logic: against rtamt, closed forms, and what is no formula."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -71,12 +69,6 @@ def test_robustness_is_that_of_rtamt(text, frames, seed):
 def test_what_a_ramp_keeps(text, expected):
     columns = {"a": np.arange(5.0), "b": np.array([0.0, 0, 0, 1, 1])}
     assert parse(text).robustness(columns, RATE_HZ) == expected
-
-
-def test_what_is_not_a_number_is_no_verdict():
-    columns = {"a": np.array([1.0, math.nan, 1.0])}
-    assert math.isnan(parse("always(a >= 0)").robustness(columns, RATE_HZ))
-    assert parse("a >= 0").robustness(columns, RATE_HZ) == 1.0
 
 
 NO_FORMULA = [

@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.results import verdict
-from beaver_ftc.results.model import CertificateCounts, ChangeInFlight, DeclaredFault, Metrics
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.verdict import expectations_in_words
 from beaver_ftc.scenario.schema import Expect
 
@@ -56,103 +56,6 @@ def test_every_key_of_expect_is_said_in_words_here():
 DETECTION = {"detected": True, "time_s": 12.5, "delay_s": 0.5, "guaranteed_delay_s": None, "axis": "q"}
 
 
-NAMED = {
-    "isolated": True, "fault": "elevator", "delay_s": 0.25, "correct": True, "type_correct": None,
-    "type": "stuck", "candidates": ["stuck"], "estimate": None, "estimate_deg": None,
-}  # fmt: skip
-FAULTS = [
-    {"actuator": "rudder", "type": "stuck", "at_s": 4.0, "profile": "abrupt", "size": {"position_deg": 9.0}},
-    {
-        "actuator": "elevator",
-        "type": "stuck",
-        "at_s": 4.0,
-        "profile": "abrupt",
-        "size": {"position_deg": 3.0},
-    },
-    {
-        "actuator": "elevator",
-        "type": "loss_of_effectiveness",
-        "at_s": 4.0,
-        "profile": "abrupt",
-        "size": {"magnitude": 0.4},
-    },
-]
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({}, "elevator after 0.25 s; correct, stuck"),
-        ({"delay_s": None, "correct": False}, "elevator; WRONG, stuck"),
-        ({"type_correct": False}, "elevator after 0.25 s; WRONG, stuck"),
-        ({"so_far": False}, "elevator after 0.25 s; correct, stuck"),
-        ({"so_far": True}, "elevator (only remaining candidate) after 0.25 s; correct, stuck"),
-        (
-            {"so_far": True, "delay_s": None, "correct": False},
-            "elevator (only remaining candidate); WRONG, stuck",
-        ),
-        (
-            {"type": None, "candidates": ["stuck", "rate_limit"]},
-            "elevator after 0.25 s; correct, type not determined (2 remain: stuck, rate limit)",
-        ),
-        (
-            {"type": None, "candidates": ["stuck", "rate_limit", "bias"]},
-            "elevator after 0.25 s; correct, type not determined (3 remain: stuck, rate limit, bias)",
-        ),
-        (
-            {"type": None, "candidates": ["stuck", "rate_limit", "bias", "float"]},
-            "elevator after 0.25 s; correct, type not determined (4 remain: stuck, rate limit, bias, float)",
-        ),
-        ({"type": None, "candidates": []}, "elevator after 0.25 s; correct, of no known type"),
-        ({"fault": "sensor q", "type": None}, "sensor q after 0.25 s; correct"),
-        ({"type": "unanticipated"}, "elevator after 0.25 s; correct"),
-        (
-            {"estimate": 0.05, "estimate_deg": 2.9},
-            "elevator after 0.25 s; correct, stuck, estimated 2.9 deg (true 3 deg)",
-        ),
-        (
-            {"type": "loss_of_effectiveness", "estimate": -0.39},
-            "elevator after 0.25 s; correct, loss of effectiveness, estimated loss 39 % (true 40 %)",
-        ),
-    ],
-)
-def test_a_named_fault_in_words(changes, said):
-    named = NAMED | changes
-    faults = [FAULTS[0], *(fault for fault in FAULTS[1:] if fault["type"] == named["type"])]
-    found = {"isolation": named, "faults": faults, "flight": {"flown_s": 30.0, "rate_hz": 100.0}}
-    assert verdict._isolation_text(Metrics.of(found)) == said
-
-
-def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
-    change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
-    assert verdict._change_text(ChangeInFlight.of(change)) == "law adaptive at 6.00 s"
-    assert verdict._change_text(ChangeInFlight.of({**change, "law": None})) == "declared sensors at 6.00 s"
-    found = {"sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None, "false_alarm": False}
-    said = verdict._change_text(ChangeInFlight.of({**change, **found}))
-    assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, not isolated"
-    said = verdict._change_text(
-        ChangeInFlight.of({**change, **found, "isolated": "rudder", "false_alarm": True})
-    )
-    assert said.endswith("the diagnosis before: FALSE ALARM at 2.50 s, rudder")
-
-
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        ({"sensor": "q", "type": "bias", "size": {"magnitude": 3.0}}, ["+3 deg/s"]),
-        ({"sensor": "altitude", "type": "noise", "size": {"magnitude": 12.0}}, ["12 m"]),
-        ({"sensor": "V", "type": "scale", "size": {"magnitude": -0.25}}, ["-25%"]),
-        ({"sensor": "V", "type": "lost", "size": {}}, []),
-    ],
-)
-def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said):
-    declared = DeclaredFault.of(fault | {"at_s": 2.0, "end_s": 5.0})
-    assert verdict._fault_size_texts(declared) == said
-    size = f" ({said[0]})" if said else ""
-    expected = f"sensor {fault['sensor']} {fault['type']}{size} at 2.00 s to 5.00 s"
-    assert verdict._fault_text(declared) == expected
-
-
 def flown(**changes):
     """The metrics of a flight of which little is to be said."""
     nothing = {
@@ -193,19 +96,6 @@ def test_markup_in_a_name_is_no_markup():
     text = verdict.verdict_text(Metrics.of(flown(scenario="[red]x[/red] :smile:")), "runs/[bold]x")
     assert "[red]x[/red] :smile:" in text
     assert "runs/[bold]x" in text
-
-
-@pytest.mark.parametrize(
-    ("statements", "without", "said"),
-    [
-        (0, 0, "nothing to certify: no alarm"),
-        (0, 2, "0 statements, 2 not certified; check: beaver-ftc check runs/x"),
-        (1, 0, "1 statement; check: beaver-ftc check runs/x"),
-        (3, 1, "3 statements, 1 not certified; check: beaver-ftc check runs/x"),
-    ],
-)
-def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, without, said):
-    assert verdict._certificate_text(CertificateCounts(statements, without), "runs/x") == said
 
 
 @pytest.mark.parametrize(

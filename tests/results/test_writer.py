@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -88,17 +87,6 @@ def test_killed_run_leaves_nothing_at_the_final_name_and_the_next_one_cleans_up(
     assert _names(tmp_path) == ["case"]
 
 
-def test_run_in_progress_is_not_taken_for_a_leftover(tmp_path):
-    with result_folder(tmp_path, "case") as folder:
-        (folder / "metrics.json").write_text("slow")
-        other = threading.Thread(target=_result, args=(tmp_path, "quick"))
-        other.start()
-        other.join()
-        assert (folder / "metrics.json").read_text() == "slow"
-    assert (tmp_path / "case" / "metrics.json").read_text() == "slow"
-    assert _names(tmp_path) == ["case"]
-
-
 @pytest.mark.parametrize("stranger", ["thesis.tex", ".git"])
 def test_folder_with_something_else_in_it_is_not_touched(tmp_path, stranger):
     (tmp_path / "case" / stranger).mkdir(parents=True)
@@ -120,10 +108,3 @@ def test_full_disk_is_a_clear_error_and_leaves_nothing(tmp_path, monkeypatch):
         _result(tmp_path / "older", "y")
     assert _names(tmp_path) == ["older"]
     assert (tmp_path / "older" / "case" / "metrics.json").read_text() == "x"
-
-
-def test_result_is_readable_for_whom_the_umask_allows(tmp_path):
-    _result(tmp_path, "x")
-    mask = os.umask(0)
-    os.umask(mask)
-    assert (tmp_path / "case").stat().st_mode & 0o777 == 0o777 & ~mask

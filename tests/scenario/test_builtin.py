@@ -36,11 +36,3 @@ def test_a_case_and_its_nominal_twin_differ_in_the_law_alone(name):
     different = {key for key in case if case[key] != twin[key]}
     assert different <= {"name", "description", "control", "expect"}
     assert twin["control"]["law"] == "nominal"
-
-
-@pytest.mark.parametrize("name", sorted(REQUIRED))
-def test_the_uncertainty_is_the_published_one(name):
-    uncertainty = load_scenario(name).uncertainty
-    assert [abs(theta) for _, theta in uncertainty.inertia_coupling] == [0.25] * 3
-    assert [s.amplitude_rad_s2 for _, s in uncertainty.sinusoid] == [0.02] * 3
-    assert [s.frequency_rad_s for _, s in uncertainty.sinusoid] == [10, 15, 10]

@@ -12,7 +12,6 @@ from beaver_ftc.scenario.schema import load
 from flying import declared_in
 from test_architecture import PRODUCTS, modules, tree
 
-ALL = {"fault_class": "all", "statistical": {}}
 # They make other bounds of those given, and ask nothing of them.
 WRITE = {"beaver_ftc:studies.mismatch.bound", "beaver_ftc:scenario.interventions"}
 DECLARED = "beaver_ftc:scenario.declared"
@@ -34,20 +33,6 @@ def test_nobody_but_declared_reads_the_bounds():
         "beaver_ftc:scenario.pairs: sensors",
     }  # where it is refused
     assert readers <= own
-
-
-@pytest.mark.parametrize(
-    ("keys", "used"),
-    [
-        ({}, True), ({"statistical": None}, False), ({"authority": "worst-case"}, False),
-        ({"fault_class": "published"}, False), ({"scheme": "observer-constant"}, False),
-    ],
-)  # fmt: skip
-def test_who_reads_accelerometers(keys, used):
-    """The Beaver's elevator and flap both pitch it: their lift separates them."""
-    for substeps in (1, 2):
-        scenario = load({"name": "x", "substeps": substeps, "fdi": {**ALL, **keys}})
-        assert Declared.of(scenario).uses_accelerometers is (used and substeps == 1)
 
 
 def test_errors_of_an_instrument_in_si_and_how_far_a_reading_can_be_off():
@@ -92,46 +77,6 @@ def test_each_bound_is_declared_as_what_it_is():
     for alone in ({"turbulence": "light"}, {"sensors": {"q": {"bias_deg_s": 1}}}):
         assert not declared_in(alone).is_noise_free
     assert declared_in({}).is_noise_free
-
-
-@pytest.mark.parametrize(
-    ("given", "changes"),
-    [
-        ({"scheme": "rls-monitor"}, {"weighs_chance": False, "monitors_sensors": False}),
-        ({"statistical": None}, {"weighs_chance": False}),
-        ({"fault_class": "published"}, {"looks_across": False, "monitors_sensors": False}),
-        ({"fault_class": "published", "sensor_monitor": "always"}, {"looks_across": False}),
-        ({"pairs": True}, {"looks_across": False}),
-        ({"authority": "worst-case"}, {"looks_across": False}),
-        ({"authority": "statistical"}, {}),
-        ({"sensor_monitor": "never"}, {"monitors_sensors": False}),
-        ({"sensor_monitor": "auto"}, {}),
-    ],
-)  # fmt: skip
-def test_what_a_diagnosis_takes_part_in(given, changes):
-    fdi = load({"fdi": {**ALL, **given}}).fdi
-    expected = {"weighs_chance": True, "looks_across": True, "monitors_sensors": True} | changes
-    assert fdi.weighs_chance is expected["weighs_chance"]
-    assert fdi.looks_across is expected["looks_across"]
-    assert [fdi.compares_across(substeps) for substeps in (1, 2)] == [expected["looks_across"], False]
-    assert fdi.monitors_sensors is expected["monitors_sensors"]
-    assert fdi.assumes_sound_sensors is (fdi.diagnoses and not expected["monitors_sensors"])
-
-
-def test_another_scheme_keeps_what_is_said_but_the_published_one_is_the_papers():
-    fdi = load({"fdi": {
-        **ALL, "pairs": True, "sensor_monitor": "always", "probing": {}, "authority": "statistical",
-        "forgetting_time_s": 7.0, "thresholds": "interval",
-    }}).fdi  # fmt: skip
-    other = fdi.with_scheme("rls-monitor", {"gain": 2.0})
-    assert other == fdi.model_copy(update={"scheme": "rls-monitor", "options": {"gain": 2.0}})
-    published = fdi.with_scheme("zhang2005", {})
-    said = {"scheme": "zhang2005", "forgetting_time_s": 7.0, "sensor_monitor": "never"}
-    assert published == load({"fdi": said}).fdi
-    assert (published.is_published, published.is_ours, published.diagnoses) == (True, False, True)
-    assert (other.is_published, other.is_ours, other.diagnoses) == (False, False, False)
-    assert set(published.sharpen.model_dump().values()) == {False}
-    assert published.thresholds == "published"
 
 
 LOST = {"type": "loss_of_effectiveness", "magnitude": 0.4}

@@ -6,7 +6,6 @@ from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import (
     TYPES,
     Past,
-    is_share,
 )
 from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import Sensors
@@ -61,52 +60,6 @@ def test_a_quarter_of_a_fault_and_then_the_whole_of_it(kind):
     for share, after in ((0.25, QUARTER.get(kind, AFTER[kind])), (1.0, AFTER[kind])):
         fault(kind, **GIVEN[kind]).strike(found, share, Past(at_rad=0.7))
         assert found == pytest.approx(BEFORE | after)
-
-
-def test_what_is_ideal_and_what_covers_what():
-    gyro = type(Sensors().p).model_validate
-    bounded = gyro({"noise_std_deg_s": 1, "bias_deg_s": -2, "scale_error": -0.1})
-    assert not any(one.is_ideal for one in (bounded, gyro({"delay_s": 0.1})))
-    assert gyro({}).is_ideal
-    assert bounded.is_bounded
-    for key in ("delay_s", "bandwidth_rad_s", "dropout_share"):
-        assert not gyro({key: 0.5}).is_bounded
-    same = gyro({"noise_std_deg_s": 1, "bias_deg_s": 2, "scale_error": 0.1})
-    assert bounded.is_within(same)
-    assert same.is_within(bounded)
-    assert not gyro({"quantum_deg_s": 0.1}).is_within(bounded)
-    assert not gyro({"bias_deg_s": 2.1}).is_within(bounded)
-    assert not Sensors.model_validate({"az": {"delay_s": 0.1}}).is_ideal
-
-
-IN_WORDS = {  # each parameter in words, and an estimate of 0.4567 as a size and as a quantity
-    "loss_of_effectiveness": (
-        {"magnitude": "40 %", "kappa_per_s": "growing at 2.5 /s"}, "-45.7 %", "loss -45.7 %",
-    ),
-    "stuck": ({"position_deg": "45 deg"}, "0.457", "0.457"),
-    "hardover": ({"direction": "to the lower stop"}, "0.457", "0.457"),
-    "float": ({}, "0.457", "0.457"),
-    "bias": ({"bias_deg": "-18 deg", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "rate_limit": ({"scale": "20 % of its rate", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "oscillatory": (
-        {"amplitude_deg": "36 deg", "frequency_rad_s": "5 rad/s", "kappa_per_s": "growing at 2.5 /s"},
-        "0.457", "0.457",
-    ),
-    "unanticipated": ({"Cm_alpha3": "Cm_alpha3 8", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "damage": ({"case": "tail off"}, "0.457", "0.457"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", TYPES)
-def test_a_fault_and_its_estimate_in_words(kind):
-    row, (words, size, quantity) = TYPES[kind], IN_WORDS[kind]
-    given = {**GIVEN[kind], "kappa_per_s": 2.5}
-    assert {key: says(given[key]) for key, says in row.in_words.items()} == words
-    assert (row.size_in_words(0.4567), row.estimate_in_words(0.4567)) == (size, quantity)
-    assert is_share(kind) == (kind == "loss_of_effectiveness")
-    assert TYPES["hardover"].in_words["direction"](1) == "to the upper stop"
-    assert TYPES["bias"].in_words["bias_deg"](3.0) == "+3 deg"
-    assert not is_share(None)
 
 
 G = 9.80665

@@ -30,17 +30,6 @@ def test_a_fault_begins_now_and_its_mistakes_are_named_by_its_own_keys():
     )
 
 
-def test_changes_at_one_instant_are_one_and_stand_in_order():
-    law = done.with_change(load({}), {"law": "nominal"}, 4.0)
-    both = done.with_change(law, {"scheme": "none"}, 4.0)
-    (change,) = both.changes
-    assert (change.at_s, change.law, change.scheme, change.sensors) == (4.0, "nominal", "none", None)
-    assert done.with_change(both, {"law": "oracle"}, 4.0).changes[0].law == "oracle"
-    earlier = done.with_change(both, {"sensors": "tactical-grade"}, 2.0)
-    assert [(each.at_s, each.law) for each in earlier.changes] == [(2.0, None), (4.0, "nominal")]
-    assert said(done.with_change, both, {}, 5.0).startswith("(file): says no change")
-
-
 def test_targets_replace_what_was_to_come_on_their_channels():
     legs = [{"at_s": 0, "value": 1000}, {"at_s": 5, "value": 1100}, {"at_s": 9, "value": 1200}]
     given = load({"autopilot": {"altitude_m": legs, "bank_deg": [{"hold": True}]}})

@@ -48,11 +48,3 @@ def test_a_mistake_is_one_line(fault, says):
 @pytest.mark.parametrize(("said", "meant"), [("airspeed", "V"), ("dynamic_pressure", "qdyn")])
 def test_an_instrument_may_be_called_in_words(said, meant):
     assert load(faulty(sensor=said)) == load(faulty(sensor=meant))
-
-
-def test_the_same_type_is_another_fault_on_a_surface():
-    both = faulty()
-    both["faults"].append({"actuator": "flap", "type": "bias", "bias_deg": 2, "at_s": 3})
-    sensor, surface = load(both).faults
-    assert (sensor.sensor, surface.actuator) == ("p", "flap")
-    assert load(load(both).model_dump(mode="json", exclude_none=True)).faults == (sensor, surface)

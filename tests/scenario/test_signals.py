@@ -5,7 +5,6 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario import signals
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import sample
 
@@ -85,39 +84,3 @@ def test_a_table_is_straight_lines_held_outside(tmp_path):
     reference = load_text(text, folder=tmp_path).reference
     values = np.degrees(sample(reference, np.array([0.0, 1.0, 1.5, 2.0, 3.5, 9.0]))[:, 1])
     assert values == pytest.approx([0, 0, 1, 2, 4, 4])
-
-
-# What a signal is of at an instant off its edge by less than a rounding, or by more; phases of half a turn.
-EDGES = {
-    "step": (
-        signals.Step(start_s=1.0, end_s=2.0, amplitude_deg_s=4.0),
-        [1 - 1.5e-9, 1 - 0.5e-9, 2 - 1.5e-9, 2 - 0.5e-9], [0, 4, 4, 0],
-    ),
-    "doublet": (
-        signals.Doublet(start_s=1.0, amplitude_deg_s=4.0),
-        [1 - 1.5e-9, 1 - 0.5e-9, 2 - 0.5e-9, 3 - 1.5e-9, 3 - 0.5e-9], [0, 4, -4, -4, 0],
-    ),
-    "square": (
-        signals.Square(start_s=1.0, amplitude_deg_s=4.0, frequency_hz=0.5, phase_deg=180.0),
-        [1 - 1.5e-9, 1.0, 2 - 1.5e-9, 2 - 0.5e-9, 2.0], [0, -4, -4, 4, 4],
-    ),
-    "square that begins half way": (
-        signals.Square(amplitude_deg_s=4.0, frequency_hz=0.5, phase_deg=180.0), [-1e-9, 0.0], [-4, -4],
-    ),
-    "sine": (
-        signals.Sine(start_s=1.0, end_s=3.0, amplitude_deg_s=2.0, frequency_hz=0.25, phase_deg=30.0),
-        [0.9, 1.0, 5 / 3, 3.0], [0, 1, 2, 0],
-    ),
-    "chirp": (
-        signals.Chirp(
-            start_s=1.0, end_s=3.0, amplitude_deg_s=2.0, start_frequency_hz=0.25, end_frequency_hz=0.5
-        ),
-        [0.9, 2.0, 3.0], [0, 2 * np.sin(2 * pi * (0.25 + 0.0625)), 0],
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", EDGES)
-def test_edges_lie_within_a_rounding_of_their_instant(case):
-    signal, at_s, values = EDGES[case]
-    assert signal.rate_deg_s(np.array(at_s)) == pytest.approx(values, abs=1e-6)

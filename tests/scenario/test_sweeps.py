@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.sweeps import SweepFile, Variation, load_sweep_text
+from beaver_ftc.scenario.sweeps import SweepFile, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\n"
 LONG = "n" * 120
@@ -52,22 +52,6 @@ def test_what_mistakes_are_called(changed):
             load_sweep_text(text, "s.yaml")
         found[case] = [line[:200] for line in caught.value.lines]
     assert not changed(found)
-
-
-@pytest.mark.parametrize(
-    ("how", "kind", "count", "probes"),
-    [
-        ({"uniform": (3, 5)}, "uniform", None, (3, 5)),
-        ({"loguniform": (3, 5)}, "loguniform", None, (3, 5)),
-        ({"normal": (3, 5)}, "normal", None, (3,)),
-        ({"normal": (3, 5), "within": (1, 9)}, "normal", None, (3, 1, 9)),
-        ({"linspace": (3, 5, 7)}, "linspace", 7, (3, 5)),
-        ({"choice": (3, 5, "x")}, "choice", 3, (3, 5, "x")),
-    ],
-)
-def test_kinds_of_variation(how, kind, count, probes):
-    made = Variation.model_validate(how)
-    assert (made.kind, made.count, made.probes()) == (kind, count, probes)
 
 
 @pytest.mark.parametrize(

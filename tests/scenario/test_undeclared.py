@@ -1,12 +1,8 @@
 """What the truth does and the diagnosis was not told is said, one line each."""
 
-from pathlib import Path
-
 import pytest
 
-from beaver_ftc.documents.document import Document
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.schema import Scenario, load_text, validate_scenario
+from beaver_ftc.scenario.schema import Scenario, load_text
 
 TOLD = """
 fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}
@@ -102,27 +98,3 @@ def test_all_that_is_undeclared_is_said_where_there_is_a_diagnosis(keys, says):
     assert [line[: len(start)] for line, start in zip(said, says, strict=True)] == says
     silent = {**keys, "fdi": {**keys.get("fdi", {}), "scheme": "none"}}
     assert Scenario.model_validate({"name": "x", **silent}).warnings() == ()
-
-
-ALL = {"fault_class": "all", "statistical": {}}
-TRAINER = {"name": "x", "aircraft": "./trainer", "fdi": ALL}
-FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
-
-
-def of_trainer(**keys):
-    """A flight of an aircraft whose forces separate no surfaces: accelerometers have no part in it."""
-    return validate_scenario(Document({**TRAINER, **keys}), folder=FOLDER)
-
-
-def test_a_mass_that_nothing_reads_takes_no_guarantee_away():
-    """The designer has the right inertia and another mass, which only accelerometers would show."""
-    kept = {"mass": 0.9, "inertia": dict.fromkeys(("Ix", "Iy", "Iz", "Jxz"), 1 / 0.9)}
-    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.9, "at_s": 1.0}
-    given = {
-        "duration_s": 4.0, "faults": [fault], "initial": {"airspeed_mps": 30},
-        "reference": {"q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}]},
-    }  # fmt: skip
-    light, right = fly(of_trainer(**given, design_model=kept)), fly(of_trainer(**given))
-    assert right.guaranteed_delay_s is not None
-    assert light.guaranteed_delay_s == pytest.approx(right.guaranteed_delay_s)
-    assert light.detection_time_s == pytest.approx(right.detection_time_s)

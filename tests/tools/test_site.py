@@ -104,19 +104,6 @@ def test_search_works_from_disk(opened):
 
 
 @needs_browser
-@pytest.mark.parametrize("viewport", [PHONE, DESK], ids=["phone", "desk"])
-def test_equations_are_set(opened, viewport):
-    page = opened("explanation/detection.html", viewport)
-    page.wait_for_function("MathJax.startup?.promise.then(() => true)")
-    assert page.locator("mjx-container").count() == page.locator(".arithmatex").count() > 20
-    assert page.locator("[data-mml-node=merror]").count() == 0
-    sizes = page.evaluate(
-        "[...document.querySelectorAll('mjx-container > svg')].map((s) => s.getBoundingClientRect().width)"
-    )
-    assert min(sizes) > 2
-
-
-@needs_browser
 @pytest.mark.parametrize(
     "name",
     [

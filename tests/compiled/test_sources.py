@@ -160,8 +160,6 @@ def test_all_that_kernels_of_the_package_name_is_followed(monkeypatch):
 
     monkeypatch.setattr(cache, "_value", noted)
     for module in walk_packages(beaver_ftc.__path__, "beaver_ftc."):
-        if module.name.startswith("beaver_ftc.integrations"):  # former places of products
-            continue
         for made in vars(import_module(module.name)).values():
             if isinstance(made, target.Kernel) and made.py_func.__module__ == module.name:
                 kernels += 1

@@ -1,73 +1,12 @@
 """How far a command has come, and what becomes of what goes wrong: line by line."""
 
-import io
 import sys
-from collections import Counter
 
 import pytest
 
 from beaver_ftc import cli
 from beaver_ftc.cli import sweep
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-
-
-class Terminal(io.StringIO):
-    def __init__(self, is_one):
-        super().__init__()
-        self.isatty = lambda: is_one
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """The time, to be set."""
-    now = {"s": 100.0}
-    monkeypatch.setattr(cli.time, "monotonic", lambda: now["s"])
-    return now
-
-
-def counts(done, **more):
-    return Counter({"done": done, "total": 1000, **more})
-
-
-@pytest.mark.parametrize(
-    ("terminal", "step_s", "shown"),
-    [
-        (False, 15.0, "one: 20 of 1000 flights, 0.67/s, 25 min left\n"
-         "one: 40 of 1000 flights, 0.67/s, 24 min left\n"),
-        (True, 0.1, "\rone: 20 of 1000 flights, 100/s, 10 s left\rone: 40 of 1000 flights, 100/s, 10 s left\r"
-         + " " * 41 + "\r"),
-    ],
-)  # fmt: skip
-def test_a_line_of_a_sweep_now_and_then(monkeypatch, clock, terminal, step_s, shown):
-    monkeypatch.setattr(sys, "stderr", Terminal(terminal))
-    with cli.live_progress("one") as show:
-        for i in range(5):
-            show(counts(10 * i))
-            clock["s"] += 1.0001 * step_s
-    assert sys.stderr.getvalue() == shown
-
-
-@pytest.mark.parametrize(
-    ("error", "says", "status"),
-    [
-        (BadInput("a\nb"), "a\nb", 2),
-        (SimulationFailed("c"), "c", 3),
-        (BeaverFtcError("d"), "d", 3),
-        (MemoryError("so  much\n"), "there is not enough memory for this: so much", 3),
-        (MemoryError(), "there is not enough memory for this", 3),
-        (KeyError("k"), "unexpected KeyError: 'k' (BEAVER_FTC_DEBUG=1 shows where)", 3),
-    ],
-)
-def test_an_error_is_a_line_and_a_status(monkeypatch, capsys, error, says, status):
-    monkeypatch.setenv("BEAVER_FTC_DEBUG", "")
-    failure = cli.failure_of(error)
-    assert (failure is error) == isinstance(error, BeaverFtcError)
-    assert failure.__cause__ is (None if failure is error else error)
-    assert cli.report(failure) == status
-    assert capsys.readouterr() == ("", f"{says}\n")
-    monkeypatch.setenv("BEAVER_FTC_DEBUG", "1")
-    assert cli.report(failure) == status
-    assert type(error).__name__ in capsys.readouterr().err
+from beaver_ftc.documents.errors import BadInput
 
 
 def test_scenarios_are_told_all_their_mistakes_at_once(tmp_path):

@@ -2,11 +2,8 @@
 
 import errno
 import signal
-from dataclasses import dataclass
-from typing import Annotated
 
 import pytest
-import typer
 
 import needs
 from beaver_ftc.cli import failure_of
@@ -64,24 +61,3 @@ def test_an_error_ends_with_the_status_of_its_kind(monkeypatch, as_started, caps
 def test_what_a_result_folder_may_hold(changed):
     """All names that commands declare: a folder that holds another is not replaced."""
     assert not changed(sorted({*files_of_commands()} | FILES_OF_A_RUN))
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked."""
-
-    name: str
-    size_m: Annotated[float, typer.Option(min=1, help="kept")] = 2.0
-    is_new: bool = False
-
-
-def command(wanted: Wanted) -> None:
-    """Do it.
-
-    With care.
-
-    name: What it
-        is called.
-    is_new: Not yet: there.
-    """
-    raise BadInput(f"{wanted}")

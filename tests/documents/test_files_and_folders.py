@@ -5,7 +5,6 @@ import os
 import pytest
 
 from beaver_ftc.documents import files
-from beaver_ftc.documents.document import scalar
 from beaver_ftc.documents.files import UnreadableError, put_folder, read_bytes, read_text
 from beaver_ftc.documents.validation import parse_key, with_values
 
@@ -123,28 +122,6 @@ def test_a_value_is_put_in_its_place(key, value):
     before = str(DATA)
     assert with_values(DATA, {parse_key(key): 9}) == {**DATA, **value}
     assert str(DATA) == before
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("1" * 400, int("1" * 400)),
-        ("1" * 401, "1" * 401),
-        ("-0", 0),
-        ("00", "00"),
-        ("+1_0", 10),
-        ("0.5e-1", 0.05),
-        ("1e", "1e"),
-        (".inf", float("inf")),
-        ("+.INF", float("inf")),
-        ("-.Inf", float("-inf")),
-        ("On", True),
-        ("NO", False),
-    ],
-)
-def test_scalars_at_their_bounds(text, value):
-    assert scalar(text) == value
-    assert type(scalar(text)) is type(value)
 
 
 def test_code_that_another_user_can_write_is_not_read(tmp_path):

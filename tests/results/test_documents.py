@@ -1,7 +1,6 @@
 """All that is written of flights made by hand: metrics, recordings, the data of a report, JUnit, words."""
 
 import base64
-import json
 import math
 from types import SimpleNamespace
 
@@ -11,15 +10,12 @@ from synthetic import Expect, Fault, Flight, Scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import verdict
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import as_json, measure, metrics
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Expectation, Judged, Metrics
-from beaver_ftc.results.report import render
-from beaver_ftc.results.style import MODE_COLOURS
-from kept import in_short
 
 SENSOR = SimpleNamespace(
     sensor="q", type="bias", at_s=5.0, end_s=None, profile="abrupt",
@@ -124,74 +120,6 @@ def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
     content = (tmp_path / RECORDING_FILE_OF_KIND[kind]).read_bytes()
     said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
     assert not changed({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
-
-
-@pytest.mark.parametrize(
-    ("hz", "frames", "every"),
-    [(25.0, 6, 1), (26.0, 6, 2), (100.0, 9, 4), (75.0, 12, 3), (10.0, 3, 1), (50.0, 1, 1)],
-)
-def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, every):
-    path = _written(tmp_path / "log.parquet", frames, hz)
-    write_acmi(path, measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
-    lines = (tmp_path / "flight.acmi").read_text().splitlines()
-    shown = [line for line in lines if line.startswith("#")]
-    assert shown == [f"#{i / hz:.3f}" for i in range(0, frames, every)]
-
-
-def _folder(path, flight, group=1000):
-    path.mkdir()
-    columns = [
-        name for name in flight.columns if not name.startswith(("fie_rudder", "fie_aileron", "aileron"))
-    ]
-    t_s = np.arange(flight.frames) / flight.scenario.rate_hz
-    with ParquetLog(path / "log.parquet", group) as log:
-        log.open(columns)
-        log.write(np.column_stack([t_s, *(np.sin(t_s + i) for i in range(1, len(columns)))]))
-    (path / "metrics.json").write_text(as_json(metrics(flight)))
-    (path / "scenario.yaml").write_text("description: By hand.\n")
-    return path
-
-
-def _unpacked(data):
-    """The data of a page, its curves in short."""
-    for run in data["runs"]:
-        for level in run["levels"]:
-            for name, text in level.items():
-                kind = "<f8" if name == "t_s" else "<f4"
-                numbers = np.frombuffer(base64.b64decode(text), kind)
-                level[name] = [float(f"{n:.4g}") for n in in_short(numbers)]
-            level_names = ["t_s", "q_rad_s", "mode", "psi_rad", "q_ratio"]
-            level.update({"columns": sorted(level), **{name: level[name] for name in level_names}})
-            for name in set(level) - {*level_names, "columns"}:
-                del level[name]
-    return data
-
-
-def _data_of(html):
-    return json.loads(html.partition('id="data">')[2].partition("</script>")[0])
-
-
-@pytest.fixture(scope="module")
-def folders(tmp_path_factory):
-    runs = tmp_path_factory.mktemp("runs")
-    short = Flight(scenario=Scenario(rate_hz=10.0), frames=200)
-    none = Flight(scenario=Scenario(rate_hz=10.0, faults=()), frames=0, detection_time_s=None,
-                  isolation_time_s=None, isolated=None)  # fmt: skip
-    return [_folder(runs / "short", short), _folder(runs / "none", none)]
-
-
-def test_the_data_of_a_report(folders, changed):
-    data = _unpacked(_data_of(render(folders, ["one", "two"])))
-    assert data["modes"] == [list(pair) for pair in MODE_COLOURS.items()]
-    assert not changed(data["runs"], part="runs")
-    views = [view | {"panels": view["panels"][:2]} for view in data["views"] if view["name"] != "states"]
-    assert not changed({"views": views, "looks": sorted(data["looks"])}, part="views")
-
-
-def test_the_page_of_a_report(folders, changed):
-    html = render(folders)
-    words = html.partition("</style>")[2].partition('<script type="application/json"')[0]
-    assert not changed([line.strip() for line in words.splitlines() if line.strip() and "jsbsim" not in line])
 
 
 MISSED = (

@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.results.metrics import evaluate
-from beaver_ftc.results.model import Expectation, Metrics
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Expect
 
 METRICS = {
@@ -42,25 +42,6 @@ def _found(name, expected, metrics):
 )
 def test_a_rule(name, expected, actual, met):
     assert _found(name, expected, METRICS) == (actual, met)
-
-
-@pytest.mark.parametrize(
-    ("part", "expected", "actual", "met"),
-    [
-        ("altitude_m", 12.0, -12.0, True),
-        ("altitude_m", 11.9, -12.0, False),
-        ("heading_deg", 5.0, 4.0, True),
-        ("airspeed_mps", 3.0, None, False),
-        ("in_envelope", True, False, False),
-        ("in_envelope", False, False, True),
-    ],
-)
-def test_where_a_flight_has_come_to(part, expected, actual, met):
-    arrival = {"altitude_m": -12.0, "airspeed_mps": None, "heading_deg": 4.0, "in_envelope": False}
-    expect = Expect.model_validate({"arrives": {part: expected}})
-    found = Expectation(f"arrives.{part}", met, expected, actual)
-    assert evaluate(expect, Metrics.of({"arrival": arrival})) == [found]
-    assert not evaluate(expect, Metrics.of({"arrival": None}))[0].passed
 
 
 EARLY = {

@@ -1,8 +1,6 @@
 """What lies on the disk: logs whole, sliced, damaged or too large; result folders, exchanged and refused."""
 
-import os
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,22 +13,6 @@ from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.writer import refuse_foreign, result_folder
 from beaver_ftc.scenario.schema import Scenario
-
-
-def _open_files():
-    return set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").exists() else set()
-
-
-def test_a_folder_is_locked_once(tmp_path, monkeypatch):
-    before = _open_files()
-    with writer._locked(tmp_path) as first, writer._locked(tmp_path) as second:
-        assert (first, second) == (True, False)
-    with writer._locked(tmp_path) as again:
-        assert again is True
-    monkeypatch.setattr(writer, "fcntl", None)
-    with writer._locked(tmp_path) as locked:
-        assert locked is False
-    assert _open_files() == before
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.results import model
 from beaver_ftc.results.writer import run
 from flying import loss, scenario
 
@@ -93,21 +92,6 @@ class TestPlugIns:
 
 def files(folder: Path):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-
-
-def test_the_document_of_a_flight_is_its_records_and_back(flight):
-    """Also of the keys that are there only where there is something to say."""
-    again = model.Metrics.of(flight.metrics)
-    assert again.document() == flight.metrics
-    assert list(again.document()) == list(flight.metrics)
-    changed = {"time_s": 1.0, "law": None, "scheme": None, "sensors": True}
-    ended = {**changed, "detection_time_s": None, "isolated": None}
-    alarmed = {**changed, "detection_time_s": 0.5, "isolated": None, "false_alarm": True}
-    for document in (changed, ended, alarmed):
-        assert model.ChangeInFlight.of(document).document() == document
-    sensor = {"actuator": None, "sensor": "q", "type": "bias", "at_s": 1.0}
-    assert model.Fault.of(sensor).document() == sensor
-    assert list(model.Fault.of(sensor).document()) == list(sensor)
 
 
 DAMAGED = (

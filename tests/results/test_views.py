@@ -14,7 +14,6 @@ from beaver_ftc.results.views import (
     estimators,
     series_of,
     surfaces,
-    surfaces_by_kind,
     views,
 )
 
@@ -70,39 +69,6 @@ def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it
 
 
 T_S = np.arange(0.0, 20.0, 0.5)
-
-
-MANY = (
-    *(f"{side}_{place}_{kind}" for kind in ("elevator", "flap") for side in ("left", "right")
-      for place in ("inboard", "outboard")), "rudder_0", "rudder_1", "aileron_left", "stabiliser",
-)  # fmt: skip
-
-
-def test_of_more_than_eight_surfaces_those_of_a_kind_share_a_panel_and_none_is_left_out():
-    what = (
-        "effectiveness_estimate",
-        "effectiveness_used",
-        "cmd_rad",
-        "effective_rad",
-        "loss_likelihood_share",
-    )
-    columns = [f"{name}_{each}" for name in MANY for each in what]
-    known = {view.name: view for view in views([*columns, *(f"{a}_step_likelihood_share" for a in "pqr")])}
-    assert list(surfaces_by_kind(MANY)) == ["elevator", "flap", "rudder", "aileron", "stabiliser"]
-    labels = [panel.label for panel in known["surfaces"].panels]
-    assert labels[::2] == [f"{kind}: commanded" for kind in surfaces_by_kind(MANY)]
-    where = [("surfaces", "cmd_rad"), ("surfaces", "effective_rad"), ("likelihood", "loss_likelihood_share")]
-    for name, ending in (*where, *(("effectiveness", each) for each in what[:2])):
-        shown = [t.column for panel in known[name].panels for t in panel.traces if t.column.endswith(ending)]
-        assert sorted(shown) == sorted(f"{surface}_{ending}" for surface in MANY)
-    for panel in known["surfaces"].panels:
-        assert (
-            len({trace.role for trace in panel.traces})
-            == len({t.label for t in panel.traces})
-            == len(panel.traces)
-        )
-    elevator = known["surfaces"].panels[0]
-    assert elevator.traces[0].label == "left inboard"
 
 
 @pytest.mark.parametrize("ratio", [0.0, -3.0])

@@ -5,8 +5,6 @@ import ast
 import numpy as np
 import pytest
 
-from beaver_ftc.design import Dryden
-from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Bounds, of_several
 from beaver_ftc.scenario.schema import load
 from flying import declared_in
@@ -52,31 +50,6 @@ def test_errors_of_an_instrument_in_si_and_how_far_a_reading_can_be_off():
     truth = load({"sensors": {"beta": of, "p": {"bias_deg_s": 0.1}, "V": {"noise_std_mps": 3.1}}}).sensors
     assert declared.exceeded_by(truth) == ["p", "V"]
     assert declared.exceeded_by(load({"sensors": {"beta": {"bias_deg": 1.9}}}).sensors) == []
-
-
-def test_each_bound_is_declared_as_what_it_is():
-    """All of them different; an angle in radians."""
-    given = {
-        "inertia_coupling": {"p": 0.11, "q": 0.12, "r": 0.13}, "coefficients": 0.05, "inertia": 0.06,
-        "constant_rad_s2": {"p": 0.21, "q": 0.22, "r": 0.23}, "deflection_deg": 9.0, "turbulence": "moderate",
-        "vertical_wind_mps": 4.0, "sensors": {"q": {"bias_deg_s": 18.0}},
-    }  # fmt: skip
-    fdi = {"bounds": given, "fault_class": "all", "statistical": {}}
-    for substeps, compares in ((1, True), (2, False)):
-        declared = Declared.of(load({"fdi": fdi, "substeps": substeps}))
-        assert declared.air == Dryden("moderate")
-        assert declared.sensors["q"].steady == pytest.approx(np.radians(18.0))
-        assert declared.coefficients.share == 0.05
-        assert declared.deflection_rad == pytest.approx(np.radians(9.0))
-        assert (declared.inertia, declared.vertical_wind_mps) == (0.06, 4.0)
-        assert declared.coupling == (0.11, 0.12, 0.13)
-        assert declared.constant_rad_s2 == (0.21, 0.22, 0.23)
-        assert declared.uses_statistics
-        assert (declared.compares_across, declared.monitors_sensors) == (compares, True)
-        assert not declared.is_noise_free
-    for alone in ({"turbulence": "light"}, {"sensors": {"q": {"bias_deg_s": 1}}}):
-        assert not declared_in(alone).is_noise_free
-    assert declared_in({}).is_noise_free
 
 
 LOST = {"type": "loss_of_effectiveness", "magnitude": 0.4}

@@ -1,66 +1,13 @@
 """What a scenario may say, its defaults, and what it carries to the flight."""
 
-import pickle
-
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario, load_text
-
-CONTRACT = """
-name: elevator-partial-loss          # letters, digits, - and _
-description: 40 % loss of elevator effectiveness at 12 s, as published.
-aircraft: beaver
-duration_s: 30
-rate_hz: 100                         # frame rate of FDI and control
-substeps: 1                          # JSBSim frames per such frame
-seed: 1
-initial: {airspeed_mps: 45, altitude_m: 1828.8, engine_rpm: 1800, manifold_pressure_inhg: 20, flap_deg: 0}
-reference:                           # rad/s loops; amplitudes in deg/s; a missing axis is 0
-  p: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.25}}]       # a list is summed
-  q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]
-  r: [{doublet: {amplitude_deg_s: 2, start_s: 5, width_s: 2}}] # also step, square, ramp, chirp, csv
-faults:
-  - {actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 12, profile: abrupt}
-uncertainty:
-  inertia_coupling: {p: 0.25, q: -0.25, r: 0.25}
-  sinusoid: {p: {amplitude_rad_s2: 0.02, frequency_rad_s: 10}, q: {amplitude_rad_s2: 0.02, frequency_rad_s: 15}, r: {amplitude_rad_s2: 0.02, frequency_rad_s: 10}}
-  coefficients: {Cm_alpha: 1.05}     # truth / design ratio
-actuators: ideal                     # or {bandwidth_rad_s: 20, rate_limit_deg_s: 60} or per surface
-sensors: ideal                       # or standard deviations, biases, delay per signal
-environment: {turbulence: none}      # or {turbulence: dryden, severity: light|moderate|severe}, wind_mps: [n, e, d]
-fdi: {scheme: adaptive-estimators}   # gains and bounds, all with defaults; scheme names a registered detector
-control: {law: fault-tolerant}       # nominal | adaptive | fault-tolerant | oracle, or a registered law
-expect:                              # what CI asserts; each is optional
-  detected_within_s: 0.5
-  isolated_as: elevator
-  isolated_within_s: 1.0
-  no_false_alarm: true
-  no_departure: true
-  post_fault_rms_deg_s: {q: 1.0}
-"""  # noqa: E501
 
 
 def scenario(text: str = "") -> Scenario:
     return load_text("name: x\n" + text)
-
-
-def test_the_contract_s_example_loads():
-    example = load_text(CONTRACT)
-    assert example.initial.altitude_m == 1828.8
-    assert example.faults == (
-        LossOfEffectiveness(type="loss_of_effectiveness", actuator="elevator", magnitude=0.4, at_s=12.0),
-    )
-    assert example.uncertainty.coefficients == {"Cm_alpha": 1.05}
-    assert example.expect.post_fault_rms_deg_s.model_dump(exclude_none=True) == {"q": 1.0}
-    (line,) = example.warnings()  # it declares nothing of the coefficient it has wrong
-    assert line.startswith("uncertainty.coefficients.Cm_alpha: 1.05 is beyond")
-
-
-def test_a_scenario_crosses_a_process_boundary():
-    example = load_text(CONTRACT)
-    assert pickle.loads(pickle.dumps(example)) == example
 
 
 @pytest.mark.parametrize(

@@ -75,3 +75,12 @@ GONE += [{"fault": "rudder", "from_s": 4.0, "to_s": 4.5}]
 def test_why_the_diagnosis_does_not_do_what_was_expected(name, expected, metrics, met, reason):
     (found,) = evaluate(Expect.model_validate({name: expected}), Metrics.of(metrics))
     assert (found.passed, found.reason) == (met, reason)
+
+
+@pytest.mark.parametrize(
+    ("off_m", "met"), [(12.0, True), (-12.0, True), (12.1, False), (-12.1, False), (None, False)]
+)
+def test_an_arrival_is_as_near_on_either_side(off_m, met):
+    expect = Expect.model_validate({"arrives": {"altitude_m": 12.0}})
+    (found,) = evaluate(expect, Metrics.of({"arrival": {"altitude_m": off_m}}))
+    assert (found.name, found.passed) == ("arrives.altitude_m", met)

@@ -5,7 +5,7 @@ import ast
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.diagnosis import Bounds, of_several
+from beaver_ftc.scenario.diagnosis import Bounds, failing, of_several
 from beaver_ftc.scenario.schema import load
 from flying import declared_in
 from test_architecture import PRODUCTS, modules, tree
@@ -75,3 +75,10 @@ def test_surfaces_fail_at_once_where_their_faults_overlap(spans, at_once):
     assert of_several(of_two(*spans)) == (
         f"{TWO}; set fdi: {{fault_class: all, pairs: true}}" if at_once else ""
     )
+
+
+def test_surfaces_fail_when_their_first_fault_comes():
+    broken = of_two(("flap", 5, None), ("rudder", 7, 8), ("flap", 3, 4), ("rudder", 9, None))
+    assert failing(broken) == {"flap": 3.0, "rudder": 7.0}
+    instrument = {"sensor": "p", "type": "freeze", "at_s": 1}
+    assert failing(load({"faults": [instrument, {**LOST, "actuator": "flap", "at_s": 2}]})) == {"flap": 2.0}

@@ -84,3 +84,8 @@ def test_a_table_is_straight_lines_held_outside(tmp_path):
     reference = load_text(text, folder=tmp_path).reference
     values = np.degrees(sample(reference, np.array([0.0, 1.0, 1.5, 2.0, 3.5, 9.0]))[:, 1])
     assert values == pytest.approx([0, 0, 1, 2, 4, 4])
+
+
+def test_a_phase_of_90_deg_is_a_cosine():
+    wave = q_deg_s("{sine: {amplitude_deg_s: 2, frequency_hz: 0.3, phase_deg: 90}}")
+    assert wave == pytest.approx(2 * np.cos(2 * pi * 0.3 * FRAMES), abs=1e-12)

@@ -78,9 +78,10 @@ def test_json_of_several_scenarios_is_a_list_with_one_verdict(short):
     assert [run["passed"] for run in document["runs"]] == [True, False]
 
 
-def test_missed_expectation_is_status_1(short):
+@pytest.mark.parametrize("order", [("short", "strict"), ("strict", "short")])
+def test_missed_expectation_is_status_1(short, order):
     (short / "strict.yaml").write_text(SHORT.replace("short", "strict").replace("1.0", "0.0"))
-    done = beaver("run", "short.yaml", "strict.yaml", "--no-report", cwd=short)
+    done = beaver("run", *(f"{name}.yaml" for name in order), "--no-report", cwd=short)
     assert done.returncode == 1
     assert "short: PASSED" in done.stdout
     assert "strict: FAILED" in done.stdout

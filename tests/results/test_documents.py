@@ -1,19 +1,15 @@
 """All that is written of flights made by hand: metrics, recordings, the data of a report, JUnit, words."""
 
-import base64
 import math
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from synthetic import Expect, Fault, Flight, Scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import verdict
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
-from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Expectation, Judged, Metrics
 
@@ -91,35 +87,6 @@ def test_the_words_of_a_flight(name, changed):
         "outcome_class": verdict.outcome_class(Metrics.of(opened.metrics)),
         "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
     })  # fmt: skip
-
-
-FRAMES, HZ = 6, 50.0
-ANGLES, ROOM = (
-    ("phi_rad", "theta_rad", "psi_rad", "alpha_rad", "beta_rad"),
-    ("north_m", "east_m", "altitude_m"),
-)
-TRAVEL_RAD = {"elevator": 0.4, "flap": 1.0}
-LOGGED = (
-    "t_s", *ROOM, *ANGLES, "airspeed_mps", "qdyn_pa", "flap_pos_rad", *(f"{a}_measured_rad_s" for a in "pqr"),
-    *(f"{s}_cmd_rad" for s in TRAVEL_RAD),
-)  # fmt: skip
-
-
-def _written(path, frames=FRAMES, hz=HZ, group=4):
-    rows = np.outer(np.arange(frames), np.linspace(0.01, 0.2, len(LOGGED))) + np.arange(len(LOGGED)) / 100
-    rows[:, 0] = np.arange(frames) / hz
-    with ParquetLog(path, group) as log:
-        log.open(LOGGED)
-        log.write(rows)
-    return path
-
-
-@pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)
-def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
-    write_recording(_written(tmp_path / "log.parquet"), TRAVEL_RAD, kind, tmp_path)
-    content = (tmp_path / RECORDING_FILE_OF_KIND[kind]).read_bytes()
-    said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
-    assert not changed({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
 
 
 MISSED = (

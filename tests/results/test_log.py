@@ -2,8 +2,11 @@ import contextlib
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import ParquetLog, read, row_count
 
 COLUMNS = ("t_s", "q_rad_s", "residual_rad_s")
@@ -42,3 +45,14 @@ def test_log_that_failed_is_not_mistaken_for_a_whole_one(tmp_path):
         log.write(np.ones((12, 3)))
         raise RuntimeError
     assert row_count(path) == 8
+
+
+@pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
+def test_a_row_group_of_a_million_rows_at_most_is_read(tmp_path, rows, allowed):
+    table = pa.table({"t_s": pa.array(np.zeros(rows))})
+    parquet.write_table(table, tmp_path / "log.parquet", row_group_size=rows)
+    if allowed:
+        assert row_count(tmp_path / "log.parquet") == rows
+        return
+    with pytest.raises(BadInput, match=r"has 1,000,001 rows in a row group, allowed: up to 1,000,000"):
+        row_count(tmp_path / "log.parquet")

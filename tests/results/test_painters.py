@@ -11,17 +11,16 @@ import pytest
 
 from beaver_ftc.results import painters as module
 from beaver_ftc.results.figures import pictures_of, save
-from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.painters import drawing, painters
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux")
 
 
 @pytest.fixture
-def pictures(log_path, flight, tmp_path, monkeypatch):
+def pictures(log_path, found, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_can_fork", lambda: True)  # whatever threads other tests have left
     (tmp_path / "beside").mkdir()
-    return pictures_of(log_path, measure(flight), tmp_path / "beside")[-3:]
+    return pictures_of(log_path, found, tmp_path / "beside")[-3:]
 
 
 @pytest.fixture(scope="module")

@@ -7,32 +7,22 @@ import matplotlib.image
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
-from synthetic import Expect, Flight, Scenario, rows
 
-from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import as_json, metrics
+import beaver_ftc as bf
+from beaver_ftc.results.log import read
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.report import render, write_report
 
 NASTY = "</script><script>throw 1</script> <b>&amp;"
 
 
-def _folder(path, flight, description="A flight made by hand.", more=None):
-    path.mkdir()
-    with ParquetLog(path / "log.parquet") as log:
-        log.open(flight.columns)
-        made = rows(flight)
-        log.write(np.pad(made, ((0, 0), (0, len(flight.columns) - made.shape[1]))))
-    (path / "metrics.json").write_text(as_json(metrics(flight) | (more or {})))
-    (path / "scenario.yaml").write_text(
-        json.dumps({"name": flight.scenario.name, "description": description})
-    )
-    return path
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    expect = Expect(detected_within_s=0.5, isolated_within_s=0.1)
-    return _folder(tmp_path_factory.mktemp("runs") / "a", Flight(scenario=Scenario(expect=expect)), NASTY)
+    """A flight that detects in time and isolates too late, with a description that would be code."""
+    given = bf.load("elevator-partial-loss").model_dump(mode="json", exclude_unset=True)
+    given |= {"description": NASTY, "expect": {"detected_within_s": 0.5, "isolated_within_s": 0.001}}
+    return bf.fly(given).save(tmp_path_factory.mktemp("runs"), report=False)
 
 
 def test_report_needs_nothing_but_itself(folder):
@@ -44,9 +34,11 @@ def test_report_needs_nothing_but_itself(folder):
 
 def test_report_says_the_verdict_the_numbers_and_the_versions(folder):
     html = render([folder])
-    assert "synthetic: FAILED" in html
+    found = Metrics.of(json.loads((folder / "metrics.json").read_text()))
+    assert "elevator-partial-loss: FAILED" in html
     assert html.count("MISSED") == 1
-    for said in ("12.00 s", "0.07 s", "estimated loss 39 %", "isolation delay ≤ 0.1 s", "jsbsim"):
+    loss = f"estimated loss {-100 * found.isolation.estimate:.0f} %"
+    for said in ("12.00 s", f"{found.detection.delay_s:.2f} s", loss, "isolation delay ≤ 0.001 s", "jsbsim"):
         assert said in html
 
 
@@ -102,7 +94,8 @@ def test_pointing_reads_the_value_of_the_log_with_its_unit(page, folder):
     page.evaluate("beaverReport.setTime(10)")
     page.settle()
     said = page.evaluate("document.querySelector('#states output').value")
-    assert said == f"{45 + 0.5 * np.sin(2.0):.2f} m/s"
+    airspeed_mps = read(folder / "log.parquet", ["airspeed_mps"])["airspeed_mps"][1000]
+    assert said == f"{airspeed_mps:.2f} m/s"
 
 
 def test_replay_moves_at_the_pace_of_the_flight_and_stops(page):
@@ -165,13 +158,8 @@ def test_paper_gets_curves_drawn_for_its_width_and_nothing_to_press(page):
 
 
 def test_runs_stand_side_by_side_on_the_same_scale(browser, folder, tmp_path):
-    without = Flight(
-        scenario=Scenario(name="quiet", faults=()),
-        detection_time_s=None,
-        isolation_time_s=None,
-        isolated=None,
-    )
-    write_report(tmp_path / "both.html", [folder, _folder(tmp_path / "quiet", without)])
+    quiet = bf.fly("fault-free").save(tmp_path, report=False)
+    write_report(tmp_path / "both.html", [folder, quiet])
     browser.trouble.clear()
     browser.open(tmp_path / "both.html")
     assert browser.evaluate("document.querySelectorAll('#tracking canvas').length") == 6

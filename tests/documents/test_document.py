@@ -119,3 +119,14 @@ def test_the_line_of_a_syntax_error(text, line):
     with pytest.raises(MalformedDocumentError) as caught:
         parse(text)
     assert caught.value.problem.line == line
+
+
+def test_an_alias_is_as_deep_as_what_it_stands_for():
+    whole = "[" * 20 + "]" * 20
+    for around, is_read in ((11, True), (12, False)):
+        text = f"a: &a {whole}\nb: {'[' * around}*a{']' * around}"
+        if is_read:
+            assert parse(text).data["a"] is not None
+        else:
+            with pytest.raises(MalformedDocumentError, match="nested too deeply, allowed: 32 levels"):
+                parse(text)

@@ -8,6 +8,7 @@ from synthetic import Expect, Fault, Flight, Scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import verdict
+from beaver_ftc.results.exports import write_acmi
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.metrics import metrics
@@ -105,3 +106,13 @@ def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SimulationFailed, match=r"cannot write .*junit.xml: "):
         write_junit([], tmp_path / "file" / "junit.xml")
+
+
+def test_a_tacview_recording_has_25_frames_a_second(log_path, found, tmp_path):
+    write_acmi(log_path, found, tmp_path / "flight.acmi")
+    lines = (tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines()
+    times = [float(line[1:]) for line in lines if line.startswith("#")]
+    assert times == pytest.approx([k / 25.0 for k in range(len(times))])
+    assert 29.9 < times[-1] < 30.0
+    events = [line.rpartition("|")[2] for line in lines if "Event=Bookmark" in line]
+    assert [event.split()[0] for event in events] == ["fault", "detection", "isolation"]

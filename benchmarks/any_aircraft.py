@@ -1,18 +1,14 @@
 """Whether the promises hold for aircraft nobody wrote by hand: no false alarm, no fault named wrongly.
 
     python benchmarks/any_aircraft.py [NAMES] --flights N --seed S [--first K] [--healthy-s T] [--hours H]
-        [--declared]
 
 Each aircraft is derived if it has not been. Then N healthy flights, and N losses of effectiveness of 40 % and
 more of each surface, at random speeds, frame rates, references, magnitudes, times and profiles, with the
 published bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end
 early, out of the altitudes that are simulated: `--hours` flies further healthy ones, with the numbers that
 follow, until so many hours are full. `--flights 0 --first 200 --hours 2.5` flies these alone.
-`--declared` draws whole scenarios: turbulence, steady wind, gusts, sensors, actuators, class, and what an
-autopilot holds or turns to; declares what can be declared, and watches with the statistical detector, too;
-there is no `certain` then. A name may be a folder, `./aircraft/737`: of `derive --engines`, say, whose
-engines fail besides. These have a row of their own, where only `unanticipated` is a name that is not wrong.
-
+A name may be a folder, `./aircraft/737`: of `derive --engines`, say, whose engines fail besides. These have
+a row of their own, where only `unanticipated` is a name that is not wrong.
 A row an aircraft: hours flown in health and their false alarms; of each fault how many were detected, named,
 named wrongly, and how often the true surface was left out of what is still possible; how many the theory of
 `detectability` is certain to detect within 0.5 s, weighed along the same flight in health, and how many of
@@ -35,7 +31,6 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.signals import channels_of
 from beaver_ftc.studies.detectability import DETECT_WITHIN_S, SETTLED_S, detection_magnitude, excitation
 
 TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
@@ -111,71 +106,6 @@ def scenario(
     })  # fmt: skip
 
 
-def everything(scenario: Scenario, seed: int, index: int) -> Scenario:
-    """The flight with errors of every kind, all of them declared."""
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, 99)))
-    severity = str(rng.choice(("none", "light", "moderate", "severe")))
-    grade = str(rng.choice(("ideal", "tactical-grade", "consumer-grade")))
-    moves = severity != "none" and rng.random() < 0.8  # what is declared need not come
-    bounds: dict[str, Any] = {"turbulence": severity} | ({"sensors": grade} if grade != "ideal" else {})
-    own_alone = rng.random() < 0.5  # the error of its own model is all there is
-    bounds |= (
-        dict.fromkeys(("constant_rad_s2", "inertia_coupling"), dict.fromkeys("pqr", 0.0)) if own_alone else {}
-    )
-    turbulence = {"turbulence": "dryden", "severity": severity} if moves else {}
-    return scenario.with_({
-        "environment": turbulence | wind(rng), "autopilot": outer_loops(rng, scenario),
-        "sensors": grade, "actuators": str(rng.choice(("ideal", "servo"))),
-        "fdi": {
-            "fault_class": str(rng.choice(("published", "all"))), "bounds": bounds,
-            "statistical": {"uncertainty_rad_s": 5.0} if own_alone else {},
-            "fault_profile": "abrupt" if is_abrupt(scenario) and rng.random() < 0.5 else "any",
-        },
-    })  # fmt: skip
-
-
-def wind(rng: np.random.Generator) -> dict[str, Any]:
-    """Steady wind, now and then, and up to three gusts of any shape. They do not rotate: the air data show
-    all that they do, and nothing declares them."""
-    air: dict[str, Any] = {}
-    if rng.random() < 0.3:
-        air["wind_mps"] = [*rng.uniform(-12.0, 12.0, 2).tolist(), float(rng.uniform(-1.0, 1.0))]
-    if rng.random() < 0.5:
-        air["gust"], at_s = [], 0.0
-        for _ in range(rng.integers(1, 4)):
-            at_s += float(rng.uniform(1.0, 8.0))
-            way = rng.normal(size=3)
-            rise_s, hold_s, fade_s = np.exp(rng.uniform(np.log(0.2), np.log(4.0), 3)).tolist()
-            air["gust"].append({
-                "at_s": at_s, "velocity_mps": (rng.uniform(0.5, 6.0) * way / np.linalg.norm(way)).tolist(),
-                "rise_s": rise_s, "hold_s": hold_s, "fade_s": fade_s,
-            })  # fmt: skip
-            at_s += rise_s + hold_s + fade_s
-    return air
-
-
-def outer_loops(rng: np.random.Generator, scenario: Scenario) -> dict[str, Any]:
-    """Half of the time an autopilot: each of its channels held, or asked for something else on the way."""
-    known = channels_of(scenario.airframe)
-    if rng.random() < 0.5:
-        return {}
-    V, at_s = scenario.initial.airspeed_mps, float(rng.uniform(2.0, 12.0))
-    legs = {
-        "altitude_m": {"value": float(scenario.initial.altitude_m + rng.uniform(-40.0, 40.0))},
-        "airspeed_mps": {"value": float(V * rng.uniform(0.95, 1.05))},
-        str(rng.choice(("heading_deg", "bank_deg"))): {"value": float(rng.uniform(-30.0, 30.0))},
-    }
-    return {
-        name: [{"hold": True}] + ([{"at_s": at_s, **leg}] if rng.random() < 0.5 else [])
-        for name, leg in legs.items() if name in known and rng.random() < 0.8
-    }  # fmt: skip
-
-
-def is_abrupt(scenario: Scenario) -> bool:
-    """Whether no fault of the flight grows slowly."""
-    return all(fault.profile == "abrupt" for fault in scenario.faults)
-
-
 def flown(
     name: str, faulty: Iterable[str | None], args: argparse.Namespace
 ) -> Iterator[tuple[str | None, Any]]:
@@ -187,7 +117,6 @@ def flown(
             flight = scenario(name, surface, args.seed, index, args.healthy_s, args.fault_class)
             index += 1
             try:
-                flight = everything(flight, args.seed, index) if args.declared else flight
                 done = fly(flight)
             except BadInput as error:  # a speed at which it does not trim
                 print(f"   {name} {flight.name}: {error}")
@@ -246,7 +175,7 @@ def row_of(name: str, args: argparse.Namespace, damage: tuple[str, ...] = ()) ->
         wrong = flight.isolated is not None and flight.isolated != name_of_it
         left = {candidate.partition(":")[0] for candidate in flight.candidates}
         left_out = detected and not unknown and flight.isolated is None and surface not in left
-        certain = not (args.declared or unknown) and is_certain(flight.scenario)
+        certain = not unknown and is_certain(flight.scenario)
         in_time = detected and flight.detection_time_s <= fault.at_s + DETECT_WITHIN_S
         count["losses"] += 1
         count["certain"] += certain
@@ -274,7 +203,6 @@ def main() -> None:
     parser.add_argument("--healthy-s", type=float, default=HEALTHY_S)
     parser.add_argument("--hours", type=float, default=0.0, help="fly at least so long in health")
     parser.add_argument("--class", dest="fault_class", choices=("published", "all"), default="published")
-    parser.add_argument("--declared", action="store_true", help="errors of every kind, all of them declared")
     args = parser.parse_args()
     table, broken = Table(*COLUMNS), []
     for name in args.names:

@@ -19,8 +19,8 @@ as it was, under our law, `certain` is the chance that the same test finds what 
 declared error is surer. Where the model's error is not known, nothing is left.
 
 A row a case: found within 1 s by ours, by the informed test, by both, by ours alone, by it alone; of the
-flights that ours does not find in time, how many are certain, the sum of the chances. `--each` prints those
-flights, one a line. Rows that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
+flights that ours does not find in time, how many are certain, the sum of the chances.
+Rows that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
 """
 
 import argparse
@@ -56,7 +56,6 @@ HEAD = [
     "case", "flights", "ours", "told all but the instant", "both", "ours alone", "it alone",
     "certain, not ours",
 ]  # fmt: skip
-EACH_HEAD = ["flight", "case", "ours, s", "ratio", "level", "beyond, deviations", "certain"]
 
 
 def recorded(given: Document) -> Recording:
@@ -221,22 +220,6 @@ def certain(row: Document, level: float) -> float:
     return NormalDist().cdf((0.5 * d * d - level) / d) if d > 0.0 else 0.0
 
 
-def each(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[Any]]:
-    """A row for each flight that ours does not find in time."""
-    for k, row in ours.items():
-        if is_late(row):
-            level = level_of([of[j] for j in of if ours[j]["case"] == row["case"]])
-            chances = f"{of[k]['beyond']:.1f}", f"{certain(of[k], level):.2f}"
-            yield [
-                str(k),
-                row["case"],
-                str(row["delay_s"]),
-                f"{of[k]['after']:.1f}",
-                f"{level:.1f}",
-                *chances,
-            ]
-
-
 def _printed(row: list[float]) -> list[str]:
     return [*(str(int(n)) for n in row[:6]), f"{row[6]:.1f}"]
 
@@ -263,18 +246,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--beside", type=Path, default=Path("gtm_damage.jsonl"))
     parser.add_argument("--out", type=Path, default=Path("gtm_informed.jsonl"))
-    parser.add_argument("--each", action="store_true", help="the flights that ours does not find in time")
     given = parser.parse_args()
     if folder() is None or not given.beside.is_file():
         parser.error("needs BEAVER_FTC_GTM, and --beside, which gtm_damage.py writes")
     flown = map(json.loads, given.beside.read_text().splitlines())
     ours = {one["k"]: one for one in flown if one["k"] < given.flights}
     of = see_all(ours, given.seed, given.out)
-    print(
-        markdown_table(EACH_HEAD, list(each(ours, of)))
-        if given.each
-        else markdown_table(HEAD, list(rows(ours, of)))
-    )
+    print(markdown_table(HEAD, list(rows(ours, of))))
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ of the healthy flights, whitens them and the fault's signature. Errors of the mo
 as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
 
 Flights are those of `beaver-ftc power`. What is declared is what is there: sensors, air, and of the Beaver
-the published uncertainty; of other aircraft, which have none, the error of their own model, as fast as
-`benchmarks/model_pace.py` measures it (`--published` declares the published one of all). That error is known
+the published uncertainty; of other aircraft, which have none, the error of their own model, at the measured
+pace (`--published` declares the published one of all). That error is known
 within a model's envelope alone, and outside nothing is concluded: losses within a second of which the
 aircraft is outside are left out.
 

@@ -47,7 +47,6 @@ FLOORS = (
     {"results"},
     {"studies"},
     {"cli", "pytest_plugin"},
-    {"integrations"},
 )
 TOOLS = FLOORS[2]
 # Their rows name what is far above them, for those who ask; the same for other packages.

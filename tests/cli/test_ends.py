@@ -6,12 +6,9 @@ import subprocess
 import sys
 import time
 import tomllib
-import weakref
 from pathlib import Path
 
 import pytest
-
-from beaver_ftc.cli.begin import deliver_again
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 NOT_FINITE = """
@@ -112,19 +109,3 @@ def test_ctrl_c_during_any_import_leaves_no_trace(imported):
         [sys.executable, "-c", INTERRUPTED, imported, entry], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (130, "")
-
-
-def test_ctrl_c_in_a_callback_that_ignores_exceptions_is_not_lost(monkeypatch, capsys):
-    """Python drops what a weak reference's callback raises, and a command then went on to its end."""
-    monkeypatch.setattr(sys, "unraisablehook", deliver_again)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        gone = weakref.WeakSet()
-        reference = weakref.ref(gone, lambda _: signal.raise_signal(signal.SIGINT))
-        del gone
-        with pytest.raises(KeyboardInterrupt):
-            time.sleep(5.0)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert reference() is None
-    assert capsys.readouterr().err == ""

@@ -25,15 +25,6 @@ for name in sorted(sys.modules):
 # What takes a process a tenth of a second or so to import, or belongs to a flight.
 HEAVY = {"beaver_ftc.scenario.schema", "jsbsim", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "scipy"}
 BAR = 92
-# Of the core: other commands, other views of a result, the reports of many flights.
-NOT_FOR_A_RUN = (
-    "beaver_ftc.cli.catalogue", "beaver_ftc.cli.scenarios", "beaver_ftc.cli.sweep",
-    "beaver_ftc.control.rivals.indi", "beaver_ftc.control.rivals.l1", "beaver_ftc.control.rivals.lqr",
-    "beaver_ftc.diagnosis.rivals.", "beaver_ftc.loop.plugin_frame",
-    "beaver_ftc.plant.trial", "beaver_ftc.pytest_plugin", "beaver_ftc.results.exports",
-    "beaver_ftc.results.figures", "beaver_ftc.results.flight", "beaver_ftc.results.report",
-    "beaver_ftc.results.views", "beaver_ftc.studies.",
-)  # fmt: skip
 
 
 def modules(code, *arguments, folder=None):
@@ -69,10 +60,6 @@ def test_what_answers_at_once_imports_nothing_heavy(code, arguments, besides, mo
 def test_a_run_imports_no_product(imported):
     assert "beaver_ftc.loop.loop" in imported
     assert [name for name in imported if name.startswith("beaver_ftc_")] == []
-
-
-def test_a_run_imports_nothing_of_other_commands_and_views(imported):
-    assert [name for name in imported if name.startswith(NOT_FOR_A_RUN)] == []
 
 
 def test_a_run_imports_at_most_as_many_modules_as_it_needs(imported):

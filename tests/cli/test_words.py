@@ -1,19 +1,12 @@
 """What people read: it says what is so, and leads to what they wanted."""
 
 import re
-import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import beaver_ftc as bf
 import commands
-import needs
 from beaver_ftc.scenario.schema import load_text
-
-ROOT = Path(__file__).parents[2]
-ALL_SENSORS = "name: x\nduration_s: 1\nsensors: tactical-grade\n"
 
 
 @pytest.fixture
@@ -48,15 +41,6 @@ def test_a_severity_given_as_turbulence_is_told_where_it_belongs(beaver):
     assert said.startswith("x.yaml:2: environment.turbulence: 'moderate' is a severity, allowed: ")
     meant = re.search(r"turbulence: dryden with severity: moderate", said)[0].replace(" with", ",")
     assert _validated(beaver, f"name: x\nenvironment: {{{meant}}}\n")[0] == 0
-
-
-def test_undeclared_sensors_are_one_line_with_what_declares_them(beaver):
-    status, _, said = _validated(beaver, ALL_SENSORS)
-    assert status == 0
-    assert len(said.splitlines()) == 1
-    assert "`fdi.bounds.sensors: tactical-grade` declares them" in said
-    declared = ALL_SENSORS + "fdi: {bounds: {sensors: tactical-grade}}\n"
-    assert _validated(beaver, declared) == (0, "x.yaml: OK\n", "")
 
 
 @pytest.mark.parametrize(
@@ -96,17 +80,6 @@ def test_a_scenario_given_for_a_sweep_and_the_other_way_round_are_told(beaver, a
     assert len(said.splitlines()) == 1
 
 
-def test_a_file_of_the_other_kind_is_told_from_one_with_mistakes(beaver):
-    Path("many.yaml").write_text(
-        "name: many\nbase: fault-free\nruns: 2\nexpect: {pass_rate: {at_least: 1}}\n"
-    )
-    Path("one.yaml").write_text("name: one\nduration_s: 1\n")
-    says = "base: this is a sweep file, allowed: a scenario; `beaver-ftc sweep many.yaml` flies it"
-    assert beaver("run", "many.yaml") == (2, "", f"many.yaml:2: {says}\n")
-    says = "(file): this is a scenario, allowed: a sweep file; `beaver-ftc run one.yaml` flies it"
-    assert beaver("sweep", "one.yaml") == (2, "", f"one.yaml:1: {says}\n")
-
-
 @pytest.mark.parametrize(
     ("written", "says"),
     [
@@ -124,135 +97,3 @@ def test_what_was_meant_is_said_of_a_beginning_a_lone_name_and_a_missing_dash(be
     status, _, said = _validated(beaver, f"name: x\n{written}\n")
     assert status == 2
     assert says in said
-
-
-def test_fault_types_of_surfaces_and_of_sensors_are_told_apart(beaver):
-    listed = re.findall(r"^  (\w+) +(of a sensor: )?", beaver("list", "faults")[1], re.MULTILINE)
-    assert len(set(listed)) == len(listed)
-    assert [bool(of) for _, of in listed] == [False] * 9 + [True] * 5
-
-
-def test_an_airspeed_that_nothing_can_hold_is_said_at_its_key_by_validate(beaver):
-    shutil.copytree(ROOT / "tests/data/aircraft/trainer", "trainer")  # its forces have no term of thrust
-    status, _, said = _validated(
-        beaver, "name: x\naircraft: ./trainer\nautopilot:\n  airspeed_mps: [{value: 45}]\n"
-    )
-    assert status == 2
-    (line,) = (line for line in said.splitlines() if not line.startswith("beaver-ftc: "))
-    assert line.startswith(
-        "x.yaml:4: autopilot.airspeed_mps: the file of trainer does not say what thrust does"
-    )
-
-
-@needs.service("derive")
-def test_an_aircraft_of_the_package_is_suggested_by_its_name_and_nothing_is_promised(beaver):
-    status, _, said = _validated(beaver, "name: x\naircraft: jsbsim:c172\n")
-    assert status == 2
-    assert "did you mean c172p?" in said
-    assert len(said.splitlines()) == 1
-
-
-def test_a_trim_that_is_none_names_no_deflection_that_no_surface_has(beaver):
-    status, _, said = beaver("trim", "--airspeed-mps", "20")
-    assert status == 2
-    assert "no steady straight flight at 20 m/s" in said
-    assert max(abs(float(angle)) for angle in re.findall(r"(-?[\d.]+)(?= deg| to)", said)) < 90
-
-
-def test_a_new_scenario_makes_its_folder(beaver):
-    status, out, _ = beaver("new", "mine", "--out", "cases/mine")
-    assert status == 0
-    assert load_text(Path("cases/mine/mine.yaml").read_text()).name == "mine"
-    assert "beaver-ftc run cases/mine/mine.yaml" in out
-    status, _, said = beaver("new", "mine", "--out", "cases/other.yaml")
-    assert (status, "allowed: a folder" in said) == (2, True)
-    assert not Path("cases/other.yaml").exists()
-
-
-def test_the_first_line_of_tracking_has_its_label_even_if_the_fault_was_there_from_the_start(beaver):
-    Path("x.yaml").write_text(
-        "name: x\nduration_s: 2\nfaults: [{actuator: elevator, type: float, at_s: 0}]\n"
-    )
-    out = beaver("run", "x.yaml", "--no-report")[1]
-    (label,) = re.findall(r"^ (.*?)  +p \S+  q .*after the fault", out, re.MULTILINE)
-    assert label == "tracking RMS"
-
-
-def test_why_a_surface_that_is_named_is_kept_in_use_is_said(beaver):
-    mission = bf.load("mission-elevator-jammed").with_({"duration_s": 53, "expect": {}})
-    flight = bf.fly(mission, log=False)
-    (taken_s,) = (change.time_s for change in flight.supervisor if change.mode == "reallocated")
-    assert taken_s > flight.isolation.time_s + 1.0  # the flight is one of those that wait
-    named_s = flight.isolation.time_s
-    told = f"elevator was named at {named_s:.2f} s; its demand was reallocated at {taken_s:.2f} s"
-    assert [told in hint for hint in flight.metrics["hints"]] == [True]
-    assert told in repr(flight)
-    at_once = bf.fly(bf.load("elevator-stuck").with_({"duration_s": 14, "expect": {}}), log=False)
-    assert not any("was reallocated" in hint for hint in at_once.metrics["hints"])
-
-
-def test_of_two_faults_the_one_named_first_is_not_said_to_be_reallocated():
-    """The flap takes over from the elevator; the rudder, named long before, goes on."""
-    two = {
-        "name": "two",
-        "duration_s": 18,
-        "reference": {axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}] for axis in "pqr"},
-        "faults": [
-            {"actuator": "rudder", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 5},
-            {"actuator": "elevator", "type": "stuck", "at_s": 12},
-        ],
-        "fdi": {"fault_class": "all", "pairs": True},
-    }
-    flight = bf.fly(bf.load(two), log=False)
-    (taken_s,) = (change.time_s for change in flight.supervisor if change.mode == "reallocated")
-    assert flight.isolation.time_s < 6.0 < taken_s - 6.0
-    assert [one.fault for one in flight.isolation.faults] == ["rudder", "elevator"]
-    assert not any("was reallocated" in hint for hint in flight.metrics["hints"])
-
-
-@needs.command("identify")
-def test_a_table_with_a_column_twice_is_bad_input(beaver):
-    Path("twice.csv").write_text("t_s,p_rad_s,p_rad_s\n0,0,0\n1,0,0\n")
-    vehicle = ROOT / "examples/recorded-flights/flying-wing.yaml"
-    status, _, said = beaver("identify", "twice.csv", "--vehicle", vehicle, "--out", "m.json")
-    assert status == 2
-    assert said == "twice.csv: has two columns p_rad_s, allowed: one of a name\n"
-
-
-SHAPE = r"(\((?:\d|\w+ \+ \w+|surfaces),[\w ]*\))"  # such as (3, surfaces)
-
-
-def _documented(name):
-    """Field -> shape as text, of one of the tables of docs/reference/plugins.md."""
-    page = (ROOT / "docs/reference/plugins.md").read_text()
-    table = page.partition(f"`{name}` (`beaver_ftc")[2].partition("|\n\n")[0]
-    for names, says in re.findall(r"^\| ?(`[^|]*?) ?\| ?(.*?) ?\|$", f"{table}|", re.MULTILINE):
-        fields, shapes = (
-            re.findall(r"`(\w+)`", names),
-            re.findall(r"(\((?:\d|\w+ \+ \w+|surfaces),[\w ]*\))", says),
-        )
-        if len(shapes) == len(fields):
-            yield from zip(fields, shapes, strict=True)
-
-
-@pytest.mark.parametrize("aircraft", ["beaver", "./trainer"])
-def test_arrays_of_a_plug_in_have_the_documented_shapes(aircraft, tmp_path, monkeypatch):
-    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
-    monkeypatch.chdir(tmp_path)
-    seen = {}
-
-    class Looks:
-        def reset(self, context):
-            seen["context"] = context
-
-        def step(self, measured, command):
-            seen["measured"] = measured
-            return bf.Verdict()
-
-    flown = bf.fly({"duration_s": 0.05, "aircraft": aircraft}, log=False, detector=Looks())
-    made = flown.scenario.airframe
-    sizes = {"surfaces": len(made.surfaces), "signals": len(made.signals)}
-    documented = {(name, field): shape for name in seen for field, shape in _documented(name)}
-    assert {("context", "trim_y"), ("measured", "y"), ("measured", "contribution")} <= documented.keys()
-    found = {(name, field): np.shape(getattr(seen[name], field)) for name, field in documented}
-    assert found == {of: eval(shape, {}, sizes) for of, shape in documented.items()}

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from beaver_ftc.documents.document import MAX_DEPTH, MalformedDocumentError, first_text, parse, scalar
-from beaver_ftc.documents.errors import say_once, split_docstring
+from beaver_ftc.documents.document import MAX_DEPTH, MalformedDocumentError, parse, scalar
 
 
 @pytest.mark.parametrize(
@@ -46,14 +45,6 @@ def test_plain_scalars(text, value):
     assert type(read) is type(value)
 
 
-def test_dot_nan_is_not_a_number():
-    assert math.isnan(scalar(".nan"))
-
-
-def test_quotes_make_text():
-    assert parse("a: '45'\nb: \"true\"").data == {"a": "45", "b": "true"}
-
-
 def test_lines_of_keys_and_values():
     document = parse("a: 1\nb:\n  - x\n  - {c: 2,\n     d: 3}\n")
     assert document.data == {"a": 1, "b": ["x", {"c": 2, "d": 3}]}
@@ -64,10 +55,6 @@ def test_lines_of_keys_and_values():
         4,
         5,
     ]
-
-
-def test_a_missing_location_has_the_line_of_what_is_around_it():
-    assert parse("\nb:\n  - {c: 2}\n").line(("b", 0, "nothing", "here")) == 3
 
 
 def test_every_duplicate_key_is_a_problem_and_the_first_value_stays():
@@ -134,52 +121,12 @@ def test_the_line_of_a_syntax_error(text, line):
     assert caught.value.problem.line == line
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("a: 1\ndescription: two words\nb: [", "two words"),
-        ("description: >\n  two\n  lines\n", "two lines\n"),
-        ("a: description\nb: c\n", ""), ("a: {description: inner}\ndescription: outer\n", "outer"),
-        ("a: [description, b]\ndescription: outer\n", "outer"), ("description: {a: b}\nc: d\n", ""),
-        ("", ""), ("a:\ndescription: after nothing", "after nothing"),
-        ("a: {b: {c: 1}}\nd: [[x], {y: z}]\ndescription: 'last'", "last"),
-    ],
-)  # fmt: skip
-def test_the_text_of_a_key_is_read_and_nothing_behind_it(text, found):
-    assert first_text(text, "description") == found
-
-
-def test_a_text_that_is_no_yaml_before_its_key_is_said():
-    with pytest.raises(MalformedDocumentError) as caught:
-        first_text("a: 1\nb: 'x\nc: 2\n", "description")
-    assert caught.value.problem.line == 4
-
-
-def test_a_docstring_ends_with_what_it_says_of_names():
-    text = """What it is: a section.
-
-    More of it.
-
-    one: the first,
-    over two lines
-    two: the second: with a colon
-    other: no name of it, so of the line before
-    """
-    about, says = split_docstring(text, ["one", "two", "three"])
-    assert about == "What it is: a section.\n\nMore of it."
-    assert says == {
-        "one": "the first, over two lines",
-        "two": "the second: with a colon other: no name of it, so of the line before",
-    }
-    assert split_docstring(None, ["one"]) == (None, {})
-
-
-@pytest.mark.parametrize("terminal", [False, True])
-def test_a_line_is_said_once_a_process_over_what_stands_there(monkeypatch, capsys, terminal):
-    say_once.cache_clear()
-    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal, raising=False)
-    for line in ("one", "other", "one"):
-        say_once(line)
-    clear = "\r\x1b[K" if terminal else ""
-    assert capsys.readouterr() == ("", f"{clear}beaver-ftc: one\n{clear}beaver-ftc: other\n")
-    say_once.cache_clear()
+def test_an_alias_is_as_deep_as_what_it_stands_for():
+    whole = "[" * 20 + "]" * 20
+    for around, is_read in ((11, True), (12, False)):
+        text = f"a: &a {whole}\nb: {'[' * around}*a{']' * around}"
+        if is_read:
+            assert parse(text).data["a"] is not None
+        else:
+            with pytest.raises(MalformedDocumentError, match="nested too deeply, allowed: 32 levels"):
+                parse(text)

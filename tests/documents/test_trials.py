@@ -40,29 +40,6 @@ def test_it_is_asked_once_a_build(passes, code, expected):
     assert passes(code, build="2") == (expected, 2)
 
 
-def test_the_child_has_the_package_and_not_the_working_directory(passes, tmp_path, monkeypatch):
-    (tmp_path / "jsbsim.py").write_text("raise SystemExit(1)")
-    monkeypatch.chdir(tmp_path)
-    assert passes("import jsbsim, beaver_ftc") == (True, 1)
-
-
-def test_a_child_that_cannot_be_started_or_does_not_end_is_no_answer_for_others(passes, monkeypatch):
-    monkeypatch.setattr(files.sys, "executable", "/nowhere/python")
-    assert passes("pass") == (False, 1)
-    monkeypatch.undo()
-
-
-@pytest.mark.parametrize("code", ["raise MemoryError", "import nothing_of_this_name"])
-def test_one_that_could_not_find_out_is_asked_again(passes, code):
-    assert [passes(code), passes(code)] == [(False, 1), (False, 2)]
-
-
-def test_one_that_does_not_end_is_asked_again(passes, monkeypatch):
-    monkeypatch.setattr(files, "PATIENCE_S", 0.5)
-    assert passes("import time; time.sleep(60)") == (False, 1)
-    assert passes("import time; time.sleep(60)") == (False, 2)
-
-
 @pytest.mark.skipif(os.name != "posix", reason="files have no mode here")
 def test_an_answer_that_another_user_can_write_does_not_count(passes, tmp_path):
     assert passes("raise SystemExit(3)") == (False, 1)
@@ -71,8 +48,3 @@ def test_an_answer_that_another_user_can_write_does_not_count(passes, tmp_path):
     file.chmod(0o666)
     assert passes("raise SystemExit(3)") == (False, 2)
     assert file.stat().st_mode & 0o022 == 0
-
-
-def test_without_a_folder_it_is_asked_each_time(passes, monkeypatch):
-    monkeypatch.setattr(files, "cache_base", lambda: None)
-    assert [passes("pass"), passes("pass")] == [(True, 1), (True, 2)]

@@ -1,18 +1,23 @@
+import json
+
 import pytest
-from synthetic import Flight, rows
 
-from beaver_ftc.results.log import ParquetLog
-
-
-@pytest.fixture
-def flight():
-    return Flight()
+import beaver_ftc as bf
+from beaver_ftc.results.model import Metrics
 
 
-@pytest.fixture
-def log_path(tmp_path, flight):
-    path = tmp_path / "log.parquet"
-    with ParquetLog(path) as log:
-        log.open(flight.columns)
-        log.write(rows(flight))
-    return path
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """The result of the published elevator case, without report."""
+    return bf.fly("elevator-partial-loss").save(tmp_path_factory.mktemp("runs"), report=False)
+
+
+@pytest.fixture(scope="session")
+def log_path(folder):
+    return folder / "log.parquet"
+
+
+@pytest.fixture(scope="session")
+def found(folder):
+    """Its metrics."""
+    return Metrics.of(json.loads((folder / "metrics.json").read_text()))

@@ -4,8 +4,6 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from beaver_ftc.aircraft import load
 from beaver_ftc.scenario.airframe import Actuators, Environment
 from beaver_ftc.scenario.sensors import Sensors
@@ -144,82 +142,3 @@ class Flight:
     def __post_init__(self) -> None:
         if self.isolated is not None:
             self.so_far = self.isolated in SURFACES
-
-
-def rows(flight: Flight) -> np.ndarray:
-    """The log of `flight`, shape (frames, columns): sines, a fault at 12 s, residuals that leave bounds."""
-    t = np.arange(flight.frames) / flight.scenario.rate_hz
-    values = dict.fromkeys(COLUMNS, np.zeros_like(t)) | {"t_s": t}
-    rng = np.random.default_rng(flight.scenario.seed)
-    after = np.clip(t - 12.0, 0.0, None)
-    detected = t >= 12.07
-    values |= _states(t) | _rates(t, after) | _surfaces(t, after)
-    for axis in AXES:
-        threshold = 0.02 * (1 - np.exp(-t))
-        noise = 0.1 * threshold * np.sin(10 * t) + 1e-5 * rng.standard_normal(t.size)
-        values[f"{axis}_alarm_threshold_rad_s"] = threshold
-        values[f"{axis}_alarm_residual_rad_s"] = noise + (axis == "q") * 0.3 * np.minimum(after, 1)
-        values[f"{axis}_residual_rad_s"] = noise + (axis == "q") * 0.08 * np.minimum(after, 1) * np.sin(
-            1.3 * t
-        )
-        values[f"{axis}_threshold_rad_s"] = threshold
-        values[f"{axis}_eta_bar_rad_s2"] = 0.02 + 0.001 * np.abs(np.sin(t))
-        for estimator in ESTIMATORS:
-            values |= _estimator(
-                f"fie_{estimator}_{axis}", t, detected, drifts=estimator != "elevator" and axis == "q"
-            )
-    for estimator in ESTIMATORS:
-        values[f"fie_{estimator}_excluded"] = np.where(
-            detected, np.where(t > 12.12, float(estimator != "elevator"), 0.0), np.nan
-        )
-    values["envelope_valid"] = np.ones_like(t)
-    values["mode"] = np.where(t < 12.07, 0.0, np.where(t < 12.12, 1.0, 2.0))
-    values["detected"] = detected.astype(float)
-    return np.column_stack([values[name] for name in COLUMNS])
-
-
-def _states(t: np.ndarray) -> dict[str, np.ndarray]:
-    return {
-        "airspeed_mps": 45 + 0.5 * np.sin(0.2 * t), "alpha_rad": 0.06 + 0.01 * np.sin(t),
-        "beta_rad": 0.01 * np.sin(0.9 * t), "phi_rad": 0.1 * np.sin(0.5 * t),
-        "theta_rad": 0.05 + 0.02 * np.sin(0.8 * t), "psi_rad": 0.02 * t,
-        "north_m": 45 * t * np.cos(0.01 * t), "east_m": 45 * t * np.sin(0.01 * t),
-        "altitude_m": 1828.8 + 4 * np.sin(0.3 * t), "qdyn_pa": np.full_like(t, 1037.0),
-        "dpt": np.full_like(t, 0.6),
-    }  # fmt: skip
-
-
-def _rates(t: np.ndarray, after: np.ndarray) -> dict[str, np.ndarray]:
-    out = {}
-    for axis, frequency in zip(AXES, (0.25, 0.2, 0.1), strict=True):
-        reference = np.radians(3) * np.sin(2 * np.pi * frequency * t)
-        out[f"{axis}_reference_rad_s"] = reference
-        out[f"{axis}_model_rad_s"] = np.radians(3) * np.sin(2 * np.pi * frequency * t - 0.2)
-        error = 0.02 * np.exp(-after) * np.sin(3 * after) if axis == "q" else 0.0
-        out[f"{axis}_rad_s"] = out[f"{axis}_measured_rad_s"] = out[f"{axis}_model_rad_s"] + error
-    return out
-
-
-def _surfaces(t: np.ndarray, after: np.ndarray) -> dict[str, np.ndarray]:
-    out = {}
-    for surface in SURFACES:
-        position = np.zeros_like(t) if surface == "flap" else 0.04 * np.sin(1.2 * t)
-        if surface == "flap":
-            position = 0.2 * np.minimum(after, 1) * np.sin(1.2 * t)
-        out[f"{surface}_cmd_rad"] = out[f"{surface}_pos_rad"] = position
-        out[f"{surface}_effective_rad"] = position * np.where((surface == "elevator") & (t >= 12), 0.6, 1.0)
-        health = 1 - 0.4 * (1 - np.exp(-after / 0.5)) if surface == "elevator" else np.ones_like(t)
-        out[f"{surface}_effectiveness_used"] = health
-        out[f"{surface}_effectiveness_estimate"] = np.where(health < 0.99, 0.6, 1.0)
-    return out
-
-
-def _estimator(stem: str, t: np.ndarray, active: np.ndarray, drifts: bool) -> dict[str, np.ndarray]:
-    since = np.clip(t - 12.07, 0, None)
-    residual = 0.002 * np.sin(10 * t) + drifts * 0.06 * np.minimum(since, 1) * np.sin(2 * since + 1)
-    upper = 0.012 + 0.01 * np.exp(-since)
-    return {
-        f"{stem}_residual_rad_s": np.where(active, residual, np.nan),
-        f"{stem}_lower_rad_s": np.where(active, -upper, np.nan),
-        f"{stem}_upper_rad_s": np.where(active, upper, np.nan),
-    }

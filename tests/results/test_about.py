@@ -5,15 +5,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.results.metrics import faults_of, hints
+from beaver_ftc.results.metrics import hints
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import outcome_class, title, verdict_lines
 from beaver_ftc.scenario.schema import Scenario
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
 STUCK = {"type": "stuck", "actuator": "elevator", "at_s": 12}
 RUDDER = {"type": "bias", "actuator": "rudder", "bias_deg": 2, "at_s": 14}
-UNKNOWN = {"type": "unanticipated", "at_s": 12}
 ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
 
 
@@ -29,24 +27,6 @@ def _hints(
     }
     flight = SimpleNamespace(scenario=scenario, end=end, closest_approach=used)
     return hints(flight, Metrics.of({"detection": detection}))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "keys"),
-    [
-        ([], {}), ([LOSS], {}), ([UNKNOWN], {}), ([STUCK], {"fdi": ALL}), ([STUCK, RUDDER], {"fdi": PAIRS}),
-        ([STUCK], {"fdi": {"scheme": "none"}}), ([LOSS], {"end": (41.0, 1600.0)}),
-        ([LOSS | {"end_s": 13}, RUDDER], {"fdi": ALL}), ([LOSS], {"detected": False}),
-        ([LOSS], {"detected": False, "guaranteed": None, "why": {"share": 0.5}}),
-        ([LOSS], {"used": (0.2, 0.899)}), ([LOSS], {"used": (0.2, 1.25)}), ([], {"used": (0.899, 0.2)}),
-        ([LOSS], {"delay": 0.02}), ([LOSS], {"delay": 0.01, "sensors": "tactical-grade"}),
-        ([LOSS], {"delay": 0.01, "actuators": "servo"}),
-        ([LOSS], {"delay": 0.01, "environment": {"wind_mps": [0, 3, 0]}}),
-        ([LOSS], {"delay": 0.01, "uncertainty": {"coefficients": {"Cm_de": 1.02}}}),
-    ],
-)  # fmt: skip
-def test_nothing_is_said_without_need(arguments, keys):
-    assert _hints(*arguments, **keys) == []
 
 
 @pytest.mark.parametrize(
@@ -75,44 +55,3 @@ def test_nothing_is_said_without_need(arguments, keys):
 def test_a_reader_is_told(arguments, keys, says):
     (said,) = _hints(*arguments, **keys)
     assert re.search(says, said)
-
-
-def test_every_type_of_fault_has_a_size_in_words():
-    faults = [
-        LOSS, STUCK | {"position_deg": 3, "at_s": 13}, RUDDER, UNKNOWN,
-        {"type": "hardover", "actuator": "flap", "direction": -1, "at_s": 1, "end_s": 2},
-        {"type": "rate_limit", "actuator": "flap", "scale": 0.1, "at_s": 2, "end_s": 3},
-        {"type": "oscillatory", "actuator": "aileron", "amplitude_deg": 2, "frequency_rad_s": 5, "at_s": 4},
-        {"type": "float", "actuator": "rudder", "at_s": 5, "end_s": 6},
-    ]  # fmt: skip
-    document = _document(faults=faults_of(Scenario.model_validate({"name": "x", "faults": faults})))
-    said = [how for what, how in verdict_lines(Metrics.of(document)) if what in ("fault", "")]
-    assert said == [
-        "flap hardover (to the lower stop) at 1.00 s to 2.00 s",
-        "flap rate limit (10 % of its rate) at 2.00 s to 3.00 s",
-        "aileron oscillatory (2 deg, 5 rad/s) at 4.00 s",
-        "rudder float at 5.00 s to 6.00 s",
-        "elevator loss of effectiveness (40 %) at 12.00 s",
-        "unanticipated (Cm_alpha3 10) at 12.00 s",
-        "elevator stuck (3 deg) at 13.00 s",
-        "rudder bias (+2 deg) at 14.00 s",
-    ]
-
-
-def _document(**changes):
-    nothing = {"isolated": False, "candidates": []}
-    return {
-        "scenario": "x", "expectations": [], "passed": True, "departure": None, "fault": None, "faults": [],
-        "detection": {"detected": False}, "false_alarm": False, "isolation": nothing, "supervisor": [],
-        "envelope_exits": [], "saturation_s": {}, **changes,
-    }  # fmt: skip
-
-
-def test_a_lost_aircraft_is_said_and_not_green():
-    lost = _document(departure={"time_s": 3.0, "signal": "altitude"})
-    assert (title(Metrics.of(lost)), outcome_class(Metrics.of(lost))) == (
-        "x: flown, the aircraft was LOST, nothing was expected",
-        "lost",
-    )
-    assert outcome_class(Metrics.of(_document())) == "good"
-    assert outcome_class(Metrics.of(lost | {"passed": False})) == "bad"

@@ -1,26 +1,18 @@
 """All that is written of flights made by hand: metrics, recordings, the data of a report, JUnit, words."""
 
-import base64
-import json
 import math
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
-from pyarrow import parquet
-from synthetic import FDI, Expect, Fault, Flight, Scenario
+from synthetic import Expect, Fault, Flight, Scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results import report, verdict
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_recording
+from beaver_ftc.results import verdict
+from beaver_ftc.results.exports import write_acmi
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
-from beaver_ftc.results.log import ParquetLog, unit_of, units
-from beaver_ftc.results.metrics import as_json, fault_free_s, hints, measure, metrics
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Expectation, Judged, Metrics
-from beaver_ftc.results.report import register_section, render
-from beaver_ftc.results.style import MODE_COLOURS
-from kept import in_short
 
 SENSOR = SimpleNamespace(
     sensor="q", type="bias", at_s=5.0, end_s=None, profile="abrupt",
@@ -98,229 +90,6 @@ def test_the_words_of_a_flight(name, changed):
     })  # fmt: skip
 
 
-def test_a_fault_free_time_ends_with_the_first_alarm_or_fault():
-    assert fault_free_s(FLIGHTS["quiet"]) == 30.0
-    assert fault_free_s(FLIGHTS["eventful"]) == 2.0
-    assert fault_free_s(FLIGHTS["lost"]) == 5.0
-
-
-@pytest.mark.parametrize(
-    ("end", "said"),
-    [
-        ((50.0, 2100.0), ""),
-        ((50.1, 1800.0), "airspeed rose from 45 to 50 m/s"),
-        ((39.9, 2101.0), "airspeed fell from 45 to 40 m/s and altitude rose from 1800 to 2101 m"),
-    ],
-)
-def test_a_flight_has_drifted_beyond_5_mps_or_300_m(end, said):
-    initial = SimpleNamespace(airspeed_mps=45.0, altitude_m=1800.0)
-    found = hints(
-        Flight(scenario=Scenario(initial=initial), end=end), Metrics.of({"detection": {"detected": True}})
-    )
-    assert "".join(found) == (said and f"{said} (only the body rates are controlled in this scenario)")
-
-
-@pytest.mark.parametrize(("taken_s", "explained"), [(13.0, False), (13.25, True), (13.5, True)])
-def test_a_late_reallocation_is_explained(taken_s, explained):
-    late = Flight(supervisor=[(0.0, "nominal"), (taken_s, "reallocated")], isolation_time_s=12.25)
-    assert any("when it was certain" in said for said in metrics(late)["hints"]) is explained
-
-
-@pytest.mark.parametrize(
-    ("spans", "together"),
-    [
-        ([(2.0, 5.0), (5.0, 8.0)], False),
-        ([(2.0, 5.0), (4.9, 8.0)], True),
-        ([(2.0, None), (29.0, None)], True),
-        ([(2.0, None), (30.0, None)], False),
-    ],
-)
-def test_faults_that_touch_are_not_at_once(spans, together):
-    fdi = SimpleNamespace(**vars(FDI) | {"fault_class": "all"})
-    surfaces = ("elevator", "rudder")
-    faults = tuple(
-        Fault(at_s=at, end_s=end, actuator=s) for s, (at, end) in zip(surfaces, spans, strict=True)
-    )
-    said = metrics(Flight(scenario=Scenario(faults=faults, fdi=fdi)))["hints"]
-    assert bool(said) is together
-    for one in said:
-        assert one == ("faults on several surfaces at once: the diagnosis looks for one; set fdi.pairs: true")
-
-
-FRAMES, HZ = 6, 50.0
-ANGLES, ROOM = (
-    ("phi_rad", "theta_rad", "psi_rad", "alpha_rad", "beta_rad"),
-    ("north_m", "east_m", "altitude_m"),
-)
-TRAVEL_RAD = {"elevator": 0.4, "flap": 1.0}
-LOGGED = (
-    "t_s", *ROOM, *ANGLES, "airspeed_mps", "qdyn_pa", "flap_pos_rad", *(f"{a}_measured_rad_s" for a in "pqr"),
-    *(f"{s}_cmd_rad" for s in TRAVEL_RAD),
-)  # fmt: skip
-
-
-def _written(path, frames=FRAMES, hz=HZ, group=4):
-    rows = np.outer(np.arange(frames), np.linspace(0.01, 0.2, len(LOGGED))) + np.arange(len(LOGGED)) / 100
-    rows[:, 0] = np.arange(frames) / hz
-    with ParquetLog(path, group) as log:
-        log.open(LOGGED)
-        log.write(rows)
-    return path
-
-
-@pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)
-def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
-    write_recording(_written(tmp_path / "log.parquet"), TRAVEL_RAD, kind, tmp_path)
-    content = (tmp_path / RECORDING_FILE_OF_KIND[kind]).read_bytes()
-    said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
-    assert not changed({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
-
-
-def test_a_tacview_recording(tmp_path, changed):
-    flown = Flight(scenario=Scenario(name="a, b\\c\nd", faults=(Fault(at_s=0.04),)), frames=FRAMES,
-                   detection_time_s=0.06, isolation_time_s=0.2)  # fmt: skip
-    write_acmi(_written(tmp_path / "log.parquet"), measure(flown), tmp_path / "flight.acmi")
-    assert not changed((tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines())
-
-
-@pytest.mark.parametrize(
-    ("hz", "frames", "every"),
-    [(25.0, 6, 1), (26.0, 6, 2), (100.0, 9, 4), (75.0, 12, 3), (10.0, 3, 1), (50.0, 1, 1)],
-)
-def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, every):
-    path = _written(tmp_path / "log.parquet", frames, hz)
-    write_acmi(path, measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
-    lines = (tmp_path / "flight.acmi").read_text().splitlines()
-    shown = [line for line in lines if line.startswith("#")]
-    assert shown == [f"#{i / hz:.3f}" for i in range(0, frames, every)]
-
-
-def test_a_place_is_told_by_the_radius_at_the_start(tmp_path):
-    """A flight that begins 629 km up and ends on the ground: 122.173 km to the north are a degree there."""
-    rows = np.zeros((2, len(LOGGED)))
-    rows[:, 0], rows[:, LOGGED.index("altitude_m")] = [0.0, 0.04], [629_000.0, 0.0]
-    rows[:, LOGGED.index("north_m")] = math.radians(1.0) * 7_000_000.0
-    with ParquetLog(tmp_path / "log.parquet") as log:
-        log.open(LOGGED)
-        log.write(rows)
-    write_acmi(tmp_path / "log.parquet", measure(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
-    text = (tmp_path / "flight.acmi").read_text()
-    assert text.count("b1,T=0.00000000|46.00000000|") == 2
-
-
-def test_a_false_alarm_is_one_before_the_fault_by_more_than_rounding():
-    for early_s, false in ((1.5e-9, True), (1e-9, False), (0.5e-9, False)):
-        flown = Flight(scenario=Scenario(faults=(Fault(at_s=1.0),)), detection_time_s=1.0 - early_s)
-        assert metrics(flown)["false_alarm"] is false
-
-
-def test_a_change_that_ended_a_diagnosis_says_whether_its_alarm_was_false():
-    ended = tuple({"time_s": 9.0, "detection_time_s": at_s, "isolated": None} for at_s in (None, 2.0, 6.0))
-    flown = metrics(Flight(scenario=Scenario(faults=(Fault(at_s=5.0),)), changes=({"time_s": 1.0}, *ended)))
-    assert [change.get("false_alarm") for change in flown["changes"]] == [None, None, True, False]
-    assert flown["false_alarm"] is True
-
-
-def test_numbers_have_nine_decimals_and_texts_their_letters():
-    flown = metrics(Flight(scenario=Scenario(rate_hz=30.0), frames=100, estimate=-1 / 3))
-    assert flown["flight"]["flown_s"] == 3.333333333
-    assert flown["isolation"]["estimate"] == -0.333333333
-    assert as_json({"é": [1, "\udce9"]}) == '{\n  "é": [\n    1,\n    "\\udce9"\n  ]\n}\n'
-
-
-def _folder(path, flight, group=1000):
-    path.mkdir()
-    columns = [
-        name for name in flight.columns if not name.startswith(("fie_rudder", "fie_aileron", "aileron"))
-    ]
-    t_s = np.arange(flight.frames) / flight.scenario.rate_hz
-    with ParquetLog(path / "log.parquet", group) as log:
-        log.open(columns)
-        log.write(np.column_stack([t_s, *(np.sin(t_s + i) for i in range(1, len(columns)))]))
-    (path / "metrics.json").write_text(as_json(metrics(flight)))
-    (path / "scenario.yaml").write_text("description: By hand.\n")
-    return path
-
-
-def _unpacked(data):
-    """The data of a page, its curves in short."""
-    for run in data["runs"]:
-        for level in run["levels"]:
-            for name, text in level.items():
-                kind = "<f8" if name == "t_s" else "<f4"
-                numbers = np.frombuffer(base64.b64decode(text), kind)
-                level[name] = [float(f"{n:.4g}") for n in in_short(numbers)]
-            level_names = ["t_s", "q_rad_s", "mode", "psi_rad", "q_ratio"]
-            level.update({"columns": sorted(level), **{name: level[name] for name in level_names}})
-            for name in set(level) - {*level_names, "columns"}:
-                del level[name]
-    return data
-
-
-def _data_of(html):
-    return json.loads(html.partition('id="data">')[2].partition("</script>")[0])
-
-
-@pytest.fixture(scope="module")
-def folders(tmp_path_factory):
-    runs = tmp_path_factory.mktemp("runs")
-    short = Flight(scenario=Scenario(rate_hz=10.0), frames=200)
-    none = Flight(scenario=Scenario(rate_hz=10.0, faults=()), frames=0, detection_time_s=None,
-                  isolation_time_s=None, isolated=None)  # fmt: skip
-    return [_folder(runs / "short", short), _folder(runs / "none", none)]
-
-
-def test_the_data_of_a_report(folders, changed):
-    data = _unpacked(_data_of(render(folders, ["one", "two"])))
-    assert data["modes"] == [list(pair) for pair in MODE_COLOURS.items()]
-    assert not changed(data["runs"], part="runs")
-    views = [view | {"panels": view["panels"][:2]} for view in data["views"] if view["name"] != "states"]
-    assert not changed({"views": views, "looks": sorted(data["looks"])}, part="views")
-
-
-def test_a_long_flight_is_shown_whole_and_around_the_fault(tmp_path):
-    """8 runs: 1000 points a curve; 2.5 s about the window from 11.5 s to 14.12 s in full resolution."""
-    long = _folder(tmp_path / "long", Flight(), 3000)
-    data = _data_of(render([long] * 8))
-    for run in data["runs"]:
-        whole, near = (np.frombuffer(base64.b64decode(level["t_s"]), "<f8") for level in run["levels"])
-        assert whole.size == 1000
-        assert near[[0, -1]] == pytest.approx([9.0, 16.61], abs=0.011)
-        assert np.diff(near) == pytest.approx(0.01)
-    (alone,) = _data_of(render([long]))["runs"]
-    assert len(alone["levels"]) == 1
-    points = [len(_data_of(render([long] * n))["runs"][0]["levels"][0]["mode"]) for n in (3, 20)]
-    per = 16 / 3  # characters of base64 for four bytes
-    assert points == pytest.approx([per * 2 * 3000 / 3, per * 600], rel=0.01)
-
-
-def test_a_quiet_flight_is_shown_from_its_first_instant_to_its_last(tmp_path):
-    none = {"detection_time_s": None, "isolation_time_s": None, "isolated": None}
-    quiet = Flight(scenario=Scenario(rate_hz=10.0, faults=()), frames=200, **none)
-    folder = _folder(tmp_path / "quiet", quiet)
-    (run,) = _data_of(render([folder]))["runs"]
-    assert run["window"] == [0.0, 19.9]
-    report.write_report(tmp_path / "report.html", [folder])
-    assert (tmp_path / "report.html").read_text(encoding="utf-8") == render([folder])
-
-
-def test_the_page_of_a_report(folders, changed):
-    html = render(folders)
-    words = html.partition("</style>")[2].partition('<script type="application/json"')[0]
-    assert not changed([line.strip() for line in words.splitlines() if line.strip() and "jsbsim" not in line])
-
-
-def test_a_section_is_shown_once_of_each_run(folders, monkeypatch):
-    monkeypatch.setattr(report, "_REGISTERED_SECTIONS", [])
-    for _ in range(2):
-        register_section(_say_where)
-    assert render(folders).count("<em>in ") == 2
-
-
-def _say_where(folder):
-    return f"<em>in {folder.name}</em>"
-
-
 MISSED = (
     Expectation("a", False, 1, None), Expectation("b", True, 1, 1), Expectation("c", False, "x" * 20_000, []),
 )  # fmt: skip
@@ -339,20 +108,11 @@ def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
         write_junit([], tmp_path / "file" / "junit.xml")
 
 
-def test_units_by_the_ends_of_names():
-    said = {
-        "p_rad_s2": "rad/s2", "x_deg_s": "deg/s", "p_rad_s": "rad/s", "gain_per_s": "1/s", "phi_rad": "rad",
-        "phi_deg": "deg", "airspeed_mps": "m/s", "manifold_pressure_inhg": "inHg", "qdyn_pa": "Pa",
-        "rate_hz": "Hz", "north_m": "m", "t_s": "s", "mode": "1", "size_deg.q": "deg",
-    }  # fmt: skip
-    assert units(said) == said
-    assert unit_of("rms_rad_s.time_s") == "s"
-
-
-def test_a_log_is_written_without_compressing_twice(tmp_path):
-    """Snappy, no dictionaries, no statistics, no nulls: what every reader opens, and costs least."""
-    file = parquet.ParquetFile(_written(tmp_path / "log.parquet"))
-    assert [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)] == [4, 2]
-    column = file.metadata.row_group(0).column(1)
-    assert (column.compression, column.statistics, column.has_dictionary_page) == ("SNAPPY", None, False)
-    assert not any(field.nullable for field in file.schema_arrow)
+def test_a_tacview_recording_has_25_frames_a_second(log_path, found, tmp_path):
+    write_acmi(log_path, found, tmp_path / "flight.acmi")
+    lines = (tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines()
+    times = [float(line[1:]) for line in lines if line.startswith("#")]
+    assert times == pytest.approx([k / 25.0 for k in range(len(times))])
+    assert 29.9 < times[-1] < 30.0
+    events = [line.rpartition("|")[2] for line in lines if "Event=Bookmark" in line]
+    assert [event.split()[0] for event in events] == ["fault", "detection", "isolation"]

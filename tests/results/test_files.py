@@ -1,187 +1,18 @@
 """What lies on the disk: logs whole, sliced, damaged or too large; result folders, exchanged and refused."""
 
-import ctypes
-import errno
-import os
 import shutil
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
-import pyarrow as pa
 import pytest
-from pyarrow import parquet
 from synthetic import Flight
 
 import beaver_ftc as bf
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import log, writer
 from beaver_ftc.results.flight import Flight as Opened
-from beaver_ftc.results.log import Columns, MemoryLog, ParquetLog, log_dataframe
-from beaver_ftc.results.metrics import measure, metrics
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.writer import refuse_foreign, result_folder
 from beaver_ftc.scenario.schema import Scenario
-
-NAMES = ("t_s", "x", "y")
-
-
-def _rows(frames, first=0):
-    return np.arange(first, first + frames)[:, None] * [0.5, 1.0, -2.0]
-
-
-def _filled(sink, *pieces):
-    sink.open(NAMES)
-    for piece in pieces:
-        buffer = piece.copy()
-        sink.write(buffer)
-        buffer[:] = np.nan  # the loop reuses its buffer
-    sink.close()
-    return sink
-
-
-def _open_files():
-    return set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").exists() else set()
-
-
-def test_a_group_has_16384_rows_and_the_file_is_closed(tmp_path):
-    before = _open_files()
-    _filled(ParquetLog(tmp_path / "log.parquet"), _rows(16_000), _rows(385, 16_000))
-    assert [chunk["x"].size for chunk in log.read_chunks(tmp_path / "log.parquet")] == [16_384, 1]
-    assert np.array_equal(log.read(tmp_path / "log.parquet", ["y"])["y"], _rows(16_385)[:, 2])
-    assert _open_files() == before
-
-
-def test_a_log_never_opened_is_closed_all_the_same(tmp_path):
-    ParquetLog(tmp_path / "log.parquet").close()
-    assert not (tmp_path / "log.parquet").exists()
-
-
-def test_a_file_is_closed_whatever_its_last_rows_come_to(tmp_path, monkeypatch):
-    sink, before = ParquetLog(tmp_path / "log.parquet"), _open_files()
-    sink.open(NAMES)
-    sink.write(_rows(3))
-
-    def full(writer):
-        raise OSError(errno.ENOSPC, "raised by the test")
-
-    monkeypatch.setattr(sink, "_flush", full)
-    with pytest.raises(OSError, match="raised by the test"):
-        sink.close()
-    sink.close()  # once is enough
-    assert _open_files() == before
-
-
-def test_a_log_in_memory_is_one_table_whatever_its_pieces():
-    kept = _filled(MemoryLog(), _rows(2), _rows(3, 2), _rows(1, 5))
-    assert kept.row_count() == 6
-    assert [chunk["y"].size for chunk in kept.read_chunks()] == [2, 3, 1]
-    then = kept.frozen_copy()
-    assert list(next(then.read_chunks(["y", "t_s"]))) == ["y", "t_s"]
-    assert np.array_equal(kept.rows, _rows(6))
-    kept.write(_rows(1))
-    assert (then.row_count(), kept.row_count()) == (6, 7)
-    empty = _filled(MemoryLog())
-    assert (empty.rows.shape, list(empty.read_chunks())) == ((0, 3), [{n: pytest.approx([]) for n in NAMES}])
-
-
-def test_columns_of_a_flight_all_or_some():
-    every, some = (_filled(Columns(*names), _rows(2), _rows(2, 2)) for names in ((), ("y", "t_s")))
-    assert (list(every), list(some)) == (list(NAMES), ["y", "t_s"])
-    assert np.array_equal(every.read("y", "x"), _rows(4)[:, [2, 1]])
-    assert {name: list(column) for name, column in some.since(1.0).items()} == {
-        "y": [-4.0, -6.0],
-        "t_s": [1.0, 1.5],
-    }
-
-
-def test_part_of_a_column_is_read_from_where_it_begins():
-    whole = pa.array([1.0, 2.0, 3.0, 4.0])
-    parts = pa.chunked_array([whole.slice(1, 2), whole.slice(3)])
-    assert list(log._column_values(parts)) == [2.0, 3.0, 4.0]
-    assert log._column_values(pa.chunked_array([], pa.float64())).size == 0
-
-
-@pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
-def test_a_row_group_of_a_million_rows_at_most_is_read(tmp_path, rows, allowed):
-    table = pa.table({"t_s": pa.array(np.zeros(rows))})
-    parquet.write_table(table, tmp_path / "log.parquet", row_group_size=rows)
-    if allowed:
-        assert log.row_count(tmp_path / "log.parquet") == rows
-        return
-    with pytest.raises(BadInput, match=r"has 1,000,001 rows in a row group, allowed: up to 1,000,000"):
-        log.row_count(tmp_path / "log.parquet")
-
-
-def test_what_is_no_log_and_what_cannot_be_read(tmp_path, monkeypatch):
-    (tmp_path / "log.parquet").write_bytes(b"PAR1 is how it begins")
-    with pytest.raises(BadInput, match="is damaged or cut short"):
-        log.column_names(tmp_path / "log.parquet")
-
-    def broken(*_, **__):
-        raise OSError(errno.EIO, "raised by the test")
-
-    monkeypatch.setattr(parquet, "ParquetFile", broken)
-    with pytest.raises(OSError, match="raised by the test"):
-        log.column_names(tmp_path / "log.parquet")
-
-
-def test_a_table_is_the_same_from_memory_and_from_the_disk(tmp_path, changed):
-    found = measure(Flight(departure=(20.0, "alpha_rad")))
-    memory = _filled(MemoryLog(), _rows(2), _rows(1, 2))
-    memory.copy_to(tmp_path / "log.parquet")
-    stored = log.StoredLog(tmp_path / "log.parquet")
-    stored.copy_to(tmp_path / "copy.parquet")
-    assert (tmp_path / "copy.parquet").read_bytes() == (tmp_path / "log.parquet").read_bytes()
-    tables = [log_dataframe(each, found) for each in (memory, stored)]
-    assert tables[0].equals(tables[1])
-    assert tables[0].attrs == tables[1].attrs
-    assert not changed(tables[0].attrs)
-
-
-def test_folders_are_exchanged_in_one_step_where_a_system_can(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in ("one", "two"):
-        Path(name).mkdir()
-        Path(name, name).touch()
-    can = hasattr(ctypes.CDLL(None), "renameat2")
-    assert writer._swap_folders(Path("one"), Path("two")) is can
-    assert Path("one", "two" if can else "one").exists()
-    if can:
-        with pytest.raises(FileNotFoundError):
-            writer._swap_folders(Path("one"), Path("three"))
-    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
-    assert writer._swap_folders(Path("one"), Path("two")) is False
-
-
-@pytest.mark.parametrize("number", [errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EACCES])
-def test_a_kernel_or_a_file_system_that_cannot_exchange_is_no_error(monkeypatch, number):
-    """An old kernel, a file system without it; what else goes wrong is said."""
-    asked = []
-
-    def renameat2(*arguments):
-        asked.append(arguments)
-        ctypes.set_errno(number)
-        return -1
-
-    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(renameat2=renameat2))
-    if number == errno.EACCES:
-        with pytest.raises(PermissionError):
-            writer._swap_folders(Path("one"), Path("two"))
-    else:
-        assert writer._swap_folders(Path("one"), Path("two")) is False
-    assert [each[1:4:2] for each in asked] == [(b"one", b"two")]
-
-
-def test_a_folder_is_locked_once(tmp_path, monkeypatch):
-    before = _open_files()
-    with writer._locked(tmp_path) as first, writer._locked(tmp_path) as second:
-        assert (first, second) == (True, False)
-    with writer._locked(tmp_path) as again:
-        assert again is True
-    monkeypatch.setattr(writer, "fcntl", None)
-    with writer._locked(tmp_path) as locked:
-        assert locked is False
-    assert _open_files() == before
 
 
 @pytest.mark.parametrize(
@@ -228,33 +59,6 @@ def test_what_appears_in_its_place_meanwhile_is_not_lost(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["case"]
 
 
-def test_what_went_wrong_first_is_said_and_every_file_is_brought_to_the_disk(tmp_path, monkeypatch):
-    synced, fsync, before = [], os.fsync, _open_files()
-
-    def note(descriptor):
-        synced.append(os.path.basename(os.readlink(f"/proc/self/fd/{descriptor}")))
-        fsync(descriptor)
-
-    if before:
-        monkeypatch.setattr(os, "fsync", note)
-    with result_folder(tmp_path, "case") as folder:
-        (folder / "metrics.json").touch()
-        (folder / "figures").mkdir()
-    assert not before or [name.partition("-")[0] for name in synced] == [
-        "metrics.json",
-        "figures",
-        ".case.partial",
-    ]
-    assert _open_files() == before
-
-    def full(self, target):
-        raise OSError(errno.ENOSPC, "raised by the test")
-
-    monkeypatch.setattr(Path, "rename", full)
-    with pytest.raises(SimulationFailed, match="no space left on device"), result_folder(tmp_path, "new"):
-        pytest.fail("it cannot be begun")
-
-
 @pytest.fixture(scope="module")
 def own(tmp_path_factory):
     """A scenario of the user's own aircraft, with more in its folder than a model is made of."""
@@ -298,23 +102,3 @@ def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
     stops = flown.airframe.travel["flap"]
     assert stops.max_rad > abs(stops.min_rad)
     assert written["flap_command"] == pytest.approx(flap / stops.max_rad)
-
-
-def test_a_flight_is_saved_with_its_report_unless_told_otherwise(tmp_path, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(writer, "write_report_files", lambda folder, document, **_: drawn.append(folder.name))
-    sim = bf.Simulation(Scenario(name="short", duration_s=0.2))
-    sim.step(frames=3)
-    for saved in (sim, sim.land()):
-        assert saved.save(tmp_path) == tmp_path / "short"
-        saved.save(tmp_path, report=False)
-    assert len(drawn) == 2
-    flight = bf.open_run(tmp_path / "short")
-    assert (flight.name, flight.fault, flight.departure, len(flight.log)) == ("short", None, None, 4)
-    (tmp_path / "short" / "log.parquet").unlink()
-    with pytest.raises(BadInput, match="this flight kept no log"):
-        _ = bf.open_run(tmp_path / "short").log
-    with pytest.raises(BadInput, match=r"3 is no folder, allowed: the result folder of a run"):
-        bf.open_run(3)
-    with pytest.raises(BadInput, match=r"no metrics\.json can be read there"):
-        bf.open_run(str(tmp_path))

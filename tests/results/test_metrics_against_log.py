@@ -684,26 +684,3 @@ def test_an_airspeed_that_is_within_what_is_expected_as_a_mean_alone():
     assert judged["actual"] == pytest.approx(mean, rel=2e-3)
     said = f"airspeed {judged['actual']:.3g} m/s (10 s mean; largest at one instant {at_once:.3g})"
     assert said in dict(verdict.verdict_lines(model.Metrics.of(flight.metrics)))["profile"]
-
-
-def test_the_flights_show_what_is_compared():
-    """Every field has a value in one of them, but for what only longer flights and other types have."""
-    empty = None
-    for name, given in FLIGHTS.items():
-        metrics = bf.fly(bf.load({"name": name} | given), log=False).metrics
-        here = {where for where, value in leaves(metrics) if value in (None, [], {}, 0, False)}
-        empty = here if empty is None else empty & here
-    assert {where for where in empty if not where.startswith("saturation_s.")} == {
-        "mode_changes_left_out", "envelope.exits_left_out", "limits", "engine_power", "isolation.probing_s",
-        "outside_class",
-        "isolation.frequency_rad_s", "isolation.estimate_deg",
-    }  # fmt: skip
-
-
-def leaves(section, path=""):
-    for key, value in section.items():
-        here = f"{path}.{key}" if path else key
-        if isinstance(value, dict) and value:
-            yield from leaves(value, here)
-        else:
-            yield here, value

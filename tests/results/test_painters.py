@@ -3,28 +3,24 @@
 import os
 import signal
 import sys
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.results import figures
 from beaver_ftc.results import painters as module
 from beaver_ftc.results.figures import pictures_of, save
-from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.painters import drawing, painters, shares_of_equal_work
+from beaver_ftc.results.painters import drawing, painters
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux")
 
 
 @pytest.fixture
-def pictures(log_path, flight, tmp_path, monkeypatch):
+def pictures(log_path, found, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_can_fork", lambda: True)  # whatever threads other tests have left
     (tmp_path / "beside").mkdir()
-    return pictures_of(log_path, measure(flight), tmp_path / "beside")[-3:]
+    return pictures_of(log_path, found, tmp_path / "beside")[-3:]
 
 
 @pytest.fixture(scope="module")
@@ -89,37 +85,3 @@ def test_a_failure_is_raised_here_once_all_have_ended(pictures, tmp_path):
         drawing([*pictures, nowhere], at_work),
     ):
         pass
-
-
-def test_whoever_has_least_draws_the_next_largest(pictures):
-    sizes = sorted(len(p.view.panels) for p in pictures)
-    assert [[len(p.view.panels) for p in each] for each in shares_of_equal_work(pictures, 2)] == [
-        [sizes[2]],
-        [sizes[1], sizes[0]],
-    ]
-
-
-def test_nobody_is_begun_for_no_figures():
-    with painters(wanted=False) as at_work:
-        assert at_work == ()
-
-
-def test_nobody_is_begun_beside_another_thread():
-    done = threading.Event()
-    other = threading.Thread(target=done.wait)
-    other.start()
-    try:
-        with painters() as at_work:
-            assert at_work == ()
-    finally:
-        done.set()
-        other.join()
-
-
-def test_figures_are_drawn_anew_into_a_folder_that_is_there(tmp_path, monkeypatch):
-    pictures, saved = [SimpleNamespace(path=tmp_path / "figures" / "one.png")], []
-    monkeypatch.setattr(figures, "pictures_of", lambda *of: pictures)
-    monkeypatch.setattr(figures, "save", saved.append)
-    for times in (1, 2):
-        assert figures.write_figures(None, None, tmp_path / "figures") == [pictures[0].path]
-        assert saved == pictures * times

@@ -22,11 +22,6 @@ def path(tmp_path):
     return tmp_path / "log.parquet"
 
 
-def test_short_log_is_returned_as_it_is(path):
-    x = np.random.default_rng(1).standard_normal(3000)
-    np.testing.assert_array_equal(read_series(_log(path, 3000, x=x), ["x"])["x"], x)
-
-
 def test_long_log_keeps_every_peak_at_its_time(path):
     x = np.zeros(50_000)
     x[12_345], x[33_333] = 7.0, -3.0
@@ -42,14 +37,6 @@ def test_window_of_a_long_log_is_in_full_resolution(path):
     x = np.arange(50_000.0)
     series = read_series(_log(path, 50_000, x=x), ["x"], (99.995, 110.005), max_points=2000)
     np.testing.assert_array_equal(series["x"], np.arange(10_000, 11_001))
-
-
-def test_what_is_not_there_stays_absent_without_hiding_its_neighbours(path):
-    x = np.full(50_000, np.nan)
-    x[25_001] = 2.0
-    series = read_series(_log(path, 50_000, x=x), ["x"], max_points=400)
-    assert np.nanmax(series["x"]) == 2.0
-    assert np.isnan(series["x"][:100]).all()
 
 
 def test_heading_goes_on_where_it_passes_north(path):
@@ -71,8 +58,3 @@ def test_ratio_is_of_the_bound_on_the_residuals_side(path):
     series = read_series(path, ["q_ratio", "fie_e_q_ratio"])
     np.testing.assert_allclose(series["fie_e_q_ratio"], [0.25, 0.5, 0.75, np.nan])
     np.testing.assert_allclose(series["q_ratio"], [np.nan, 1.0, 1.5, np.nan])
-
-
-def test_single_row_and_empty_log(tmp_path):
-    assert read_series(_log(tmp_path / "one", 1), ["x"])["x"].size == 1
-    assert read_series(_log(tmp_path / "none", 0), ["x"])["x"].size == 0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.documents.errors import BadInput
 from flying import loss, scenario
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer-flight.yaml"
@@ -46,45 +45,3 @@ def test_a_continued_flight_is_the_uninterrupted_one(kind):
     assert same(ended(first).log, ended(sim).log)
     assert first.land().metrics == sim.land().metrics
     assert same(ended(kept.resume()).log, sim.log), "any number of times"
-
-
-def test_clones_go_their_own_ways():
-    sim = bf.Simulation(KINDS["published"])
-    sim.step(frames=140)
-    healthy = sim.clone()
-    healthy.inject({"actuator": "elevator", "type": "stuck", "position_deg": 3})
-    assert not same(ended(healthy).log, ended(sim).log)
-    assert same(sim.log, bf.fly(KINDS["published"]).log), "what was done to the clone changes nothing here"
-
-
-def test_before_the_first_step_nothing_is_flown():
-    kept = bf.Simulation(KINDS["published"], log=False).snapshot()
-    assert kept.resume().frames == kept.frames == 0
-    with pytest.raises(BadInput, match="kept no log"):
-        _ = kept.resume().log
-    looked_at = bf.Simulation(KINDS["published"])
-    assert len(looked_at.rows) == 1
-    assert looked_at.clone().frames == looked_at.frames == 1
-
-
-class Quiet:
-    """A detector that never raises an alarm."""
-
-    def reset(self, context):
-        self.seen = 0
-
-    def step(self, measured, command):
-        self.seen += 1
-        return bf.Verdict()
-
-
-def test_objects_plugged_in_are_new_ones_of_each_continued_flight():
-    sim = bf.Simulation(KINDS["published"], detector=Quiet())
-    sim.step(frames=50)
-    kept, again = sim.snapshot(), Quiet()
-    with pytest.raises(BadInput, match="resume: a flight with detector is resumed, allowed: new objects"):
-        kept.resume()
-    assert same(ended(kept.resume(detector=again)).log, ended(sim).log)
-    assert again.seen == sim.frames
-    with pytest.raises(BadInput, match="a flight with no plug-in"):
-        bf.Simulation(KINDS["published"]).snapshot().resume(detector=again)

@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -37,12 +36,6 @@ def test_result_appears_only_when_it_is_whole(tmp_path):
         assert not (out / "case").exists()
     assert (out / "case" / "metrics.json").read_text() == "new"
     assert _names(out) == ["case"]
-
-
-def test_failure_leaves_no_trace_not_even_of_its_parents(tmp_path):
-    with pytest.raises(KeyError), result_folder(tmp_path / "deep" / "runs", "case"):
-        raise KeyError
-    assert _names(tmp_path) == []
 
 
 @pytest.mark.parametrize("can_exchange", [True, False])
@@ -94,23 +87,6 @@ def test_killed_run_leaves_nothing_at_the_final_name_and_the_next_one_cleans_up(
     assert _names(tmp_path) == ["case"]
 
 
-def test_run_in_progress_is_not_taken_for_a_leftover(tmp_path):
-    with result_folder(tmp_path, "case") as folder:
-        (folder / "metrics.json").write_text("slow")
-        other = threading.Thread(target=_result, args=(tmp_path, "quick"))
-        other.start()
-        other.join()
-        assert (folder / "metrics.json").read_text() == "slow"
-    assert (tmp_path / "case" / "metrics.json").read_text() == "slow"
-    assert _names(tmp_path) == ["case"]
-
-
-def test_leftover_of_another_scenario_is_left_alone(tmp_path):
-    (tmp_path / ".case-2.partial-x").mkdir()
-    _result(tmp_path, "new", "case")
-    assert _names(tmp_path) == [".case-2.partial-x", "case"]
-
-
 @pytest.mark.parametrize("stranger", ["thesis.tex", ".git"])
 def test_folder_with_something_else_in_it_is_not_touched(tmp_path, stranger):
     (tmp_path / "case" / stranger).mkdir(parents=True)
@@ -118,20 +94,6 @@ def test_folder_with_something_else_in_it_is_not_touched(tmp_path, stranger):
         pytest.fail("refuse before flying, not after")
     assert _names(tmp_path) == ["case"]
     assert _names(tmp_path / "case") == [stranger]
-
-
-def test_file_in_the_place_of_the_result_is_not_touched(tmp_path):
-    (tmp_path / "case").write_text("mine")
-    with pytest.raises(SimulationFailed, match="not a folder"), result_folder(tmp_path, "case"):
-        pass
-    assert (tmp_path / "case").read_text() == "mine"
-
-
-def test_out_that_is_a_file_is_a_clear_error(tmp_path):
-    (tmp_path / "runs").write_text("")
-    with pytest.raises(SimulationFailed, match=r"cannot write .*runs/case: ") as failed:
-        _result(tmp_path / "runs", "x")
-    assert "\n" not in str(failed.value)
 
 
 def test_full_disk_is_a_clear_error_and_leaves_nothing(tmp_path, monkeypatch):
@@ -146,25 +108,3 @@ def test_full_disk_is_a_clear_error_and_leaves_nothing(tmp_path, monkeypatch):
         _result(tmp_path / "older", "y")
     assert _names(tmp_path) == ["older"]
     assert (tmp_path / "older" / "case" / "metrics.json").read_text() == "x"
-
-
-def test_result_is_readable_for_whom_the_umask_allows(tmp_path):
-    _result(tmp_path, "x")
-    mask = os.umask(0)
-    os.umask(mask)
-    assert (tmp_path / "case").stat().st_mode & 0o777 == 0o777 & ~mask
-
-
-@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
-def test_a_result_with_figures_of_any_format_can_be_replaced(tmp_path, kind):
-    """A PDF has its metadata at its end."""
-    from matplotlib.figure import Figure
-
-    mark = "Software" if kind == "png" else "Creator"
-    for _ in range(2):
-        with result_folder(tmp_path, "case") as folder:
-            (folder / "figures").mkdir()
-            drawn = Figure()
-            drawn.subplots().plot(range(300))
-            drawn.savefig(folder / f"figures/states.{kind}", metadata={mark: "beaver-ftc"})
-    assert (tmp_path / f"case/figures/states.{kind}").stat().st_size > 4096

@@ -9,7 +9,6 @@ import needs
 from beaver_ftc.aircraft.aircraft import load as load_aircraft
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario import airframe
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario, load
 
@@ -78,28 +77,12 @@ def test_a_mistake_is_said_at_its_line(folder, old, new, says):
     assert sorted(changed(folder, old, new)) == says
 
 
-@needs.service("compare")
-def test_a_model_that_needs_a_file_that_is_not_there_is_bad_input(folder):
-    model = folder / "trainer" / "trainer.xml"
-    model.write_text(model.read_text().replace("<aerodynamics>", '<system file="none"/>\n<aerodynamics>', 1))
-    (line,) = changed(folder, "made-up", "made up")
-    assert line.startswith("5: jsbsim: JSBSim cannot load trainer/trainer.xml: it needs the file none.xml")
-
-
 @pytest.mark.parametrize("linked", ["aircraft.yaml", "trainer.xml"])
 def test_a_link_out_of_the_scenarios_folder_is_refused(folder, linked):
     (folder / "trainer" / linked).unlink(missing_ok=True)
     (folder / "trainer" / linked).symlink_to(TRAINER / linked)
     with pytest.raises(BadInput, match=f"'./trainer/{linked}' leads outside, allowed: files below"):
         find_aircraft("./trainer", folder)
-
-
-def test_an_aircraft_of_the_users_own_alone_is_compared_with_its_model(folder, monkeypatch):
-    """Of any other nothing is found out again, wherever the file lies that names it."""
-    asked = []
-    monkeypatch.setattr(airframe, "offered", {"compare": asked.append}.get)
-    own = [find_aircraft(name, folder) for name in ("beaver", "./trainer")][1]
-    assert asked == [own]
 
 
 def test_an_unknown_aircraft_is_the_one_mistake_and_a_scenario_keeps_its_own():

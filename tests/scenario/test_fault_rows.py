@@ -4,18 +4,11 @@ import pytest
 
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import (
-    HEALTHY,
-    HOLDING,
-    SENSOR_TYPES,
     TYPES,
     Past,
-    fault_name,
-    is_share,
-    of_a_sensor,
-    place_of,
 )
 from beaver_ftc.scenario.interventions import fault_of
-from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
+from beaver_ftc.scenario.sensors import Sensors
 from scenario.damageable import damageable
 
 GIVEN = {
@@ -67,106 +60,6 @@ def test_a_quarter_of_a_fault_and_then_the_whole_of_it(kind):
     for share, after in ((0.25, QUARTER.get(kind, AFTER[kind])), (1.0, AFTER[kind])):
         fault(kind, **GIVEN[kind]).strike(found, share, Past(at_rad=0.7))
         assert found == pytest.approx(BEFORE | after)
-
-
-def test_a_jam_where_the_surface_was_is_not_moved_by_another():
-    found = dict(BEFORE)
-    fault("stuck").strike(found, 1.0, Past(at_rad=0.7))
-    fault("stuck", position_deg=3.0).strike(found, 1.0, Past(at_rad=0.9))
-    assert found == BEFORE | {"stuck": 1.0, "stuck-at-rad": 0.7}
-
-
-def test_rows_of_the_types(changed):
-    words = ("adds", "stays_where_it_is", "truth", "size", "examples", "button")
-    assert not changed({kind: {word: getattr(row, word) for word in words} for kind, row in TYPES.items()})
-
-
-def test_places():
-    sensor = fault_of({"sensor": "p", "type": "freeze"}, 1.0)
-    assert [place_of(one) for one in (fault("float"), fault("unanticipated"), sensor)] == [
-        "flap", "unanticipated", "p",
-    ]  # fmt: skip
-    assert [of_a_sensor(one) for one in (fault("float"), sensor, {"sensor": 3}, {"type": 3})] == [
-        False, True, True, False,
-    ]  # fmt: skip
-    names = ("p", "flap", "sensor p")
-    assert [fault_name(said, names) for said in ("sensor p", "sensor q", "airspeed", "flap", 3)] == [
-        "sensor p", "q", "V", "flap", 3,
-    ]  # fmt: skip
-
-
-def test_what_instruments_measure(changed):
-    """Units, the largest offset or noise of a fault, and a reading's errors in SI."""
-    given = {"noise_std": 1.0, "bias": -2.0, "quantum": 6.0}
-    found = {}
-    for name, sensor in Sensors():
-        keys = {next(key for key in sensor.si[:3] if key.startswith(kind)): of for kind, of in given.items()}
-        errors = type(sensor).model_validate(keys)
-        found[name] = [*QUANTITIES[name], *errors.noise_bias_quantum, errors.random_error]
-    assert not changed(found)
-    heading = type(Sensors().psi).model_validate({"drift_deg_h": 3600.0})
-    assert heading.drift_rad_s == pytest.approx(PI / 180)
-
-
-def test_what_is_ideal_and_what_covers_what():
-    gyro = type(Sensors().p).model_validate
-    bounded = gyro({"noise_std_deg_s": 1, "bias_deg_s": -2, "scale_error": -0.1})
-    assert not any(one.is_ideal for one in (bounded, gyro({"delay_s": 0.1})))
-    assert gyro({}).is_ideal
-    assert bounded.is_bounded
-    for key in ("delay_s", "bandwidth_rad_s", "dropout_share"):
-        assert not gyro({key: 0.5}).is_bounded
-    same = gyro({"noise_std_deg_s": 1, "bias_deg_s": 2, "scale_error": 0.1})
-    assert bounded.is_within(same)
-    assert same.is_within(bounded)
-    assert not gyro({"quantum_deg_s": 0.1}).is_within(bounded)
-    assert not gyro({"bias_deg_s": 2.1}).is_within(bounded)
-    assert not Sensors.model_validate({"az": {"delay_s": 0.1}}).is_ideal
-
-
-def test_what_nobody_anticipates_comes_last_wherever_types_are_listed():
-    assert list(TYPES)[-1] == "unanticipated"
-    assert set(TYPES) == set(GIVEN)
-
-
-IN_WORDS = {  # each parameter in words, and an estimate of 0.4567 as a size and as a quantity
-    "loss_of_effectiveness": (
-        {"magnitude": "40 %", "kappa_per_s": "growing at 2.5 /s"}, "-45.7 %", "loss -45.7 %",
-    ),
-    "stuck": ({"position_deg": "45 deg"}, "0.457", "0.457"),
-    "hardover": ({"direction": "to the lower stop"}, "0.457", "0.457"),
-    "float": ({}, "0.457", "0.457"),
-    "bias": ({"bias_deg": "-18 deg", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "rate_limit": ({"scale": "20 % of its rate", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "oscillatory": (
-        {"amplitude_deg": "36 deg", "frequency_rad_s": "5 rad/s", "kappa_per_s": "growing at 2.5 /s"},
-        "0.457", "0.457",
-    ),
-    "unanticipated": ({"Cm_alpha3": "Cm_alpha3 8", "kappa_per_s": "growing at 2.5 /s"}, "0.457", "0.457"),
-    "damage": ({"case": "tail off"}, "0.457", "0.457"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", TYPES)
-def test_a_fault_and_its_estimate_in_words(kind):
-    row, (words, size, quantity) = TYPES[kind], IN_WORDS[kind]
-    given = {**GIVEN[kind], "kappa_per_s": 2.5}
-    assert {key: says(given[key]) for key, says in row.in_words.items()} == words
-    assert (row.size_in_words(0.4567), row.estimate_in_words(0.4567)) == (size, quantity)
-    assert is_share(kind) == (kind == "loss_of_effectiveness")
-    assert TYPES["hardover"].in_words["direction"](1) == "to the upper stop"
-    assert TYPES["bias"].in_words["bias_deg"](3.0) == "+3 deg"
-    assert not is_share(None)
-
-
-def test_healthy_values_and_what_holds_a_surface():
-    assert HEALTHY == {
-        "effectiveness": 1.0, "stuck": 0.0, "stuck-at-rad": 0.0, "hardover": 0.0, "float": 0.0,
-        "bias-rad": 0.0, "rate-scale": 1.0, "oscillation-amplitude-rad": 0.0,
-        "oscillation-frequency-rad_sec": 0.0, "Cm-alpha3": 0.0,
-    }  # fmt: skip
-    assert sorted(HOLDING) == ["float", "hardover", "stuck"]
-    assert sorted(SENSOR_TYPES) == ["bias", "freeze", "lost", "noise", "scale"]
 
 
 G = 9.80665

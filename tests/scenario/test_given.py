@@ -20,16 +20,6 @@ class TestLoad:
         mapping = yaml.safe_load(path.read_text(encoding="utf-8"))
         assert bf.load(name) == bf.load(path) == bf.load(str(path)) == bf.load(mapping)
 
-    def test_a_scenario_stays_what_it_is(self):
-        scenario = bf.load("elevator-partial-loss")
-        assert bf.load(scenario) is scenario
-
-    def test_a_mapping_may_lack_a_name_and_hold_numpy(self):
-        scenario = bf.load(
-            {"duration_s": np.float64(3.0), "seed": np.int64(4), "initial": {"altitude_m": 300}}
-        )
-        assert (scenario.duration_s, scenario.seed, scenario.initial.altitude_m) == (3.0, 4, 300.0)
-
     def test_a_table_is_beside_whoever_calls(self, tmp_path, monkeypatch):
         (tmp_path / "rates.csv").write_text("t_s,rate_deg_s\n0,0\n1,2\n", encoding="utf-8")
         monkeypatch.chdir(tmp_path)
@@ -77,15 +67,6 @@ class TestWith:
         assert other.sensors.p.noise_std_deg_s == 0.001
         assert scenario.faults[0].magnitude == 0.4
 
-    def test_sections_that_do_not_change_are_the_same_objects(self):
-        scenario = bf.load("elevator-loss-in-turbulence")
-        other = scenario.with_({"seed": 7, "uncertainty.coefficients.Cm_q": 0.98})
-        assert other.fdi is scenario.fdi
-        assert other.uncertainty.coefficients["Cm_q"] == 0.98
-
-    def test_a_default_that_follows_from_another_key_follows_it(self):
-        assert not bf.load("elevator-partial-loss").with_({"fdi.thresholds": "published"}).fdi.sharpen.memory
-
     @pytest.mark.parametrize(
         ("changes", "says"),
         [
@@ -111,10 +92,6 @@ class TestAnAircraftBesideTheScenario:
         data = {"name": "mine", "aircraft": "./my-uav", "duration_s": 1.0}
         (tmp_path / "mine.yaml").write_text(yaml.dump(data), encoding="utf-8")
         return bf.load(tmp_path / "mine.yaml")
-
-    def test_is_found_again_when_something_changes(self, written, tmp_path):
-        other = written.with_({"seed": 7, "faults": [{"type": "float", "actuator": "flap", "at_s": 0.5}]})
-        assert other.airframe.folder == tmp_path / "my-uav"
 
     def test_is_found_again_by_the_scenario_flown(self, written, tmp_path):
         sim = bf.Simulation(written)

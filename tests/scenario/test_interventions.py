@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario import interventions as done
 from beaver_ftc.scenario.interventions import StickTrack
-from beaver_ftc.scenario.schema import load, stages
+from beaver_ftc.scenario.schema import load
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 STUCK = {"type": "stuck", "actuator": "rudder", "position_deg": 3}
@@ -30,58 +30,6 @@ def test_a_fault_begins_now_and_its_mistakes_are_named_by_its_own_keys():
     )
 
 
-@pytest.mark.parametrize(
-    ("new", "at_s", "known", "is_there"),
-    [
-        (STUCK, 5, (STUCK, 2), True),
-        (STUCK, 2, (STUCK, 2), True),
-        (STUCK, 1, (STUCK, 2), False),  # the one known is yet to come
-        ({**STUCK, "position_deg": 4}, 5, (STUCK, 2), False),
-        ({**STUCK, "actuator": "flap"}, 5, (STUCK, 2), False),
-        (STUCK, 5, ({**STUCK, "end_s": 9}, 2), False),  # it does not stay
-        ({"type": "float", "actuator": "rudder"}, 5, (STUCK, 2), False),
-        (LOSS, 5, (LOSS, 2), False),  # half of a half is a quarter
-        ({"sensor": "p", "type": "freeze"}, 5, ({"sensor": "p", "type": "freeze"}, 2), False),
-    ],
-)
-def test_a_jam_of_a_jammed_surface_is_the_same_again(new, at_s, known, is_there):
-    assert done.is_same_again(done.fault_of(new, at_s), done.fault_of(*known)) is is_there
-
-
-def test_faults_in_force_began_before_the_end_and_lasted():
-    begun = [done.fault_of(LOSS, at_s) for at_s in (0.0, 3.99, 4.0, 5.0)]
-    assert [fault.at_s for fault in done.in_force(begun, 4.0)] == [0.0, 3.99]
-    ended = [begun[1].model_copy(update={"end_s": end_s}) for end_s in (3.0, 3.99, 4.5, None)]
-    assert [fault.end_s for fault in done.in_force(ended, 4.0)] == [4.5, None]
-
-
-def test_gusts_come_one_at_a_time_in_the_order_of_their_times():
-    gust = {"velocity_mps": [0, 0, 5], "rise_s": 1, "hold_s": 0, "fade_s": 1}
-    one = done.with_gust(load({}), gust, 4.0)
-    assert one.environment.gust.at_s == 4.0
-    assert [each.at_s for each in done.with_gust(one, gust, 2.0).environment.gust] == [2.0, 4.0]
-    assert [each.at_s for each in done.with_gust(one, gust, 6.0).environment.gust] == [4.0, 6.0]
-    for at_s in (2.01, 4.0, 5.99):
-        assert said(done.with_gust, one, gust, at_s) == (
-            "gust: another one blows from 4 to 6 s, allowed: one at a time"
-        )
-    assert said(done.with_gust, one, {**gust, "rise_s": 0}, 9.0).startswith("rise_s: 0 is out of range")
-    assert said(done.with_gust, one, 3, 9.0) == (
-        "3 is no gust, allowed: a mapping of `velocity_mps` and its times"
-    )
-
-
-def test_changes_at_one_instant_are_one_and_stand_in_order():
-    law = done.with_change(load({}), {"law": "nominal"}, 4.0)
-    both = done.with_change(law, {"scheme": "none"}, 4.0)
-    (change,) = both.changes
-    assert (change.at_s, change.law, change.scheme, change.sensors) == (4.0, "nominal", "none", None)
-    assert done.with_change(both, {"law": "oracle"}, 4.0).changes[0].law == "oracle"
-    earlier = done.with_change(both, {"sensors": "tactical-grade"}, 2.0)
-    assert [(each.at_s, each.law) for each in earlier.changes] == [(2.0, None), (4.0, "nominal")]
-    assert said(done.with_change, both, {}, 5.0).startswith("(file): says no change")
-
-
 def test_targets_replace_what_was_to_come_on_their_channels():
     legs = [{"at_s": 0, "value": 1000}, {"at_s": 5, "value": 1100}, {"at_s": 9, "value": 1200}]
     given = load({"autopilot": {"altitude_m": legs, "bank_deg": [{"hold": True}]}})
@@ -96,28 +44,6 @@ def test_targets_replace_what_was_to_come_on_their_channels():
         assert said(done.with_targets, load(without), {"altitude_m": 1}, 1.0) == (
             "autopilot: this flight has none, allowed: a scenario with `autopilot`"
         )
-
-
-def test_stages_keep_the_options_of_what_the_scenario_begins_with():
-    scenario = load({
-        "control": {"law": "lqr", "options": {"a": 1.0}},
-        "fdi": {"scheme": "rls-monitor", "options": {"b": 2.0}},
-        "changes": [
-            {"at_s": 1, "law": "nominal", "sensors": "tactical-grade"},
-            {"at_s": 2, "scheme": "none", "declared_sensors": "tactical-grade"},
-            {"at_s": 3, "law": "lqr", "scheme": "rls-monitor"},
-        ],
-    })  # fmt: skip
-    found = [
-        (change.at_s, now.control.law, now.control.options, now.fdi.scheme, now.fdi.options,
-         now.sensors.is_ideal, now.fdi.bounds.sensors.is_ideal)
-        for change, now in stages(scenario)
-    ]  # fmt: skip
-    assert found == [
-        (1, "nominal", {}, "rls-monitor", {"b": 2.0}, False, True),
-        (2, "nominal", {}, "none", {}, False, False),
-        (3, "lqr", {"a": 1.0}, "rls-monitor", {"b": 2.0}, False, False),
-    ]
 
 
 def moved(*rates):
@@ -150,13 +76,6 @@ def test_a_table_of_the_stick_gives_every_frame_its_rate(rates, is_moved, tables
         assert list(np.interp(np.arange(len(rates)) / 10.0, times, of)) == felt
 
 
-def test_the_last_of_several_moves_in_one_frame_counts():
-    track = StickTrack()
-    for k, q in ((0, 1), (0, 2), (3, 4), (3, 5), (3, 6)):
-        track.move(k, np.array([0, q, 0]))
-    assert list(track.tables(1.0)) == [("q", [0.0, 2.0, 3.0], [2.0, 2.0, 6.0])]
-
-
 def test_what_was_flown_is_a_scenario_that_flies_it_again():
     scenario = load({
         "duration_s": 60, "rate_hz": 50, "faults": [{**LOSS, "at_s": 1}],
@@ -185,12 +104,3 @@ def test_what_was_flown_is_a_scenario_that_flies_it_again():
 
 def table(axis, times_s, values_deg_s):
     return {"csv": {"file": "sticks.csv", "column": axis, "time_s": times_s, "values_deg_s": values_deg_s}}
-
-
-def test_a_stick_that_never_rests_does_not_fit_a_table():
-    track = moved(*((0, k % 2 + 1, 0) for k in range(20_000)))
-    assert done.scenario_flown(load({}), [], track, 20_000).reference.q[0].csv.time_s[-1] == 199.99
-    track.move(20_000, None)
-    assert said(done.scenario_flown, load({}), [], track, 20_001) == (
-        "the stick moved too often on q, allowed: 10000 times in a scenario"
-    )

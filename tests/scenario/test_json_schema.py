@@ -21,11 +21,6 @@ def refusals(data):
     return [error.message for error in VALIDATOR.iter_errors(data)]
 
 
-def test_it_is_a_schema():
-    jsonschema.Draft202012Validator.check_schema(SCHEMA)
-    assert SCHEMA["title"] == "beaver-ftc scenario"
-
-
 @pytest.mark.parametrize("name", builtin_names())
 def test_it_accepts_the_builtin_scenarios(name):
     assert refusals(parse(builtin_path(name).read_text()).data) == []
@@ -62,10 +57,6 @@ def test_it_refuses_what_the_loader_refuses(data):
         Scenario.model_validate(data)
 
 
-def test_a_reference_table_s_file_is_enough_for_an_editor():
-    assert refusals({"name": "x", "reference": {"q": [{"csv": {"file": "ref.csv"}}]}}) == []
-
-
 def sections(parent: type[Section] = Section) -> set[str]:
     """The names of all sections of a scenario but diagnosis and control, which have their own home."""
     children = [child for child in parent.__subclasses__() if child.__module__ not in OWN_HOME]
@@ -79,11 +70,3 @@ def test_every_number_of_a_scenario_has_a_unit_and_a_description(name):
         if "number" in kinds:
             assert node["unit"], (name, key)
             assert node["description"].endswith(node["unit"]), (name, key)
-
-
-@pytest.mark.parametrize("sensor", ["ax", "ay", "az"])
-def test_accelerometers_are_sensors(sensor):
-    known = {"name": "x", "sensors": {sensor: {"bias_mps2": 0.1, "noise_std_mps2": 0.1, "delay_s": 0.01}}}
-    assert refusals(known) == []
-    assert refusals({"name": "x", "sensors": {sensor: {"bias_deg": 0.1}}})
-    assert refusals({"name": "x", "faults": [{"sensor": sensor, "type": "freeze", "at_s": 1}]}) == []

@@ -3,9 +3,7 @@
 import pytest
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.airframe import air_of
-from beaver_ftc.scenario.builtin import to_yaml
-from beaver_ftc.scenario.schema import Scenario, conflicts, load, load_text
+from beaver_ftc.scenario.schema import load, load_text
 
 FLOAT = "{type: float, actuator: flap, at_s: "
 GUST = "{velocity_mps: [0, 0, 1], rise_s: 1, hold_s: 2, fade_s: 3, at_s: "
@@ -79,30 +77,6 @@ def test_what_contradictions_are_called(changed):
             load_text(f"name: x\n{text}", "s.yaml")
         found[text[:90]] = [line[:180] for line in caught.value.lines]
     assert not changed(found)
-
-
-@pytest.mark.parametrize(
-    ("said", "at"),
-    [
-        ({"duration_s": 1e9, "faults": [{"at_s": 1e9}]}, [("faults", 0, "at_s")]),
-        ({"duration_s": 1e9 + 1, "faults": [{"at_s": 2e9}]}, []),  # unknown
-        ({"duration_s": True, "faults": [{"at_s": 31}]}, []),
-        ({"duration_s": "3", "faults": [{"at_s": 31}]}, []),
-        ({"duration_s": float("nan"), "faults": [{"at_s": 31}]}, []),
-        ({"duration_s": 0, "faults": [{"at_s": 31}]}, []),
-        ({"faults": [{"at_s": 29}, {"at_s": 30}, {"at_s": -1}, {}]}, [("faults", 1, "at_s")]),
-        ({"faults": "none", "expect": {"isolated_as": "flap"}}, []),
-        ({"expect": {"isolated_as": "flap", "isolated_type": None}}, [("expect", "isolated_as")]),
-        ({"autopilot": 3, "expect": {"altitude_within_m": 3}}, []),
-        ({"expect": {"altitude_within_m": 3, "arrives": 5}}, [("expect", "altitude_within_m")]),
-        ({"duration_s": 0.01}, []),
-        ({"duration_s": 0.0099}, [("duration_s",)]),
-        ({"changes": [{"at_s": 3}, {"at_s": 0}, {"at_s": 2}]}, []),
-        ({"changes": [{"at_s": 3}, {"at_s": 2}]}, [("changes", 1, "at_s")]),
-    ],
-)
-def test_what_cannot_be_read_contradicts_nothing(said, at):
-    assert [where for where, _ in conflicts(said)] == at
 
 
 UNWISE = {
@@ -184,23 +158,3 @@ UNWISE = {
 
 def test_what_is_unwise_is_said_at_the_bound_and_not_before(changed):
     assert not changed({case: load({"name": "x", **given}).warnings() for case, given in UNWISE.items()})
-
-
-def test_a_dump_reads_well(changed):
-    """Short mappings and lists on a line, descriptions by themselves, texts that want quotes quoted."""
-    given = {
-        "name": "x", "description": f"a line\u2028and another {'word ' * 30}",
-        "faults": [{"type": "float", "actuator": "flap", "at_s": 1}],
-        "reference": {"q": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 1}}]},
-        "environment": {"wind_mps": [1, 2, 3]},
-        "changes": [{"at_s": 3, "law": "nominal"}],
-    }  # fmt: skip
-    lines = to_yaml(Scenario.model_validate(given)).splitlines()
-    assert not changed([line for line in lines if "std" not in line])
-
-
-@pytest.mark.parametrize("severity", ["none", "light", "moderate", "severe"])
-def test_air_by_the_name_of_its_severity_is_what_a_scenario_says_of_it(severity):
-    found = Scenario.model_validate({"name": "x", "environment": air_of(severity)}).environment
-    assert found.turbulence == ("none" if severity == "none" else "dryden")
-    assert severity in ("none", found.severity)

@@ -3,7 +3,6 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.faults import fault_name
 from beaver_ftc.scenario.schema import load
 
 
@@ -46,50 +45,6 @@ def test_a_mistake_is_one_line(fault, says):
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_a_size_that_is_missing_is_asked_for():
-    with pytest.raises(BadInput, match=r"faults\[0\].magnitude: required key is missing, allowed: a number"):
-        load({"name": "x", "faults": [{"sensor": "p", "type": "bias", "at_s": 2}]})
-
-
-def test_the_end_may_be_called_until():
-    (fault,) = load(faulty(until_s=5)).faults
-    assert fault.end_s == 5
-
-
 @pytest.mark.parametrize(("said", "meant"), [("airspeed", "V"), ("dynamic_pressure", "qdyn")])
 def test_an_instrument_may_be_called_in_words(said, meant):
     assert load(faulty(sensor=said)) == load(faulty(sensor=meant))
-
-
-def test_what_is_repaired_may_be_said_as_a_verdict_says_it():
-    names = ("aileron", "p", "V")
-    assert [fault_name(said, names) for said in ("p", "sensor p", "airspeed", "sensor airspeed")] == [
-        "p",
-        "p",
-        "V",
-        "V",
-    ]
-    assert fault_name("nope", names) == "nope"
-    assert fault_name(None, names) is None
-
-
-def test_the_same_type_is_another_fault_on_a_surface():
-    both = faulty()
-    both["faults"].append({"actuator": "flap", "type": "bias", "bias_deg": 2, "at_s": 3})
-    sensor, surface = load(both).faults
-    assert (sensor.sensor, surface.actuator) == ("p", "flap")
-    assert load(load(both).model_dump(mode="json", exclude_none=True)).faults == (sensor, surface)
-
-
-def test_a_sensor_may_be_expected_by_name():
-    assert load(faulty() | {"expect": {"isolated_as": "sensor p"}}).expect.isolated_as == "sensor p"
-    with pytest.raises(
-        BadInput, match=r"expect.isolated_as: 'sensor pp' is not known, did you mean sensor p"
-    ):
-        load(faulty() | {"expect": {"isolated_as": "sensor pp"}})
-
-
-@pytest.mark.parametrize("grade", ["tactical-grade", "consumer-grade"])
-def test_a_preset_has_every_instrument(grade):
-    sensors = load({"name": "x", "sensors": grade}).sensors
-    assert [name for name, sensor in sensors if sensor.is_ideal] == []

@@ -7,7 +7,7 @@ import pytest
 from pydantic_core import PydanticCustomError
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.schema import load_scenario, load_text
+from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.signals import check_table
 
 GOOD = "t_s,rate_deg_s\n0,0\n1,2\n"
@@ -31,12 +31,6 @@ def test_a_column_by_name(tmp_path):
     table = load(tmp_path, more="column: q").reference.q[0].csv
     assert table.time_s == (0, 0.5)
     assert table.values_deg_s == (2, 4)
-
-
-def test_a_file_in_a_folder_below(tmp_path):
-    (tmp_path / "tables").mkdir()
-    (tmp_path / "tables" / "ref.csv").write_text(GOOD)
-    assert load(tmp_path, file="tables/ref.csv").reference.q[0].csv.values_deg_s == (0, 2)
 
 
 @pytest.mark.parametrize(
@@ -87,75 +81,7 @@ def test_nothing_outside_the_folder_is_read(tmp_path, file):
     )
 
 
-@pytest.mark.parametrize(
-    ("file", "says"), [("none.csv", "no such file"), (".", "is a folder"), ("pipe", "is a pipe")]
-)
-def test_what_is_no_file(tmp_path, file, says):
-    os.mkfifo(tmp_path / "pipe")
-    assert says in refused(tmp_path, file=file)
-
-
-def test_a_text_without_a_folder_has_no_files():
-    with pytest.raises(
-        ScenarioError, match=r"reference\.q\[0\]\.csv\.file: there is no folder to read it from"
-    ):
-        load_text("name: x\nreference: {q: [{csv: {file: ref.csv}}]}")
-
-
-@pytest.mark.parametrize(
-    "values", ["time_s: [0, 1], values_deg_s: [0]", "time_s: [1, 0], values_deg_s: [0, 1]"]
-)
-def test_a_table_written_out_is_checked_too(values):
-    with pytest.raises(ScenarioError, match=r"reference.q\[0\].csv: "):
-        load_text(f"name: x\nreference: {{q: [{{csv: {{file: ref.csv, {values}}}}}]}}")
-
-
 @pytest.mark.parametrize("time_s", [(-0.5, 0.5), (0.0, 0.0), (0.0, 1e9)])
 def test_times_before_the_flight_or_twice_the_same_are_refused(time_s):
     with pytest.raises(PydanticCustomError, match="contradictory"):
         check_table(time_s, (1.0, 2.0))
-
-
-def test_the_first_row_may_be_later_than_zero():
-    check_table((0.0, 0.5, 3.0), (1.0, 2.0, 3.0))
-    check_table((0.5, 3.0), (1.0, 2.0))
-    check_table((0.0, 360_000.0), (-1000.0, 1000.0))
-
-
-@pytest.mark.parametrize(
-    ("time_s", "values"),
-    [
-        ((0.0, 1.0), (0.0, 1000.1)),
-        ((0.0, 1.0), (-1000.1, 0.0)),
-        ((0.0, 360_001.0), (0.0, 0.0)),
-        ((0.0,), (1, 2)),
-    ],
-)
-def test_what_no_aircraft_flies_is_refused(time_s, values):
-    with pytest.raises(PydanticCustomError, match="contradictory"):
-        check_table(time_s, values)
-
-
-def test_a_table_of_the_largest_size_is_read(tmp_path):
-    (tmp_path / "ref.csv").write_text("t_s,rate_deg_s\n0,0\n1,3\n".ljust(2_000_000))
-    text = "name: x\nreference: {q: [{csv: {file: ref.csv}}]}"
-    assert load_text(text, folder=tmp_path).reference.q[0].csv.values_deg_s == (0.0, 3.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ("{file: none.csv, time_s: [0]}", "reference.q[0].csv.values_deg_s: required key is missing"),
-        ("{file: none.csv, values_deg_s: [0]}", "reference.q[0].csv.time_s: required key is missing"),
-        ("3", "reference.q[0].csv: 3 is a number, allowed: a mapping of file"),
-        ("{}", "reference.q[0].csv.file: required key is missing"),
-        ("{file: ''}", "reference.q[0].csv.file: '' is too short"),
-        ("{file: 3}", "reference.q[0].csv.file: 3 is a number"),
-        ("{file: ref.csv, column: 3}", "reference.q[0].csv.column: 3 is a number"),
-    ],
-)
-def test_a_mistake_in_the_keys_is_one_line_and_nothing_is_read(tmp_path, given, says):
-    with pytest.raises(ScenarioError) as caught:
-        load_text(f"name: x\nreference: {{q: [{{csv: {given}}}]}}", folder=tmp_path)
-    (line,) = caught.value.lines
-    assert says in line

@@ -35,28 +35,3 @@ def test_every_file_of_the_core_and_its_tests_is_there():
     assert in_sources == {"beaver_ftc", "begin_beaver_ftc.py"}
     assert {Path("tests/conftest.py"), Path("tests/cli/test_main.py"), Path("pyproject.toml")} <= found
     assert not [path for path in found if "products" in path.parts]
-
-
-REFUSED = {
-    "schema --plan": "plan_json_schema", "new x --log": "sample_logs",
-    "compare --flights recorded": "compare_recorded", "validate flight-controls": "load_plan",
-    "run fault-free --certificate --no-report": "certificate",
-}  # fmt: skip
-EACH = """
-import sys
-from beaver_ftc.cli.main import main
-for asked in sys.argv[1:]:
-    sys.argv = ["beaver-ftc", *asked.split()]
-    try:
-        main()
-    except SystemExit as ended:
-        print(ended.code)
-"""
-
-
-def test_what_is_refused_without_a_product_says_what_to_install(tmp_path):
-    done = ran(tmp_path, EACH, *REFUSED)
-    for line, service in zip(done.stderr.splitlines(), REFUSED.values(), strict=True):
-        said = f"no installed package offers {service!r}, allowed: with all of `pip install beaver-ftc`"
-        assert line.endswith(said)
-    assert done.stdout.split() == ["2"] * len(REFUSED)

@@ -4,12 +4,11 @@ import io
 import json
 import os
 import time
-from importlib import import_module
 
 import numpy as np
 import pytest
 from PIL import Image
-from tools.docs import commands, kept, pages, pictures, tables
+from tools.docs import commands, pages, pictures
 from tools.docs.commands import Output, outputs
 from tools.docs.constants import constants
 from tools.docs.marks import parsed
@@ -23,16 +22,6 @@ def one(line, **options):
     return outputs([line], **options)[line]
 
 
-def test_a_command_runs_once_in_an_empty_folder(tmp_path):
-    line = f"ls; echo ran >> {tmp_path}/ran; echo end   "
-    assert outputs([line, line])[line].text == "end"
-    assert (tmp_path / "ran").read_text() == "ran\n"
-
-
-def test_a_command_finds_the_files_that_the_pages_show():
-    assert "brief.yaml" in one("ls brief.yaml brief.scenario.yaml").text
-
-
 FAULTS = {
     "exit 2": "ends with status 2: nothing on standard error",
     "echo no such thing >&2; exit 3": "ends with status 3: no such thing",
@@ -42,14 +31,6 @@ FAULTS = {
     f"echo {pages.ROOT}/docs": "prints a path of this machine",
     "echo missed; exit 1": "",
 }
-
-
-def test_a_command_has_a_readers_environment_and_the_data_that_it_needs(monkeypatch):
-    for name in ("BEAVER_FTC_FLIGHTS", "BEAVER_FTC_PLUGINS", "FORCE_COLOR"):
-        monkeypatch.setenv(name, "set")
-    line = "echo $BEAVER_FTC_FLIGHTS-$BEAVER_FTC_PLUGINS-$FORCE_COLOR-$COLUMNS"
-    assert one(line).text == "---80"
-    assert one(line, needed={"BEAVER_FTC_FLIGHTS"}).text == "set---80"
 
 
 def test_what_cannot_be_used_says_why():
@@ -95,19 +76,6 @@ def picture(shade, size=40):
     return content.getvalue()
 
 
-def test_pictures_are_compared_by_what_is_seen(tmp_path):
-    path = tmp_path / "a.png"
-    assert not pictures.look_the_same(path, picture(100))
-    pictures.write(path, picture(100))
-    assert pictures.look_the_same(path, picture(100))
-    assert pictures.look_the_same(path, picture(101))
-    assert not pictures.look_the_same(path, picture(110))
-    assert not pictures.look_the_same(path, picture(100, 41))
-    (tmp_path / "a.svg").write_bytes(b"<svg/>")
-    assert pictures.look_the_same(tmp_path / "a.svg", b"<svg/>")
-    assert not pictures.look_the_same(tmp_path / "a.svg", b"<svg />")
-
-
 def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
     monkeypatch.setattr("tools.docs.refresh.ROOT", tmp_path)
     text = "<!-- printed: draw -->\n![x](images/a.png)\n<!-- /printed -->\n"
@@ -116,11 +84,6 @@ def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
     assert ["docs/images/a.png" in change.words for change in made.changes] == [True]
     pictures.write(tmp_path / "docs" / "images" / "a.png", made.drawn["a.png"])
     assert Refreshed(parsed(text, "docs/page.md"), output, Wanted()).changes == []
-
-
-def test_a_picture_that_a_command_draws_is_taken():
-    made = one("mkdir -p images/of; echo '<svg/>' > images/of/a.svg; echo '![a](images/of/a.svg)'")
-    assert made.pictures == {"of/a.svg": b"<svg/>\n"}
 
 
 def test_a_changed_gain_turns_the_page_that_cites_it_red(monkeypatch):
@@ -138,77 +101,6 @@ def test_a_changed_gain_turns_the_page_that_cites_it_red(monkeypatch):
     assert changes() == []
     monkeypatch.setitem(options_of(LAWS, "zhang2005")["network_gain"], "default", 41.0)
     assert ['stands "40", printed "41"' in str(change) for change in changes()] == [True]
-
-
-def test_constants_are_those_of_the_code():
-    found = json.loads(json.dumps(constants(), allow_nan=False))
-    assert found["defaults"]["initial"]["airspeed_mps"] == 45.0
-    assert found["modules"]["plant.adapter"]
-    assert found["counts"]["commands"] > 20
-    assert str(pages.ROOT) not in json.dumps(found)  # where this checkout lies
-
-
-@pytest.fixture
-def own_tables(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "__file__", str(tmp_path / "__init__.py"))
-    return tmp_path
-
-
-def test_table_makers_are_found_by_name(own_tables):
-    (own_tables / "page.py").write_text("def my_table(): ...\ndef _helper(): ...\n")
-    assert tables.makers() == {"my-table": "page"}
-    with pytest.raises(BadInput, match="did you mean my-table"):
-        tables.table("my-tabel")
-    (own_tables / "other.py").write_text("def my_table(): ...\n")
-    with pytest.raises(BadInput, match="a second table is called my-table"):
-        tables.makers()
-
-
-def test_every_table_maker_says_what_its_table_shows():
-    for name, module in tables.makers().items():
-        make = getattr(import_module(f"tools.docs.tables.{module}"), name.replace("-", "_"))
-        assert make.__doc__
-
-
-def test_what_tables_share_is_made_once(tmp_path, monkeypatch):
-    made = []
-
-    @tables.shared
-    def dear():
-        made.append(1)
-        return {"x": [1, 2]}
-
-    assert dear() == dear()
-    assert len(made) == 2  # by itself nothing is kept
-    monkeypatch.setenv(commands.SHARED, str(tmp_path))
-    assert dear() == dear() == {"x": [1, 2]}
-    assert len(made) == 3
-
-
-def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "cache_base", lambda: tmp_path / "cache")
-    (tmp_path / "src").mkdir()
-    code, page = tmp_path / "src" / "one.py", tmp_path / "README.md"
-    code.write_text("1")
-    page.write_text("old")
-    table, other, printed = (
-        f"{kept.MAKES_TABLE}x",
-        "beaver-ftc list",
-        Output("said", "", 1.5, {"a.png": b"p"}),
-    )
-    for line in (table, other):
-        kept.Kept(root=tmp_path).put(line, printed)
-    kept.Kept(root=tmp_path).put("wrong", Output("", "ends with status 3"))
-    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other, "wrong")] == [
-        printed,
-        printed,
-        None,
-    ]
-    page.write_text("new")
-    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other)] == [printed, None]
-    assert kept.Kept(["DATA"], tmp_path).get(table) is None
-    code.write_text("2")
-    assert kept.Kept(root=tmp_path).get(table) is None
 
 
 def test_pages_are_named_as_one_likes():

@@ -38,43 +38,9 @@ def test_what_breaks_a_rule_is_found(text, kind, line):
     assert [(kind, line)] == [(of, at) for of, at, _ in found][:1], found
 
 
-def test_a_page_names_a_next_step():
-    for text in (
-        "It moves.\n",
-        "It moves.\n\n## Next\n\nNothing follows.\n",
-        f"{NEXT}\n## Last\n\nIt moves.\n",
-    ):
-        assert [kind for kind, _, _ in prose.faults("docs/page.md", text)] == ["next"], text
-    assert list(prose.faults("README.md", "It moves.\n")) == []
-
-
 def test_a_page_breaks_a_rule_no_more_often_than_it_may(monkeypatch):
     page = parsed("The largest error of all. The least error of all." + NEXT, "docs/page.md")
     for allowed, found in ({}, 2), ({"docs/page.md": {"verb": 1}}, 2), ({"docs/page.md": {"verb": 2}}, 0):
         monkeypatch.setattr(prose, "_allowed", lambda allowed=allowed: allowed)
         assert len(prose.check([page])) == found
     assert prose.counts([page]) == {"docs/page.md": {"verb": 2}}
-
-
-def test_forms_of_a_verb_are_verbs():
-    for verb in (
-        "flies",
-        "flew",
-        "flying",
-        "stopped",
-        "carries",
-        "carried",
-        "uses",
-        "using",
-        "reaches",
-        "isn't",
-    ):
-        assert prose._is_verb(verb), verb
-    for word in ("surface", "error", "fin", "in"):
-        assert not prose._is_verb(word), word
-
-
-def test_numbers_of_results_are_printed():
-    text = "It detects 75 % of them. It detects <!--=own 1.share-->75<!--/--> % of them." + NEXT
-    assert [(kind, line) for kind, line, _ in prose.faults("docs/results/page.md", text)] == [("number", 1)]
-    assert list(prose.faults("docs/how-to/page.md", text)) == []

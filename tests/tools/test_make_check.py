@@ -5,31 +5,6 @@ from tools.mutants.reach import Reach
 
 from tools import check
 
-DIFF = """diff --git a/src/beaver_ftc/a.py b/src/beaver_ftc/a.py
---- a/src/beaver_ftc/a.py
-+++ b/src/beaver_ftc/a.py
-@@ -3 +3,2 @@ def f():
--    return 1
-+    x = 2
-+    return x
-@@ -8,0 +10 @@ def g():
-+    y = 3
-@@ -11,2 +13,0 @@
--    a
--    b
-diff --git a/tests/test_a.py b/tests/test_a.py
---- a/tests/test_a.py
-+++ b/tests/test_a.py
-@@ -1 +1 @@
--1
-+2
-"""
-
-
-def test_changed_lines_are_numbered_as_before_the_change():
-    assert list(check.changed(DIFF)) == [("src/beaver_ftc/a.py", [3, 8, 11, 12]), ("tests/test_a.py", [1])]
-    assert list(check.changed("")) == []
-
 
 @pytest.mark.parametrize(
     ("budget_s", "taken"), [(10.0, ["quick", "slow"]), (4.9, ["quick"]), (0.5, [])], ids=str

@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 from tools.docs.reference import PAGES
 
-import beaver_ftc as bf
-
 ROOT = Path(__file__).parents[2]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
@@ -69,14 +67,6 @@ def opened(browser, site):
     assert trouble == []
 
 
-def test_every_public_name_is_in_the_reference_with_its_source(site):
-    page = (site / "reference/python-names.html").read_text(encoding="utf-8")
-    found = set(re.findall(r'id="beaver_ftc\.(?:aircraft\.)?(\w+)"', page))
-    assert set(bf.__all__) - {"__version__", "aircraft"} <= found
-    assert "load" in found
-    assert page.count("Source code in") > 40
-
-
 def test_every_page_and_notebook_is_there(site):
     docs = ROOT / "docs"
     pages = {path.relative_to(docs).with_suffix(".html") for path in docs.rglob("*.md")}
@@ -91,23 +81,6 @@ def test_nothing_is_fetched_from_elsewhere(site):
     fetched = re.compile(r'(?:<(?:script|img|iframe|source)[^>]*\ssrc|<link[^>]*\shref)="(https?:[^"]*)"')
     asked = {page.name: fetched.findall(page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
     assert {name: urls for name, urls in asked.items() if urls} == {}
-
-
-def test_links_out_of_the_documentation_lead_to_copies(site):
-    page = (site / "reference/properties.html").read_text(encoding="utf-8")
-    (link,) = set(re.findall(r'href="\.\./(files/[^"]+beaver\.xml\.txt)"', page))
-    assert (site / link).read_bytes() == (ROOT / "aircraft/beaver/beaver.xml").read_bytes()
-
-
-def test_boxes_of_the_diagram_lead_to_places_that_are_there(site):
-    for link in re.findall(r'href="\.\./([^"]+)"', (site / "images/loop.svg").read_text(encoding="utf-8")):
-        name, _, place = link.partition("#")
-        page = (site / name).read_text(encoding="utf-8")
-        assert not place or f'id="{place}"' in page, link
-
-
-def test_no_mark_of_a_printed_number_is_left(site):
-    assert "<!-- printed" not in (site / "results/reproduction.html").read_text(encoding="utf-8")
 
 
 @needs_browser
@@ -128,24 +101,6 @@ def test_search_works_from_disk(opened):
     found = page.locator(".md-search-result__link", has_text="Scenario keys").first
     found.wait_for()
     assert "loss_of_effectiveness" in found.locator("xpath=..").inner_text()
-
-
-@needs_browser
-@pytest.mark.parametrize("viewport", [PHONE, DESK], ids=["phone", "desk"])
-def test_equations_are_set(opened, viewport):
-    page = opened("explanation/detection.html", viewport)
-    page.wait_for_function("MathJax.startup?.promise.then(() => true)")
-    assert page.locator("mjx-container").count() == page.locator(".arithmatex").count() > 20
-    assert page.locator("[data-mml-node=merror]").count() == 0
-    sizes = page.evaluate(
-        "[...document.querySelectorAll('mjx-container > svg')].map((s) => s.getBoundingClientRect().width)"
-    )
-    assert min(sizes) > 2
-
-
-def test_only_pages_with_equations_load_what_sets_them(site):
-    assert "assets/mathjax.js" in (site / "explanation/detection.html").read_text(encoding="utf-8")
-    assert "assets/mathjax.js" not in (site / "reference/commands.html").read_text(encoding="utf-8")
 
 
 @needs_browser

@@ -43,11 +43,3 @@ TABLE = """
 )
 def test_where_a_term_is_found(name, text, lines):
     assert [int(one.split(":")[1]) for one in words.findings(name, text, TABLE)] == lines
-
-
-def test_every_exception_is_of_a_term_that_is_avoided_and_has_a_reason():
-    text = (words.ROOT / words.PAGE).read_text(encoding="utf-8")
-    avoided, exceptions = words.table(text)
-    assert {term for term, _ in exceptions} <= set(avoided)
-    assert all(reason for _, _, reason in words.rows("Exceptions", text))
-    assert all(list(words.ROOT.glob(place)) for _, place in exceptions), "an exception of no file"

@@ -5,8 +5,8 @@
 Row by row of covering arrays of everything a scenario may say (`tools/drawn`), so that any two choices meet.
 Flight I of a seed is the same whatever else is flown. Each flight is held against what it promises (exit, no
 false alarm, nothing true excluded, nothing wrong named, no later than said), every third is flown again from
-its saved text with a log, which must tell the same; every fiftieth by `beaver-ftc run`, page and all. What
-breaks is written to FOLDER, and again with as much left out as still breaks (`--shrink`).
+its saved text with a log. What breaks is written to FOLDER, and again with as much left out as still breaks
+(`--shrink`).
 """
 
 import argparse
@@ -16,11 +16,9 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from queue import Queue
 
 from tools.drawn.campaign import AIRCRAFT, Outcome, fly_slice
 
-WORKERS_BEGIN_AS = get_context()
 WORDS = ("flights", "refused", "detected", "named", "broken")
 
 
@@ -51,39 +49,16 @@ def main() -> None:
 
 
 def outcomes(args: argparse.Namespace) -> Iterator[Outcome]:
-    """Every outcome as it comes; each worker flies every so many-th, and tells of each flight at once."""
-    slices = [
-        (
-            args.seed,
-            tuple(args.aircraft),
-            args.first + i,
-            args.first + args.flights,
-            args.workers,
-            args.keep,
-            args.shrink,
-        )
-        for i in range(args.workers)
-    ]
-    if args.workers == 1:
-        yield from fly_slice(*slices[0])
-        return
-    with (
-        WORKERS_BEGIN_AS.Manager() as manager,
-        ProcessPoolExecutor(args.workers, WORKERS_BEGIN_AS) as pool,
-    ):
-        told = manager.Queue()
-        flying = [pool.submit(_tell, one, told) for one in slices]
-        for one in flying:
-            one.add_done_callback(lambda _: told.put(None))  # however it ended
-        for _ in flying:
-            yield from iter(told.get, None)
-        for one in flying:
-            one.result()  # raises what ended it
+    """Every outcome; each worker flies every so many-th."""
+    rest = args.first + args.flights, args.workers, args.keep, args.shrink
+    slices = [(args.seed, tuple(args.aircraft), args.first + i, *rest) for i in range(args.workers)]
+    with ProcessPoolExecutor(args.workers, get_context()) as pool:
+        for flown in pool.map(_slice, slices):
+            yield from flown
 
 
-def _tell(one: tuple, told: Queue) -> None:
-    for outcome in fly_slice(*one):
-        told.put(outcome)
+def _slice(one: tuple) -> list[Outcome]:
+    return list(fly_slice(*one))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """What every flight must keep, and what of it a flight breaks.
 
-`broken` looks at the metrics alone; `told_alike` at log and verdict; `saved_alike` at a result folder and its
-page; `flown_again` at the numbers of the same scenario read back from its text.
+`broken` looks at the metrics alone, `flown_again` at the numbers of the scenario read back from its text.
 
 Whether an alarm is false, a detection late or a name right is asked of `beaver_ftc.results.metrics`, as
 everywhere. `_judged_otherwise` works the same out by a second road, with a tolerance of its own, so that an
@@ -13,14 +12,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-import yaml
-
 import beaver_ftc as bf
-from beaver_ftc.results import Metrics, verdict
 from beaver_ftc.results.metrics import DeclaredFault, Truth, is_late
 from beaver_ftc.scenario.builtin import to_yaml
-from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.schema import load_text
 
@@ -268,88 +262,9 @@ def _left_of_pair(isolation: Document, true: dict[Any, set[str]]) -> Iterator[st
             yield f"excluded: {hit}"
 
 
-def told_alike(flight: bf.Flight) -> Iterator[str]:
-    """A line for each place where log and verdict disagree. The numbers are worked out from the columns."""
-    log, metrics, scenario = flight.log, flight.metrics, flight.scenario
-    t, dt = log["t_s"].to_numpy(), 1.0 / scenario.rate_hz
-    if len(t) != metrics["frames"]:
-        yield f"log: {len(t)} rows, {metrics['frames']} frames"
-    yield from _detected_alike(log, metrics, scenario)
-    yield from _modes_alike(log, metrics)
-    for surface, saturated_s in metrics["saturation_s"].items():
-        summed = float(log[f"{surface}_saturated"].sum()) * dt
-        if abs(summed - saturated_s) > DUST_S:
-            yield f"log: {surface} saturated for {summed:g} s, verdict {saturated_s:g} s"
-    if not np.isfinite(log["p_rad_s"]).all():
-        yield "log: rates that are not finite"
-    yield from _tracking_alike(log, metrics, scenario)
-    yield from _words_alike(metrics)
-
-
-def _detected_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Iterator[str]:
-    """`detected` of the last diagnosis rises where the verdict has its alarm. (A change of a frame's length
-    before the end leaves no row.)"""
-    t, detected = log["t_s"].to_numpy(), log["detected"].to_numpy() > 0.5
-    began_s = max((one["time_s"] for one in metrics["changes"] if "detection_time_s" in one), default=0.0)
-    since = t >= began_s - DUST_S
-    rows = t[since & detected]
-    time_s, first_s = metrics["detection"]["time_s"], float(rows[0]) if rows.size else None
-    late = time_s is not None and time_s > t[-1] + DUST_S  # found after the last row was written
-    if (time_s is None) != (first_s is None) and not late:
-        yield f"log: `detected` from {first_s}, verdict's alarm at {time_s}"
-    elif time_s is not None and first_s is not None and abs(time_s - first_s) > DUST_S:
-        yield f"log: `detected` from {first_s:g} s, verdict's alarm at {time_s:g} s"
-
-
-def _modes_alike(log: Any, metrics: Document) -> Iterator[str]:
-    """Every change of `mode` is one of the verdict's."""
-    if metrics["mode_changes_left_out"]:
-        return
-    t, mode = log["t_s"].to_numpy(), log["mode"].to_numpy().astype(int)
-    changed = [0, *(np.flatnonzero(np.diff(mode)) + 1)]
-    logged = [(round(float(t[i]), 6), MODES[mode[i]]) for i in changed]
-    said: list[tuple[float, str]] = []
-    for one in metrics["supervisor"]:
-        said = [known for known in said if known[0] < one["time_s"] - DUST_S]
-        if (not said or said[-1][1] != one["mode"]) and one["time_s"] <= t[-1] + DUST_S:
-            said.append((round(one["time_s"], 6), one["mode"]))
-    if logged != said:
-        yield f"log: modes {logged[:4]}, verdict {said[:4]}"
-
-
-def _tracking_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Iterator[str]:
-    """RMS errors of tracking before the first fault, of a flight whose fault never ends before."""
-    before = metrics["tracking"]["pre_fault_rms_deg_s"]
-    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
-    rows = log[log["t_s"] < first_s - DUST_S]
-    if (
-        before is None
-        or rows.empty
-        or any(fault.end_s is not None or _sensor(fault) for fault in scenario.faults)
-    ):
-        return
-    for axis in "pqr":
-        error = np.rad2deg((rows[f"{axis}_model_rad_s"] - rows[f"{axis}_rad_s"]).to_numpy())
-        rms = float(np.sqrt(np.mean(error**2)))
-        if abs(rms - before[axis]) > 1e-6 * (1.0 + rms):
-            yield f"log: {axis} missed by {rms:g} deg/s before the fault, verdict {before[axis]:g}"
-
-
-def _words_alike(metrics: Document) -> Iterator[str]:
-    """The verdict in words says what the document has."""
-    facts, detection = verdict.verdict_lines(Metrics.of(metrics)), metrics["detection"]
-    words = dict(facts)
-    false = [line for _, line in facts if "FALSE ALARM" in line]
-    if bool(false) != metrics["false_alarm"]:
-        yield f"verdict: {false or words['detection']!r}, false_alarm {metrics['false_alarm']}"
-    if (words["detection"] == "no alarm") == detection["detected"]:
-        yield f"verdict: {words['detection']!r}, detected {detection['detected']}"
-
-
-def flown_again(flight: bf.Flight) -> tuple[bf.Flight, list[str]]:
-    """The same from the text that a result folder has, with a log; and what differs."""
-    again = bf.fly(load_text(to_yaml(flight.scenario)))
-    return again, list(differences(flight.metrics, again.metrics))
+def flown_again(flight: bf.Flight) -> Iterator[str]:
+    """What differs in the same flight from the text that a result folder has, with a log."""
+    return differences(flight.metrics, bf.fly(load_text(to_yaml(flight.scenario))).metrics)
 
 
 def differences(one: Any, other: Any, path: str = "again") -> Iterator[str]:
@@ -359,24 +274,3 @@ def differences(one: Any, other: Any, path: str = "again") -> Iterator[str]:
             yield from differences(one[key], other[key], f"{path}.{key}")
     elif json.dumps(one) != json.dumps(other):
         yield f"{path}: {one!r:.80}, then {other!r:.80}"
-
-
-def saved_alike(folder: Any, metrics: Document) -> Iterator[str]:
-    """A result folder: its documents and page say what the flight was."""
-    stored = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    yield from differences(metrics, stored, "metrics.json")
-    if yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))["name"] != metrics["scenario"]:
-        yield "scenario.yaml: another name"
-    page = folder / "report.html"
-    if page.exists():
-        yield from _page_alike(page.read_text(encoding="utf-8"), metrics)
-
-
-def _page_alike(page: str, metrics: Document) -> Iterator[str]:
-    """Every fact of the verdict stands on the page, escaped."""
-    from markupsafe import escape
-
-    said = " ".join(page.split())
-    for what, how in verdict.verdict_lines(Metrics.of(metrics)):
-        if " ".join(str(escape(how)).split()) not in said:
-            yield f"page: does not say {what}: {how!r:.80}"

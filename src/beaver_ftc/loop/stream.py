@@ -1,6 +1,5 @@
 """The diagnosis as a stream, without JSBSim: for another simulator, a log, an autopilot."""
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -157,11 +156,6 @@ class Diagnosis:
     def config(self) -> FdiConfig:
         """What it goes by: `fdi` with all defaults."""
         return self._scenario.fdi
-
-    def surprise(self) -> tuple[Vector, Vector, Vector]:
-        """The former name of `innovation`. A call prints a deprecation warning."""
-        warnings.warn("Diagnosis.surprise is now Diagnosis.innovation", DeprecationWarning, stacklevel=2)
-        return self.innovation()
 
     def innovation(self) -> tuple[Vector, Vector, Vector]:
         """Three arrays of the last frame in rad/s²: the innovation (3,), its bound (3,), and the effect of

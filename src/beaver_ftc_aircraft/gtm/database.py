@@ -34,7 +34,6 @@ _TABLES: dict[str, tuple[dict[str, int], int]] = {
     "dC6_damage.ddinc": ({"alpha": 24, "(case)": 6, "(rate)": 3}, 6),
 }
 _FLAPS = ("flaplib", "flaplob", "flaprib", "flaprob")
-_SAME_AXIS = 1e-12
 
 
 @dataclass(frozen=True)

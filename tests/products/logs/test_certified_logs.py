@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from pyarrow import parquet
-from tools.drawn.reader import doubts
 from typer.testing import CliRunner
 
 import beaver_ftc as bf
@@ -24,12 +23,12 @@ FDI = {
 
 
 def proved(folder):
-    """Certificate, its log, and whether two readers accept it."""
+    """Certificate, its log, and why the checker refuses it."""
     document = json.loads((folder / "certificate.json").read_text())
     table = parquet.read_table(folder / "log.parquet")
     log = {name: table[name].to_numpy() for name in table.column_names}
     scenario = (folder / "scenario.yaml").read_text()
-    return document, log, [*failures(document, log, scenario)], [*doubts(document, log, scenario)]
+    return document, log, [*failures(document, log, scenario)]
 
 
 @pytest.mark.parametrize("faults", [[LOSS], []])
@@ -51,8 +50,8 @@ def test_a_logs_alarm_and_exclusions_are_proved(name, faults, tmp_path, monkeypa
     asked = ["--aircraft", "beaver", "--scenario", str(folder / "scenario.yaml"), "--certificate"]
     done = CliRunner().invoke(app, ["diagnose", RECORDING_FILE_OF_KIND["table"], *asked])
     assert done.exit_code == 0, done.output
-    document, log, *refused = proved(tmp_path / "diagnoses" / "flight")
-    assert refused == [[], []]
+    document, log, refused = proved(tmp_path / "diagnoses" / "flight")
+    assert refused == []
     set_at_end = {column for column in log if "likelihood" not in column and column != "t_s"}
     set_at_end = {c for c in set_at_end if (c == "detected" or c.endswith("_excluded")) and log[c][-1] > 0}
     told = [said["column"] for said in (*document["statements"], *document["without"])]

@@ -113,7 +113,6 @@ def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
         healthy_s=HEALTHY_S,
         hours=hours,
         fault_class="published",
-        declared=False,
     )
     rows = []
     for name in chosen:

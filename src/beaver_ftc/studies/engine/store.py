@@ -158,7 +158,7 @@ def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
 
 
 PACKAGE = Path(__file__).resolve().parents[2]
-NO_ROWS = ("cli", "commands", "integrations", "pytest_plugin")  # they ask for rows, or show them
+NO_ROWS = ("cli", "commands", "pytest_plugin")  # they ask for rows, or show them
 
 
 def identity(what: str, asked: Document) -> Document:

@@ -1,1 +1,0 @@
-"""Former places of the pytest plug-in and of the Gymnasium environments."""

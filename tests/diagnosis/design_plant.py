@@ -107,8 +107,8 @@ class DesignPlant:
         """Where an actuator at u is a frame later: 20 rad/s, 60 deg/s."""
         if not self.servo:
             return command
-        furthest = np.deg2rad(60) * self.dt
-        return u + np.clip((command - u) * (1 - np.exp(-20 * self.dt)), -furthest, furthest)
+        farthest = np.deg2rad(60) * self.dt
+        return u + np.clip((command - u) * (1 - np.exp(-20 * self.dt)), -farthest, farthest)
 
     def effect(self, G):
         """phi of the fault, rad/s2."""

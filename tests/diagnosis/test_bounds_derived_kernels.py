@@ -28,7 +28,7 @@ def records(seed=0, gust=0.02, deflection=0.004):
     return declared_errors, design
 
 
-def furthest(declared_errors, i, reading):
+def farthest(declared_errors, i, reading):
     """The largest truth that reads so: |reading - truth| <= offset + slope |truth|."""
     return (abs(reading) + declared_errors["e0"][i]) / (1.0 - declared_errors["e1"][i])
 
@@ -49,8 +49,8 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
         2.0,
         150.0,
     )
-    pressure = furthest(declared_errors, 6, y[3]) / y[3] - 1.0
-    speed = furthest(declared_errors, 5, y[2]) / y[2] - 1.0
+    pressure = farthest(declared_errors, 6, y[3]) / y[3] - 1.0
+    speed = farthest(declared_errors, 5, y[2]) / y[2] - 1.0
 
     def density(q, V):
         return 2.0 * q / V**2 / SEA_LEVEL_DENSITY_KG_M3

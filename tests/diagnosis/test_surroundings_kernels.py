@@ -85,7 +85,7 @@ def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, 
         ((0.0, 0.1), 0.0, 11, 0.275), ((-0.1, 0.1), 0.0, 3, 0.75),
     ],
 )  # fmt: skip
-def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
+def test_the_share_of_its_travel_is_the_farthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
     error_map = new_fdi()["bound"]["error_map"]
     error_map["stop_lo"][1], error_map["stop_hi"][1] = -0.2, 0.4

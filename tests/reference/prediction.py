@@ -204,7 +204,7 @@ def servo_positions(
     """Positions u (instants, surfaces) rad of healthy surfaces under the command (instants, surfaces) rad
     that acts in each JSBSim step, and how far from u they may be by the declared errors, du.
 
-    The ends of where a surface may be go by the furthest of all steps that errors of bandwidth and rate limit
+    The ends of where a surface may be go by the farthest of all steps that errors of bandwidth and rate limit
     allow, to a target within the dead band of the command."""
     errors, surfaces = declaration["bounds.actuators"], declaration.aircraft.surfaces
     each = [{**errors, **errors.get(s, {})} for s in surfaces]

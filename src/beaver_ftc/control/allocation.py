@@ -60,7 +60,7 @@ def solve(problem, B, demand):
     for _ in range(4 * n + 4):
         problem.steps += 1
         multipliers(problem, B, demand)
-        blocking, share = furthest(problem, B)
+        blocking, share = farthest(problem, B)
         for s in range(n):
             if problem.at[s] == FREE:
                 wanted = target[s] + problem.weight[s] * along(B, s, problem.y)
@@ -121,7 +121,7 @@ def multipliers(problem, B, demand):
 
 
 @kernel
-def furthest(problem, B):
+def farthest(problem, B):
     """The free surface that meets a limit first on its way, or -1, and which share of the way that is."""
     blocking, share = -1, 1.0
     for s in range(problem.u.size):

@@ -69,8 +69,8 @@ class DeclaredErrors:
     def errors(self) -> bool:
         """Whether any error is declared."""
         shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s, self.coefficients
-        of_servos = self.bandwidth_error, self.rate_limit_error, self.dead_band_rad
-        return bool(any(np.any(share) for share in (*shares, *of_servos)) or self.inertia or self.deflection_rad)
+        of_servos = self.bandwidth_error, self.rate_limit_error, self.dead_band_rad, self.deflection_rad
+        return bool(any(np.any(share) for share in (*shares, *of_servos)) or self.inertia)
 
     @property
     def noisy(self) -> bool:

@@ -208,7 +208,7 @@ def actuators_dtype(n: int) -> np.dtype:
     return record(
         real=int,
         approach=n,  # share of the way to the command in one JSBSim frame; 1 without lag
-        step=n,  # rad, the furthest in one JSBSim frame
+        step=n,  # rad, the farthest in one JSBSim frame
         low=n, high=n,
         # least and greatest of both by the declared errors; rad, how far from its command a surface may stay
         uncertain=int, approaches=(n, 2), steps=(n, 2), band=n,
@@ -222,7 +222,7 @@ def nearer(u, wanted, approach, step):
 
 
 @kernel
-def furthest(u, command, sign, approaches, steps, band, low, high):
+def farthest(u, command, sign, approaches, steps, band, low, high):
     """The greatest (sign 1) or least (-1) position, rad, that a surface at u can have one JSBSim frame later.
 
     approaches, steps (2,): least and greatest of its actuator. It goes as far as it can to that side, and
@@ -250,8 +250,8 @@ def move_ends(act, command, lo, hi):
     """Move lo and hi (n,) rad, between which the surfaces are, by one JSBSim frame towards command (n,)."""
     for s in range(lo.size):
         of = act.approaches[s], act.steps[s], act.band[s], act.low[s], act.high[s]
-        lo[s] = furthest(lo[s], command[s], -1.0, *of)
-        hi[s] = furthest(hi[s], command[s], 1.0, *of)
+        lo[s] = farthest(lo[s], command[s], -1.0, *of)
+        hi[s] = farthest(hi[s], command[s], 1.0, *of)
 
 
 SEA_LEVEL_DENSITY_KG_M3 = 1.225

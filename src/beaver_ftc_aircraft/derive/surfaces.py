@@ -97,7 +97,7 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Difference:
-    """Where the copy is furthest off the model when a surface moves. share: of what whole travels do about
+    """Where the copy is farthest off the model when a surface moves. share: of what whole travels do about
     the axis. because: properties that the aerodynamics see at another value in the copy."""
 
     surface: str
@@ -365,7 +365,7 @@ def _corners(points: list[tuple[float, float]], off: float) -> list[tuple[float,
 def differences(
     own: Path, copy: Path, surfaces: Surfaces, airspeed_mps: tuple[float, float]
 ) -> list[Difference]:
-    """Where the copy is furthest off the model as each surface goes from stop to stop, the others at rest,
+    """Where the copy is farthest off the model as each surface goes from stop to stop, the others at rest,
     and as all go together; in several states, the surfaces of both where the model's flight control has put
     them."""
     fdm = bare(own)

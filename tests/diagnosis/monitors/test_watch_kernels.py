@@ -109,17 +109,17 @@ def with_shares(shares, **fields):
 
 
 @pytest.mark.parametrize(
-    ("shares", "substep", "furthest"),
+    ("shares", "substep", "farthest"),
     [({}, 0, (0, 0.0)), ({3: 1.1, 7: 1.3, 9: 1.2}, 0, (7, 1.3)), ({0: 2.0}, 0, (0, 2.0)),
      ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
 )  # fmt: skip
-def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, substep, furthest):
+def test_of_the_looks_of_a_frame_the_test_farthest_towards_its_bound_is_kept(shares, substep, farthest):
     monitor = with_shares(shares, worst_test_index=5, top_ratio=0.7, substep=substep)
     watching.find_worst(monitor)
     assert (
         monitor["output"]["worst_test_index"],
         monitor["output"]["top_ratio"],
-    ) == furthest
+    ) == farthest
 
 
 def suspects(shares, lead=None, **fields):
@@ -263,7 +263,7 @@ def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
     )
 
 
-def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
+def test_an_angle_shows_what_the_axis_farthest_beyond_its_bound_does():
     monitor = with_shares({TURN_TEST: 0.2, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.3})
     assert [watching.worst_turn_axis(monitor, i) for i in range(3)] == [1, 1, 1]
     monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.5})

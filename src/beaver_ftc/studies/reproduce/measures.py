@@ -270,7 +270,7 @@ def _left_of_error(flown: Flown, axis: str) -> float:
     return np.inf if flown.metrics.departure else late / early
 
 
-@_measure("furthest outside")
+@_measure("farthest outside")
 def outside(flights: Flights, *names: str) -> float:
     """How far a theta that diagnosis or law estimates, one less than the effectiveness, leaves [-1, 0]."""
     columns = [f"{surface}_effectiveness_{what}" for surface in ESTIMATORS for what in ("estimate", "used")]

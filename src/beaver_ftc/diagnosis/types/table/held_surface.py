@@ -28,7 +28,7 @@ b: slot of releases, EARLIER_SLOT or LATER_SLOT; rel: record of the releases. Sy
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import furthest
+from beaver_ftc.design.model import farthest
 from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
@@ -82,8 +82,8 @@ def simulate_return(c, srf, p0, end, anywhere=False):
     """Mean of p over the judged frame of a surface released at p0 (rad), p at the end of the frame, and
     kappa times the range of p, by which the mean may be off.
 
-    p <- f(p), f a step of the actuator towards u: of those declared the one that takes it furthest to one
-    side, end 1 or -1. The release is at the beginning of the frame, or `anywhere` in it, where p is furthest.
+    p <- f(p), f a step of the actuator towards u: of those declared the one that takes it farthest to one
+    side, end 1 or -1. The release is at the beginning of the frame, or `anywhere` in it, where p is farthest.
     """
     act = srf.actuator
     total, p, p_min, p_max = 0.0, p0, p0, p0
@@ -92,7 +92,7 @@ def simulate_return(c, srf, p0, end, anywhere=False):
         for _ in range(c.n_substeps):
             total += p
             p_min, p_max = min(p_min, p), max(p_max, p)
-            p = furthest(p, u, end, act.approaches, act.steps, act.band, act.stop_lo, act.stop_hi)
+            p = farthest(p, u, end, act.approaches, act.steps, act.band, act.stop_lo, act.stop_hi)
             if anywhere:
                 p = min(p, p0) if end < 0.0 else max(p, p0)
     return total / (c.frames_per_block * c.n_substeps), p, srf.judged.kappa * (p_max - p_min)

@@ -103,7 +103,7 @@ def errors_dtype(n: int) -> np.dtype:
         e0=7, e1=7,
         steady=3,  # of the offset of a gyro, what does not change
         wg=3,
-        du0=float, du=n,  # of a deflection: beside its actuator's own, and all of it now, rad
+        du0=float, du=n,  # of a deflection, rad: not by its actuator; all of it now
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
         # far the reading of the altitude can be off: offset, m, and slope
         wg_aloft=float, wg_1m=float, h0=float, h1=float,

@@ -191,12 +191,13 @@ def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read
     code, page = tmp_path / "src" / "one.py", tmp_path / "README.md"
     code.write_text("1")
     page.write_text("old")
-    table, other, printed = (
+    table, other, cells, printed = (
         f"{kept.MAKES_TABLE}x",
         "beaver-ftc list",
+        "python -m tools.docs cells a",
         Output("said", "", 1.5, {"a.png": b"p"}),
     )
-    for line in (table, other):
+    for line in (table, other, cells):
         kept.Kept(root=tmp_path).put(line, printed)
     kept.Kept(root=tmp_path).put("wrong", Output("", "ends with status 3"))
     assert [kept.Kept(root=tmp_path).get(line) for line in (table, other, "wrong")] == [
@@ -205,6 +206,9 @@ def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read
         None,
     ]
     page.write_text("new")
+    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other)] == [printed, printed]
+    assert kept.Kept(root=tmp_path).get(cells) is None
+    page.write_text("new\n```yaml\nname: a\n```\n")
     assert [kept.Kept(root=tmp_path).get(line) for line in (table, other)] == [printed, None]
     assert kept.Kept(["DATA"], tmp_path).get(table) is None
     code.write_text("2")

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import time
 from collections.abc import Collection, Iterator
 from hashlib import sha256
@@ -21,13 +22,20 @@ CODE = (
     "examples",
     "benchmarks",
     "tools",
-    "tests",
+    "tests/acceptance",
+    "tests/data",
+    "tests/products/logs/synthetic.py",  # benchmarks fly it
     "pyproject.toml",
 )
-PAGES = ("docs", "README.md", "CONTRIBUTING.md")
-MAKES_TABLE = (
-    "python -m tools.docs table "  # it does not read the pages: text can be changed without a flight
+RUNS = (  # what a command of the package can read, and what lays out its folder
+    *("src", "aircraft", "scenarios", "evidence", "examples", "pyproject.toml"),
+    *("tests/acceptance", "tools/docs/commands.py", "tools/check_certificate.py"),
 )
+PAGES = ("docs", "README.md", "CONTRIBUTING.md")
+# none of these reads a page: text can be changed without a flight
+MAKES_TABLE = "python -m tools.docs table "
+READS_CODE = (MAKES_TABLE, "python -m tools.docs reference ", "python -m tools.docs constants")
+_FILE_OF_READER = re.compile(r"^ *```(?:yaml|python)\n.*?^ *```$", re.MULTILINE | re.DOTALL)
 _UNUSED_S = 14.0 * 86400.0
 
 
@@ -40,9 +48,11 @@ class Kept:
         named = "".join(f"{name}={os.environ.get(name)};" for name in sorted(needed))
         self._code = _digest(root, CODE, named)
         self._pages = _digest(root, PAGES, self._code)
+        self._shown = _digest(root, RUNS, named + _files_of_readers(root))
 
     def _file(self, line: str) -> Path | None:
-        state = self._code if line.startswith(MAKES_TABLE) else self._pages
+        whole = self._code if line.startswith(READS_CODE) else self._pages
+        state = whole if "python -m " in line else self._shown
         return self._folder and self._folder / f"{sha256(f'{state} {line}'.encode()).hexdigest()[:24]}.json"
 
     def get(self, line: str) -> Output | None:
@@ -79,6 +89,12 @@ def _digest(root: Path, places: Collection[str], more: str) -> str:
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root)} {len(content)} ".encode() + content)
     return digest.hexdigest()
+
+
+def _files_of_readers(root: Path) -> str:
+    """The YAML and Python that the pages show: of a page, a command of the package reads nothing else."""
+    pages = (path for path in _files(root, PAGES) if path.suffix == ".md")
+    return "".join("".join(_FILE_OF_READER.findall(path.read_text(encoding="utf-8"))) for path in pages)
 
 
 def _files(root: Path, places: Collection[str]) -> Iterator[Path]:

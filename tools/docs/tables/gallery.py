@@ -59,7 +59,8 @@ def _row(name: str) -> tuple[str, str, str]:
     path = Path("images/gallery", f"{name}.svg")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(_thumbnail(flight), encoding="utf-8")
-    description = " ".join(bf.load(name).description.split())
+    sentences = re.split(r"(?<=[.!?]) (?=[A-Z])", " ".join(bf.load(name).description.split()))
+    description = " ".join(sentences[:2])
     description = re.sub(r"(Compare it with )([\w-]+)", r"\1`\2`", description)
     shown = f"![{name}]({path.as_posix()})"
     return shown, f"`{name}`<br>{description}", _outcome(flight)

@@ -74,6 +74,12 @@ COUNTED = (
 )  # fmt: skip
 
 
+def with_files(part):
+    """A part of a page of results, with the tables that stand beside it."""
+    files = re.findall(r"\]\(\.\./(images/tables/[\w-]+\.csv)\)", part)
+    return "\n".join([part, *((DOCS / name).read_text(encoding="utf-8") for name in files)])
+
+
 def test_reproduction_page_counts_every_statement_and_shows_what_it_promises():
     text = (DOCS / "results/reproduction.md").read_text()
     counts = dict(zip(COUNTED, map(int, re.search(HEADLINE, text).groups()), strict=True))
@@ -81,7 +87,7 @@ def test_reproduction_page_counts_every_statement_and_shows_what_it_promises():
     assert counts["statements"] == tested == counts["hold"] + counts["do not"] + counts["unsettled"]
     assert counts["built"] == len([c for c in CLAIMS if c.construction])
     assert tested + counts["built"] + counts["background"] == len(CLAIMS) == counts["all"]
-    parts = {head: part for head, _, part in (s.partition("\n") for s in text.split("\n## "))}
+    parts = {head: with_files(part) for head, _, part in (s.partition("\n") for s in text.split("\n## "))}
     shown = {head: [c for c in CLAIMS if c.statement.rstrip(".") in part] for head, part in parts.items()}
     not_borne_out = [claim for claim in shown["Statements that do not hold"] if claim.because]
     assert len(not_borne_out) == counts["do not"]

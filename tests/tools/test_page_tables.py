@@ -1,9 +1,11 @@
 """Tables of pages that group rows, or write what several rows share only once."""
 
+import pytest
 from tools.docs import tables
 from tools.docs.cells import cells
 from tools.docs.tables import mechanisms, reproduction
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.mechanisms.shown import CRITERIA
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT
 
@@ -34,25 +36,25 @@ def test_mechanisms_stand_below_what_they_do():
     ]  # fmt: skip
 
 
-def test_a_long_list_of_settings_that_rows_share_is_written_once():
-    names = ["Kp halved, Ki to match", *(f"s{i}" for i in range(10))]
-    statements = {"x.": names, "y.": names, "z.": names[:1]}
-    claims = [
-        {
-            "where": "I", "statement": statement, "verdict": BORNE_OUT, "construction": False, "reason": "",
-            "borne_out_in": 20 - len(missed), "elsewhere": 20,
-        }
-        for statement, missed in statements.items()
-    ]  # fmt: skip
-    sensitivity = [
-        {"variant": name, "also_without": [], "missed": [
-            {"statement": statement} for statement, missed in statements.items() if name in missed]}
-        for name in names
-    ]  # fmt: skip
-    text = reproduction._not_everywhere({"claims": claims, "sensitivity": sensitivity})
-    rows = [line.split(" | ")[-1].rstrip(" |") for line in text.splitlines()[2:5]]
-    assert rows == ["list A", "list A", "Kp halved and Ki matched"]
-    assert text.splitlines()[-1] == f"*List A:* Kp halved and Ki matched; {'; '.join(names[1:])}."
+def test_settings_of_a_statement_are_named_as_the_page_names_them():
+    missed = ["Kp halved, Ki to match", "s1"]
+    claim = {
+        "where": "I", "statement": "x.", "verdict": BORNE_OUT, "construction": False, "reason": "",
+        "borne_out_in": 18, "elsewhere": 20,
+    }  # fmt: skip
+    sensitivity = [{"variant": name, "also_without": [], "missed": [{"statement": "x."}]} for name in missed]
+    text = reproduction._not_everywhere({"claims": [claim], "sensitivity": sensitivity})
+    assert text.splitlines()[2] == "| I | x | 18 of 20 | Kp halved and Ki matched; s1 |"
+
+
+def test_a_table_within_a_text_moves_beside_the_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = "Before.\n\n*Table 4. Laws.*\n\n| law |\n|---|\n| a |\n\nAfter."
+    link = "- [Laws](images/tables/laws.csv)"
+    assert tables.moved(text, "*Table 4.", "laws", "Laws") == f"Before.\n\n{link}\n\nAfter."
+    assert (tmp_path / "images/tables/laws.csv").read_text() == "law\na\n"
+    with pytest.raises(BadInput, match="no table"):
+        tables.moved(text, "*Table 5.", "laws", "Laws")
 
 
 def test_a_table_beside_the_page_has_cells_without_marks(tmp_path, monkeypatch):

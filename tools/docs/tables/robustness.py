@@ -212,7 +212,7 @@ PUBLISHED_HEAD = ("error", "declared", "times", "false alarms", "named wrongly")
 DECAY_FIGURE = (
     "*Figure 2. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
     "`elevator-loss-in-turbulence`. Horizontal: size of the error divided by its declared size, or by its "
-    "unit. Lines: error. Markers of the same size are shifted sideways. Bars: 95 % intervals.*"
+    "unit. Columns: error, with its declared size or unit. Bars: 95 % intervals.*"
 )
 _PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
 

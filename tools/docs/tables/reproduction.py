@@ -82,7 +82,7 @@ CAPTIONS = {  # of each figure: what it shows, and what to see
     ),
     SENSITIVITY: (
         "How far each number stays from its limit",
-        "One row for each statement with a number. Horizontal: ratio of number and limit, logarithmic",
+        "One row for each statement that can be tested. Horizontal: ratio of number and limit, logarithmic",
         "Left of 1 the number keeps its limit",
     ),
 }

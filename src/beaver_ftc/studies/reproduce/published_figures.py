@@ -123,8 +123,8 @@ def margins_figure(document: Document) -> "Figure":
     axes = figure.subplots(gridspec_kw={"left": 0.5, "right": 0.97, "top": 0.97, "bottom": 0.075})
     for row, claim in enumerate(claims):
         low, ours, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
-        look = {"color": BLUE, "linewidth": 2.5} if high <= 1 else {"color": VERMILION, "linewidth": 6.0}
-        axes.plot([low, high], [row, row], alpha=0.55, **look)
+        colour, width = (BLUE, 2.5) if high <= 1 else (VERMILION, 6.0)
+        axes.plot([low, high], [row, row], color=colour, linewidth=width, alpha=0.55)
         axes.plot(ours, row, _CLIPPED.get(ours, "o"), color=BLACK, markersize=5)
         if row and claim["verdict"] != claims[row - 1]["verdict"]:
             axes.axhline(row - 0.5, color=GREY, linewidth=1.0)

@@ -224,7 +224,7 @@ def robustness_decay() -> str:
         Path("images").mkdir(exist_ok=True)
         Path("images/decay.png").write_bytes(Path(whole["folder"], "decay.png").read_bytes())
     pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
-    table = _decay_table(whole).replace("*Table 1.", "*Table 5.", 1)  # the probe has the number of its page
+    table = _decay_table(whole).replace("*Table 1.", "*Table 5.", 1)  # the digest of the probe has the other number
     return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
 
 

@@ -89,3 +89,9 @@ def test_prose_can_take_numbers_of_the_tables_of_a_page():
     assert found["1"][0] == {"scheme": "ours", "light_aileron": 75, "row": "x"}
     assert found["1"][1]["light_aileron"] == 2.5
     assert found["2"] == [{"row": "a", "n": 1}]
+
+
+def test_prose_can_take_numbers_of_the_tables_beside_a_page(tmp_path):
+    (tmp_path / "laws.csv").write_text('law,"error, deg/s"\nlqr,1.5\n')
+    found = cells("- [Laws](laws.csv)\n", tmp_path)
+    assert found == {"laws": [{"law": "lqr", "error": 1.5}]}

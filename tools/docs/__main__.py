@@ -98,7 +98,8 @@ def _cells(name: str = "") -> str:
     from tools.docs.cells import cells
     from tools.docs.pages import chosen
 
-    return json.dumps(cells(chosen([name])[0].read_text(encoding="utf-8")), indent=1)
+    page = chosen([name])[0]
+    return json.dumps(cells(page.read_text(encoding="utf-8"), page.parent), indent=1)
 
 
 def _constants() -> str:

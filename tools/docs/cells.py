@@ -1,18 +1,26 @@
 """The tables of a page as a document, so that prose can take its numbers from the table that it explains."""
 
+import csv
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 _CAPTION = re.compile(r"\*Table (\d+)\. ")
 _RULE = re.compile(r"\|(?: ?:?-+:? ?\|)+")
 _COLUMNS = re.compile(r"(?<!\\)\|")
 
 
-def cells(text: str) -> dict[str, list[dict[str, str | int | float]]]:
-    """{number of a table: its rows, by the names of the columns}; what stands above the first column without
-    a name is `row`. Names are in small letters without units and brackets: `delay, s (32)` is `delay`.
+_FILE = re.compile(r"\]\(([\w./-]+\.csv)\)")
+
+Rows = list[dict[str, str | int | float]]
+
+
+def cells(text: str, folder: Path = Path()) -> dict[str, Rows]:
+    """{number of a table, or name of a CSV file that the page links: its rows, by the names of the columns};
+    what stands above the first column without a name is `row`. Names are in small letters without units and
+    brackets: `delay, s (32)` is `delay`. folder: that of the page.
     """
-    found: dict[str, list[dict[str, str | int | float]]] = {}
+    found: dict[str, Rows] = {}
     lines = text.splitlines()
     number = ""
     for at, line in enumerate(lines):
@@ -23,7 +31,14 @@ def cells(text: str) -> dict[str, list[dict[str, str | int | float]]]:
             found[number] = [
                 dict(zip(names, map(_value, row), strict=True)) for row in _rows(lines[at + 1 :])
             ]
-    return found
+    return found | {Path(name).stem: _beside(folder / name) for name in _FILE.findall(text)}
+
+
+def _beside(path: Path) -> Rows:
+    with path.open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    names = [_name(one) for one in head]
+    return [dict(zip(names, map(_value, row), strict=True)) for row in rows]
 
 
 def _rows(lines: list[str]) -> Iterator[list[str]]:

@@ -318,8 +318,13 @@ def draw_comparison_figure(document: Document) -> Any:
     height = sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
     figure, axes = panels(len(data_sets), 1, 8.6, height)
     for axis, data in zip(axes[:, 0], data_sets, strict=True):
-        (_draw_shares if data["scored_by"] == "labels" else _draw_failure_delays)(axis, data)
-        axis.set_title(f"{data['set']}: left out, {data['left_out']}", fontsize=10, loc="left")
+        draw, shown = (
+            (_draw_shares, "rows that are right")
+            if data["scored_by"] == "labels"
+            else (_draw_failure_delays, "delay of each method on each failure")
+        )
+        draw(axis, data)
+        axis.set_title(f"{data['set']}: {shown}", fontsize=10, loc="left")
         titles = _method_titles(data)
         axis.set_yticks(range(len(titles)), titles)
         axis.set_ylim(len(titles) - 0.5, -0.5)
@@ -331,7 +336,9 @@ def draw_comparison_figure(document: Document) -> Any:
 
 
 def _method_titles(data: Document) -> list[str]:
-    return [row["method"] for row in (*data["rows"], *data.get("published", ()))]
+    """The lines of a panel. Of published methods, only shares are known: not the delay on each failure."""
+    published = data.get("published", ()) if data["scored_by"] == "labels" else ()
+    return [row["method"] for row in (*data["rows"], *published)]
 
 
 def _draw_failure_delays(axis: Any, data: Document) -> None:

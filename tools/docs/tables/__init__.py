@@ -95,6 +95,19 @@ def aside(name: str, title: str, text: str) -> str:
     return f"- [{title}]({path.as_posix()})"
 
 
+def moved(text: str, head: str, name: str, title: str) -> str:
+    """The text, with what stands from this head to the end of its table as CSV, and the link in its place.
+
+    The head is the beginning of a caption, or of the table itself.
+    """
+    before, head, rest = text.partition(head)
+    _, bar, table = f"{head}{rest}".partition("|")
+    table, _, after = table.partition("\n\n")
+    if not head or not bar:
+        raise BadInput(f"{name}: no table from {head!r} on")
+    return f"{before}{aside(name, title, f'|{table}')}\n\n{after}".strip()
+
+
 def as_csv(text: str) -> str:
     """The rows of a Markdown table, without its marks of bold, code and links."""
     written = io.StringIO()

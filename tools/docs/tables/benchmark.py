@@ -83,7 +83,8 @@ def benchmark_gains() -> str:
         f"The largest gain that a last search reached is {100.0 * largest:.1f} %.",
         'After each row with "yes" in the column "adopted", a further search followed.',
     ]
-    return f"{markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])}\n\n{' '.join(says)}"
+    table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
+    return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{' '.join(says)}"
 
 
 def _gain(row: Document, again: Document) -> tuple[str, ...]:

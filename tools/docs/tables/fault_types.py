@@ -26,9 +26,16 @@ def candidates_over_time() -> str:
         if left and set(left) != before:
             gone = sorted(before - set(left))
             after = f"{simulation.t_s - began_s:.2f}"
-            rows.append((after, str(len(left)), ", ".join(gone) or "-", ", ".join(sorted(left))))
+            rows.append((after, str(len(left)), _types(gone), _types(sorted(left))))
             before = set(left)
     return markdown_table(("time since the fault, s", "types left", "excluded", "still possible"), rows)
+
+
+def _types(names: list[str]) -> str:
+    """Their names; of types of several surfaces only how many there are."""
+    if any(":" in name for name in names):
+        return f"{len(names)} types, of every surface"
+    return ", ".join(names) or "-"
 
 
 def fault_matrix() -> str:

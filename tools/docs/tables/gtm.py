@@ -20,7 +20,7 @@ from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
-from tools.docs.tables import shared
+from tools.docs.tables import aside, shared
 from tools.gtm import flights
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
 from tools.gtm.specification import DATABASE, SURFACES, Specification
@@ -30,6 +30,13 @@ SPEEDS_KT = (46, 55, 65, 75, 85, 95, 105, 115, 130)
 ALPHAS_DEG = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16)
 BETWEEN_DEG = (3.0, 5.0, 7.0, 8.5, 9.5, 10.5, 11.5)
 DRAWN = 500
+TITLES = {  # of the tables beside the page
+    "checks": "Coefficients, mass, atmosphere, trim and modes: largest differences",
+    "trim": "Trim at an angle of attack of 3 deg",
+    "spiral": "A steady steep spiral, in JSBSim and as published",
+    "flights": "Eight flights: largest differences, % of the span of the signal",
+    "cost": "Processor time of the GTM",
+}
 _SHOWN = (
     ("airspeed V, m/s", None, 0.3048),
     ("roll rate p, deg/s", 3, 57.2958),
@@ -92,7 +99,8 @@ def gtm_flights() -> str:
     head = ("flight", "integrator 1 kHz, %", "integrator 200 Hz, %", "gravity, %")
     _draw()
     alt = "Airspeed and body rates of eight flights: specification and JSBSim at 1 kHz"
-    return markdown_table(head, rows) + f"\n\n![{alt}]({PICTURE})"
+    table = aside("gtm-flights", TITLES["flights"], markdown_table(head, rows))
+    return f"{table}\n\n![{alt}]({PICTURE})"
 
 
 def _draw() -> None:
@@ -141,7 +149,8 @@ def gtm_checks() -> str:
         ("frequency of the modes", f"{frequency:.1e}", "share"),
         ("damping of the modes", f"{damping:.1e}", "1"),
     ]
-    return markdown_table(("quantity", "largest difference", "unit"), rows)
+    table = markdown_table(("quantity", "largest difference", "unit"), rows)
+    return aside("gtm-checks", TITLES["checks"], table)
 
 
 def gtm_trim() -> str:
@@ -153,7 +162,8 @@ def gtm_trim() -> str:
         ("throttle", "%", f"{here.throttle_percent:.2f}", f"{there.throttle_percent:.2f}"),
         ("gravity", "ft/s²", f"{heavy.gravity:.3f}", f"{source.gravity:.3f}"),
     ]
-    return markdown_table(("quantity", "unit", "JSBSim", "specification"), rows)
+    table = markdown_table(("quantity", "unit", "JSBSim", "specification"), rows)
+    return aside("gtm-trim", TITLES["trim"], table)
 
 
 def _air() -> float:
@@ -269,7 +279,8 @@ def gtm_cost() -> str:
     bench.damage(4)
     rows.append(["the same with a wing tip off", _ratio(bench.fdm, beaver), "frames of the Beaver"])
     rows.append(["loading the model", f"{load_s:.2f}", "s"])
-    return markdown_table(("quantity", "processor time", "unit"), rows)
+    table = markdown_table(("quantity", "processor time", "unit"), rows)
+    return aside("gtm-cost", TITLES["cost"], table)
 
 
 def _processor(work: Callable[[], object]) -> float:
@@ -309,10 +320,11 @@ def gtm_spiral() -> str:
     u, v, w = rows[:, :3].T
     size = np.sqrt(u * u + v * v + w * w)
     found = [size * 0.3048, *np.degrees([np.arctan2(w, u), np.arcsin(v / size), *rows[:, 3:8].T])]
-    return markdown_table(
+    table = markdown_table(
         ("quantity", "unit", "JSBSim", "published", "difference"),
         [
             (name, unit, f"{of.mean():.2f}", f"{given}", f"{of.mean() - given:.2f}")
             for (name, (unit, given)), of in zip(SPIRAL.items(), found, strict=True)
         ],
     )
+    return aside("gtm-spiral", TITLES["spiral"], table)

@@ -1,4 +1,4 @@
-"""Tables of docs/results/mismatch.md."""
+"""Tables of docs/results/validation.md, truth against the design model."""
 
 import json
 import subprocess

@@ -18,7 +18,7 @@ from beaver_ftc.studies.reproduce.words import (
     measured,
     number,
 )
-from tools.docs.tables import shared
+from tools.docs.tables import aside, shared
 
 Document = dict[str, Any]
 FOLDER = "images/reproduction"
@@ -30,78 +30,62 @@ IN_WORDS = {  # names of settings and of ablations that the document has, as the
     "square references, which jump themselves": "square references, which jump",
     "the health (an elevator fault instead)": "nothing is removed; an elevator fault is added",
 }
-TRACKED = "Above: deflections, deg. Below: tracking errors and {}, deg/s. Horizontal: time, s"
-RESIDUALS = "Residual and threshold on each axis, deg/s. Horizontal: time, s"
-CAPTIONS = {  # of each figure: what it shows, what its axes are, and what to see
-    "fig-2a": ("Nominal law, no fault", TRACKED.format("pitch rate"), "The pitch rate follows its reference"),
+CAPTIONS = {  # of each figure: what it shows, and what to see
+    "fig-2a": ("Nominal law, no fault", "The pitch rate follows its reference"),
     "fig-2b": (
         "Nominal law, elevator fault at 12 s",
-        TRACKED.format("pitch rate"),
         "After the fault the pitch rate no longer follows its reference",
     ),
     "fig-3": (
         "Detection of the elevator fault",
-        RESIDUALS,
         "The residual of the pitch rate exceeds its threshold after one frame",
     ),
     "fig-4a": (
         "Isolation estimator of the aileron, elevator fault",
-        RESIDUALS,
         "The residual of the pitch rate exceeds its threshold, so the aileron is excluded (grey)",
     ),
     "fig-4b": (
         "Isolation estimator of the elevator, elevator fault",
-        RESIDUALS,
         "No residual exceeds its threshold, so the elevator remains the only candidate",
     ),
     "fig-4c": (
         "Isolation estimator of the rudder, elevator fault",
-        RESIDUALS,
         "The residual of the pitch rate exceeds its threshold, so the rudder is excluded (grey)",
     ),
     "fig-5": (
         "Fault-tolerant law, elevator fault",
-        TRACKED.format("pitch rate"),
         "After isolation the flap moves in place of the elevator",
     ),
     "fig-6": (
         "Nominal law, unanticipated fault at 12 s",
-        TRACKED.format("pitch rate"),
-        "The aircraft departs 2 s after the fault",
+        "The aircraft departs",
     ),
     "fig-7": (
         "Fault-tolerant law, unanticipated fault",
-        TRACKED.format("pitch rate"),
-        "About 3 s after the fault the pitch rate follows its reference again",
+        "The pitch rate follows its reference again",
     ),
     "aileron": (
         "Fault-tolerant law, aileron fault",
-        TRACKED.format("roll rate"),
         "The roll rate follows its reference with a larger error than before the fault",
     ),
     "rudder": (
         "Fault-tolerant law, rudder fault",
-        TRACKED.format("yaw rate"),
-        "The alarm comes 0.28 s after the fault",
+        "The alarm comes later than after a fault of aileron or elevator",
     ),
     "unanticipated-detection": (
         "Detection of the unanticipated fault",
-        RESIDUALS,
         "The residual of the pitch rate exceeds its threshold after one frame",
     ),
     "as-printed": (
         "Detection with equation (2) as printed, no fault",
-        RESIDUALS,
         "The residual of the pitch rate exceeds its threshold at the start of the flight",
     ),
     SENSITIVITY: (
         "How far each number stays from its limit",
-        "One row for each of the 59 statements with a number. Horizontal: ratio of number and limit, "
-        "logarithmic, no unit",
+        "One row for each statement that can be tested. Horizontal: ratio of number and limit, logarithmic",
         "Left of 1 the number keeps its limit",
     ),
 }
-MANY = 10  # settings of a row that are written only once, if several rows have the same
 
 
 @shared
@@ -134,7 +118,7 @@ def _ours(claim: Document) -> str:
 
 def reproduction_stronger() -> str:
     """The statements read off a figure that hold wherever the paper did not fly, too, with their ablation."""
-    return _stronger(_document())
+    return aside("reproduction-everywhere", "Statements that hold in every setting", _stronger(_document()))
 
 
 def _stronger(document: Document) -> str:
@@ -156,22 +140,19 @@ def _both(claim: Document) -> tuple[str, str, str, str]:
 def reproduction_not_everywhere() -> str:
     """The testable statements that hold as published, but not in every other setting: in how many, and where
     not."""
-    return _not_everywhere(_document())
+    table = _not_everywhere(_document())
+    return aside("reproduction-settings", "Statements that hold in some settings", table)
 
 
 def _not_everywhere(document: Document) -> str:
     claims = [
         claim for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
     ]
-    where = ["; ".join(_where_not(document, claim)) for claim in claims]
-    common = [said for said in dict.fromkeys(where) if where.count(said) > 1 and said.count(";") >= MANY]
-    names = {said: f"list {letter}" for said, letter in zip(common, "ABCDEF", strict=False)}
-    table = markdown_table(("published", "statement", "settings", "not in"), [
+    return markdown_table(("published", "statement", "settings", "not in"), [
         (claim["where"], claim["statement"].rstrip("."), f"{claim['borne_out_in']} of {claim['elsewhere']}",
-         names.get(said, said))
-        for claim, said in zip(claims, where, strict=True)
+         "; ".join(_where_not(document, claim)))
+        for claim in claims
     ])  # fmt: skip
-    return "\n\n".join([table, *(f"*{name.replace('l', 'L', 1)}:* {said}." for said, name in names.items())])
 
 
 def _where_not(document: Document, claim: Document) -> Iterator[str]:
@@ -225,8 +206,8 @@ def reproduction_figures() -> str:
 
 
 def _figures() -> str:
-    titles = [(view.title, view.name) for view, _, _ in FIGURES]
-    shown = [*titles, ("How far each number stays from its limit", SENSITIVITY)]
+    titles = [(view.title.partition(":")[0], view.name) for view, _, _ in FIGURES]
+    shown = [*titles, ("Numbers and limits", SENSITIVITY)]
     return "\n\n".join(
         f"![{title}]({FOLDER}/{name}.png)\n\n*Figure {count}. {_caption(title, name)}.*"
         for count, (title, name) in enumerate(shown, 1)
@@ -235,9 +216,9 @@ def _figures() -> str:
 
 def _caption(title: str, name: str) -> str:
     """What a figure shows; of a figure of the paper, also its number there."""
-    shows, axes, see = CAPTIONS[name]
-    of_paper = f" ({title.split(':', maxsplit=1)[0]} of the paper)" if title.startswith("Fig.") else ""
-    return f"{shows}{of_paper}. {axes}. {see}"
+    of_paper = f" ({title} of the paper)" if title.startswith("Fig.") else ""
+    shows, *says = CAPTIONS[name]
+    return ". ".join([f"{shows}{of_paper}", *says])
 
 
 def reproduction_probe() -> str:

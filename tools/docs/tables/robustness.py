@@ -1,4 +1,4 @@
-"""Tables of docs/results/robustness.md and beyond-declared.md: detection and tracking with real errors."""
+"""Tables of docs/results/robustness.md: detection and tracking with real errors, and with undeclared ones."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -21,6 +21,7 @@ from beaver_ftc.studies.power.survey import GRIDS, contenders
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.one_flight import fly_one
 from beaver_ftc.studies.sweep.sampling import Plan
+from tools.docs.tables import moved
 
 Document = dict[str, Any]
 Rows = list[dict[str, Any]]
@@ -207,12 +208,13 @@ DECAY_CAPTION = (
 )
 
 
+DECAY_TITLE = "Verdicts beyond the declaration: shares in % of the flights, and median tracking error"
 PUBLISHED = "The published case has no margin"
 PUBLISHED_HEAD = ("error", "declared", "times", "false alarms", "named wrongly")
 DECAY_FIGURE = (
-    "*Figure 1. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
+    "*Figure 2. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
     "`elevator-loss-in-turbulence`. Horizontal: size of the error divided by its declared size, or by its "
-    "unit. Lines: error. Markers of the same size are shifted sideways. Bars: 95 % intervals.*"
+    "unit. Columns: error, with its declared size or unit. Bars: 95 % intervals.*"
 )
 _PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
 
@@ -224,7 +226,8 @@ def robustness_decay() -> str:
         Path("images").mkdir(exist_ok=True)
         Path("images/decay.png").write_bytes(Path(whole["folder"], "decay.png").read_bytes())
     pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
-    return "\n\n".join([_decay_table(whole), pictured, f"### {PUBLISHED}", _published(published)])
+    table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
+    return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
 
 
 def robustness_decay_probe() -> str:
@@ -270,7 +273,7 @@ def _published(document: Document) -> str:
         for row in (together[0], *each)
     ]  # fmt: skip
     caption = (
-        f"*Table 2. Verdicts of `{document['scenario']}`. First row: all errors as declared. Other "
+        f"*Table 5. Verdicts of `{document['scenario']}`. First row: all errors as declared. Other "
         'rows: the smallest size with a wrong verdict. "times": this size, divided by the declared size or '
         f"by the unit. Last columns: numbers of flights, of {document['flights']} a row.*"
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
-from beaver_ftc.studies.present.figures import GRID, curve_look, label_edges, marker, panels
+from beaver_ftc.studies.present.figures import GRID, label_edges, panels
 from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, as_html, versions_line
 from beaver_ftc.studies.present.tables import aligned, as_csv, number
 
@@ -27,7 +27,7 @@ CAPTION = (
 SHOWN = (
     ("false_alarm", "false alarms, %"),
     ("named", "named rightly, %"),
-    ("tracking_deg_s", "tracking RMS, deg/s"),
+    ("tracking_deg_s", "RMS rate error, deg/s"),
 )
 
 
@@ -99,28 +99,26 @@ def _interval(found: Document, times: float = 1.0) -> str:
 
 
 def figure_of(document: Document) -> "Figure":
-    """A panel a quantity, a curve an error, over the factor; bars are intervals."""
-    figure, grid = panels(1, len(SHOWN), 12.0, 4.2, f"{document['scenario']}: beyond what is declared")
-    for panel, (quantity, label) in zip(grid[0], SHOWN, strict=True):
-        *alone, together = _by_error(document)
-        for i, rows in enumerate(alone):
-            _curve(panel, rows, quantity, i, curve_look(i))
-        _curve(panel, together, quantity, len(alone), {"color": BLACK})
-        panel.set_xscale("log", base=2)
-        panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
-        panel.minorticks_off()
-        panel.set_title(label, fontsize=9)
-        panel.grid(color=GRID, linewidth=0.6)
-    label_edges(grid, "size of the error / declared size or unit")
-    handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+    """A row a quantity, a column an error, over the factor; bars are intervals."""
+    errors = _by_error(document)
+    titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
+    title = f"{document['scenario']}: errors larger than declared"
+    size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
+    figure, grid = panels(len(SHOWN), len(errors), *size, title, sharex=True, sharey="row")
+    for line, (quantity, _) in zip(grid, SHOWN, strict=True):
+        for panel, rows in zip(line, errors, strict=True):
+            _curve(panel, rows, quantity)
+            panel.set_xscale("log", base=2)
+            panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
+            panel.minorticks_off()
+            panel.grid(color=GRID, linewidth=0.6)
+    label_edges(grid, "times the size", [label for _, label in SHOWN], titles)
     return figure
 
 
-def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int, look: Document) -> None:
+def _curve(panel: Any, rows: Sequence[Document], quantity: str) -> None:
     times = 1.0 if quantity.endswith("_deg_s") else 100.0
     known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
-    at = [row["factor"] * (1.0 + 0.015 * (place - 3)) for row in known]  # beside one another
     value, low, high = (
         [float("nan") if row[quantity][key] is None else times * row[quantity][key] for row in known]
         for key in ("value", "low", "high")
@@ -129,11 +127,8 @@ def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int, look
         [middle - end for middle, end in zip(value, low, strict=True)],
         [end - middle for middle, end in zip(value, high, strict=True)],
     ]
-    panel.errorbar(
-        at, value, bars, marker=marker(place), markersize=4, linewidth=1.2, elinewidth=0.7, capsize=2,
-        label=f"{rows[0]['error']} ({rows[0]['declared']})",
-        **look,
-    )  # fmt: skip
+    at = [row["factor"] for row in known]
+    panel.errorbar(at, value, bars, color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2)
 
 
 def _flat(row: Document) -> Document:

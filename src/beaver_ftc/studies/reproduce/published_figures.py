@@ -5,6 +5,7 @@ Beside them the sensitivity study in one: how far each number stays from its lim
 
 from collections.abc import Mapping
 from math import inf
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,12 +25,15 @@ from beaver_ftc.results.views import (
 from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
+from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SENSITIVITY = "sensitivity"
 _LEAST, _MOST = 1e-3, 10.0  # of its axis: what is smaller is nothing, what is larger never happens
+_GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)  # from above
+_LINE = 60  # characters
 _CLIPPED = {_LEAST: "<", _MOST: ">"}
 WHOLE = (0.0, np.inf)
 CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
@@ -110,29 +114,38 @@ def _share(claim: Document, number: float | None) -> float:
 
 
 def margins_figure(document: Document) -> "Figure":
-    """A row a statement: its number's range over the changes, and ours."""
+    """A row a statement that can be tested, by verdict: its number's range over the changes, and ours."""
     from matplotlib.figure import Figure
 
-    claims = [claim for claim in document["claims"] if not claim["reason"]]
-    figure = Figure(figsize=(12.0, 0.6 + 0.25 * len(claims)), dpi=110)
-    axes = figure.subplots(gridspec_kw={"left": 0.52, "right": 0.98, "top": 0.97, "bottom": 0.075})
+    claims = [claim for claim in document["claims"] if not claim["reason"] and not claim["construction"]]
+    claims.sort(key=lambda claim: (_GROUPS.index(claim["verdict"]), -shares(claim)[1]))
+    figure = Figure(figsize=(9.0, 1.2 + 0.31 * len(claims)), dpi=110)
+    axes = figure.subplots(gridspec_kw={"left": 0.5, "right": 0.97, "top": 0.97, "bottom": 0.075})
     for row, claim in enumerate(claims):
         low, ours, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
-        axes.plot([low, high], [row, row], color=BLUE if high <= 1 else VERMILION, linewidth=3, alpha=0.55)
+        colour, width = (BLUE, 2.5) if high <= 1 else (VERMILION, 6.0)
+        axes.plot([low, high], [row, row], color=colour, linewidth=width, alpha=0.55)
         axes.plot(ours, row, _CLIPPED.get(ours, "o"), color=BLACK, markersize=5)
-    axes.axvline(1.0, color=GREY, linewidth=1.0)
+        if row and claim["verdict"] != claims[row - 1]["verdict"]:
+            axes.axhline(row - 0.5, color=GREY, linewidth=1.0)
+    axes.axvline(1.0, color=BLACK, linewidth=1.0)
     axes.set_xscale("log")
     axes.set_xlim(0.8 * _LEAST, 1.25 * _MOST)
     axes.set_ylim(len(claims) - 0.5, -0.5)
-    axes.set_yticks(range(len(claims)), [f"{c['where']}  {c['statement']}" for c in claims], fontsize=8)
+    axes.set_yticks(range(len(claims)), [_label(claim) for claim in claims], fontsize=8)
     axes.tick_params(axis="x", labelsize=8)
     axes.grid(axis="x", color="#dddddd", linewidth=0.6)
     axes.set_xlabel("ratio of number and limit (arrow: beyond the axis)", fontsize=9)
-    axes.set_title("Left of 1 the number keeps its limit", fontsize=9)
+    axes.set_title("left of 1 the number keeps its limit", fontsize=9)
     axes.plot([], [], "o", color=BLACK, markersize=5, label="as published")
-    axes.plot([], [], color=BLUE, linewidth=3, alpha=0.55, label="over all settings: always kept")
-    axes.plot([], [], color=VERMILION, linewidth=3, alpha=0.55, label="over all settings: not always kept")
+    axes.plot([], [], color=BLUE, linewidth=2.5, alpha=0.55, label="all settings: always kept")
+    axes.plot([], [], color=VERMILION, linewidth=6.0, alpha=0.55, label="all settings: not always kept")
     axes.legend(
         loc="upper right", bbox_to_anchor=(1.0, -0.045), ncols=3, fontsize=8
     )  # below: no corner is free
     return figure
+
+
+def _label(claim: Document) -> str:
+    """Where a statement is in the paper, and what it says, in at most two lines."""
+    return fill(f"{claim['where']}: {claim['statement']}", _LINE, max_lines=2, placeholder=" ...")

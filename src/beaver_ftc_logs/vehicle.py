@@ -170,8 +170,7 @@ class Vehicle(Section):
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
         "each multiplied by a weight. The numbers are the weights. The positive sense of each deflection "
-        "is your choice, for example that of its servo. For a log of PX4 or ArduPilot you can leave out this "
-        "key, if the parameters in the log state the surfaces",
+        "is your choice. Can be left out as `commands` can",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )

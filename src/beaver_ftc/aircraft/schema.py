@@ -396,7 +396,7 @@ class EffectorSection(Section):
 
 
 class ModelErrorSection(Section):
-    """Largest error of each angular acceleration. `derive` measures this error after the fit of the terms."""
+    """Largest error of each angular acceleration, in addition to `fdi.bounds`. `derive` measures it."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])

@@ -386,7 +386,7 @@ class Environment(Section):
         | None
     ) = entry(
         None,
-        "one gust, or a list of gusts that do not overlap",
+        "one gust, or a list of gusts that do not overlap. Its velocity rises, stays constant, and falls",
         examples=[[{"at_s": 10, "velocity_mps": [0, 0, -3]}]],
     )
 

@@ -152,9 +152,7 @@ class Bounds(Section, strict=True):
     sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
     deflection_deg: largest difference between the position of a surface and the model of its actuator, deg
     turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, and depends on
-    the height. Its smallest value is that above 2000 ft. The translation of the air needs no bound, because
-    airspeed and flow angles contain it. The statistical detector can subtract pitching and yawing gusts,
-    which the vanes measure. No instrument measures rolling gusts
+    the height. Airspeed and flow angles contain the translation of the air
     vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor uses it when it compares
     altitude and climb, m/s
     """
@@ -454,7 +452,8 @@ class ControlConfig(Section, strict=True):
     command, 1/s
     least_effectiveness: smallest effectiveness with which the law still uses a surface
     hand_over_s: duration of the reallocation from a failed surface to its stand-in, s
-    power: control of pitch by engine power, if elevator and flap are both lost
+    power: control of pitch by engine power, if elevator and flap are both lost. It requires the law
+    `fault-tolerant` with `fault_class: all`, or the law `oracle`
     """
 
     law: Law = entry("fault-tolerant", examples=["nominal"])

@@ -231,11 +231,14 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 class Uncertainty(Section):
     """Differences between the truth and the design model.
 
-    inertia_coupling: relative errors of the inertia coupling
-    sinusoid: sinusoidal errors of the angular accelerations
+    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates. In
+    [Zhang2005] they are at most 0.25
+
+    sinusoid: for each axis, an error of the angular acceleration: amplitude times sin(frequency t)
     coefficients: factors on aerodynamic terms of the truth, by name of the term. 1: no error
     mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
-    inertia: inertia of the truth
+    inertia: inertia of the truth, divided by the inertia in the aircraft file
+
     cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
     """
 
@@ -366,8 +369,8 @@ class Expect(Section):
     command, 30 s do not count, deg
     stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave
     this envelope
-    arrives: largest allowed deviations from the commanded flight path at the end of the flight. A lost
-    aircraft does not meet this condition
+    arrives: largest allowed deviations from the commanded flight path at the end of the flight, after a
+    first-order lag of 10 s. A lost aircraft does not meet this condition
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])

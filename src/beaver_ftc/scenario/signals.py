@@ -337,13 +337,21 @@ class Signal(Section):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    sine: Sine | None = entry(None, "sine")
-    doublet: Doublet | None = entry(None, "two opposite pulses")
-    step: Step | None = entry(None, "constant")
-    square: Square | None = entry(None, "square wave")
-    ramp: Ramp | None = entry(None, "straight line, then constant")
-    chirp: Chirp | None = entry(None, "sine with changing frequency")
-    csv: Csv | None = entry(None, "table from a CSV file")
+    sine: Sine | None = entry(
+        None, "amplitude sin(2 pi frequency tau + phase). tau is the time since start_s"
+    )
+    doublet: Doublet | None = entry(None, "+amplitude for width_s, then -amplitude for width_s")
+    step: Step | None = entry(None, "amplitude from start_s to end_s")
+    square: Square | None = entry(
+        None, "+amplitude in the first half of each period, -amplitude in the second half"
+    )
+    ramp: Ramp | None = entry(None, "straight line from 0 at start_s to amplitude at end_s, then constant")
+    chirp: Chirp | None = entry(
+        None, "sine whose frequency changes linearly from start_frequency_hz to end_frequency_hz"
+    )
+    csv: Csv | None = entry(
+        None, "table in a CSV file, interpolated linearly, constant before its first and after its last row"
+    )
 
     @model_validator(mode="after")
     def _exactly_one_kind(self) -> Self:

@@ -7,17 +7,14 @@ from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, parity, statistical
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.plant import instruments
-from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 DERIVED_IN = {
     2: "explanation/detection.md#the-bound-on-the-model-error",
     3: "explanation/detection.md#a-bank-of-poles",
-    4: "explanation/isolation.md",
     7: "explanation/statistical.md",
     9: "explanation/instruments.md",
 }  # section of the page: where it is derived
-OF_TYPES = ("slowest_oscillation_rad_s", "slowest_rate_deg_s")  # keys of section 4 that another page derives
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rotation rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
@@ -81,38 +78,22 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     ),
     (9, "largest pitch attitude of the attitude tests", redundancy, "MAX_PITCH_RAD", "rad"),
 )
-SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, unit)
-    (3, "pole of the published filter", "detection_pole_per_s", FdiConfig(), "1/s"),
-    (3, "poles of further filters", "pole_bank_per_s", FdiConfig(), "1/s"),
-    (4, "pole of the isolation estimators", "isolation_pole_per_s", FdiConfig(), "1/s"),
-    (4, "time constant of the estimates", "forgetting_time_s", FdiConfig(), "s"),
-    (4, "lowest frequency of an oscillating surface", "slowest_oscillation_rad_s", FdiConfig(), "rad/s"),
-    (4, "slowest rate limit; a slower surface counts as jammed", "slowest_rate_deg_s", FdiConfig(), "deg/s"),
-    (7, "declared rate of false alarms", "false_alarms_per_h", Statistical(), "1/h"),
-    (7, "probability that noise excludes the true fault in a second", "misnaming", Statistical(), ""),
-    (7, "largest angular frequency of the model error", "uncertainty_rad_s", Statistical(), "rad/s"),
-    (9, "largest vertical wind", "vertical_wind_mps", Bounds(), "m/s"),
-)
 
 
 def theory_constants() -> str:
-    """The constants of the page, and the defaults of its keys, by section."""
-    rows = [(at, meaning, name, getattr(module, name), unit) for at, meaning, module, name, unit in CONSTANTS]
-    rows += [(at, meaning, key, getattr(section, key), unit) for at, meaning, key, section, unit in SETTINGS]
+    """The constants of the page, by the page that derives them."""
     return markdown_table(
-        ("section", "constant", "name", "value", "unit", "derived in"),
+        ("constant", "name", "value", "unit", "derived in"),
         [
-            (str(at), meaning, f"`{name}`", _said(value), unit, derived_in(name, at))
-            for at, meaning, name, value, unit in sorted(rows, key=lambda row: row[0])
+            (meaning, f"`{name}`", _said(getattr(module, name)), unit, derived_in(at))
+            for at, meaning, module, name, unit in sorted(CONSTANTS, key=lambda row: row[0])
         ],
     )
 
 
-def derived_in(name: str, section: int) -> str:
+def derived_in(section: int) -> str:
     """The page that derives a constant, as a link."""
-    where = (
-        "explanation/fault-types.md#from-a-position-to-a-type" if name in OF_TYPES else DERIVED_IN[section]
-    )
+    where = DERIVED_IN[section]
     return f"[{where.split('/')[1].split('.')[0]}]({where})"
 
 

@@ -49,8 +49,8 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class QuantityColumn(Section):
-    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. If the
-    numbers in the log are in the SI unit, write only the name of the column instead of this section."""
+    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. For
+    numbers in the SI unit, the name of the column is enough."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
     unit: Literal[tuple(SI_UNITS)] | None = Field(  # type: ignore[valid-type]
@@ -153,9 +153,9 @@ class Vehicle(Section):
     commands: list[ColumnSpec] = Field(
         min_length=1,
         max_length=20,
-        description="columns of the commands that the autopilot sends to the servos. Do not use measured "
-        "positions of the servos, because a fault of a servo changes them. For a log of PX4 or ArduPilot you "
-        "can leave out this key, if the parameters in the log state the surfaces",
+        description="columns of the commands that the autopilot sends to the servos, not of measured "
+        "positions. Can be left out for a log of PX4 or ArduPilot, if the parameters in the "
+        "log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[ColumnSpec] = Field(
@@ -169,8 +169,8 @@ class Vehicle(Section):
         min_length=1,
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
-        "each multiplied by a weight. The numbers are the weights. The positive sense of each deflection "
-        "is your choice. Can be left out as `commands` can",
+        "each multiplied by a weight. The positive sense of each deflection is your choice. Can be left out "
+        "as `commands` can",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )

@@ -213,9 +213,9 @@ class TermSection(Section):
     )
     of: dict[str, Power] = Field(
         default_factory=dict,
-        description="exponent of each signal. Signals are `alpha` and `beta` in rad, the dimensionless "
-        "rates ph = p b/(2 V), qh = q c/V and rh = r b/(2 V) with span b, chord c and airspeed V, and "
-        "the entries of `signals`. In `forces`, betadoth = betadot b/(2 V) is allowed too. In `moments`, "
+        description="exponent of each signal: `alpha` and `beta` in rad, ph = p b/(2 V), qh = q c/V, rh "
+        "= r b/(2 V) with span b, chord c and airspeed V, and the entries of `signals`. "
+        "`forces` also allow betadoth = betadot b/(2 V). In `moments`, "
         "a term with a `surface` must not contain a rate",
         examples=[{"alpha": 1}],
     )
@@ -379,11 +379,9 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine with a lever of its own. The law moves this lever. If the force of the engine does not go
-    through the centre of gravity, the force also causes a moment.
+    """An engine with a lever of its own, which the law moves.
 
-    throttle: property that moves the lever of this engine alone. Its value is added to the common lever, in
-    the unit of the setting
+    throttle: property that moves the lever of this engine alone. Its value is added to the common lever
     share: share of the thrust of all engines, `engine.thrust`
     """
 
@@ -503,9 +501,8 @@ class ErrorMapSection(Section):
 
 
 class StartSection(Section):
-    """Flight condition at the start, if the scenario does not state one. Without an airspeed here, flights
-    start at 45 m/s. If `envelope` does not contain this airspeed, they start in the middle of the envelope.
-    Without an altitude here, flights start at 1828.8 m."""
+    """Flight condition at the start, if the scenario has none. Left out: 45 m/s, or the middle of
+    `envelope` if it does not contain 45 m/s; 1828.8 m."""
 
     airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
     altitude_m: Number | None = number(

@@ -149,10 +149,8 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The flight condition at the start: trimmed straight flight with wings level. The settings of the engine
-    and the deflections of surfaces are those of the Beaver. For another
-    aircraft, the names of the settings are in `engine.settings` of its aircraft file. Its surfaces here are
-    those that its trim does not move."""
+    """The flight condition at the start: trimmed straight flight with wings level. Another aircraft has
+    the settings in `engine.settings` of its file, and the surfaces that its trim does not move."""
 
     airspeed_mps: Number = number(
         45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70
@@ -160,8 +158,7 @@ class Initial(Section):
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
         None,
-        "true: the aircraft stands on the ground, and `altitude_m` is the elevation of the ground. Only "
-        "`sitl` accepts true; left out: the flight starts in the air",
+        "true: the aircraft stands on the ground, whose elevation is `altitude_m`. Only `sitl` accepts true",
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -276,9 +273,8 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section, extra="allow"):
-    """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
-    in the section of a surface applies only to this surface, and replaces the common value. The surfaces
-    below are those of the Beaver. For another aircraft, use the names of its surfaces."""
+    """A preset, or a key directly in this section, applies to all surfaces. A key in the section of a
+    surface replaces it for this surface. Another aircraft has the names of its own surfaces."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
 

@@ -247,9 +247,9 @@ class FdiConfig(Section, strict=True):
     faults of sensors
     pairs: true: also look for simultaneous faults of two surfaces. On the Beaver, the pairs are elevator with
     flap, and aileron with rudder. This requires `fault_class: all`
-    sensor_monitor: whether the sensor monitor compares the instruments with each other. `never`: sensors are
-    assumed to be sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a
-    former value and means the same as left out
+    sensor_monitor: whether instruments are compared with each other. `never`: they are assumed to be
+    sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a former
+    value: as left out
     slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface in the fault class `all`,
     rad/s
     slowest_rate_deg_s: lowest rate limit of a slow surface in the fault class `all`. A slower surface counts
@@ -259,8 +259,8 @@ class FdiConfig(Section, strict=True):
     left out: off
     authority: detector that can raise the alarm and exclude candidates: one of the two, or both (`either`).
     This key matters only with `statistical`
-    thresholds: bound of the isolation tests. `interval`: the residual must stay between a lower and an upper
-    bound. `published`: its magnitude must stay below one bound, as in the published study
+    thresholds: isolation tests. `interval`: the residual must stay between two bounds. `published`: its
+    magnitude must stay below one bound, as in the published study
     detection_pole_per_s: pole of the first detection filter. The published study has only this filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
@@ -269,8 +269,8 @@ class FdiConfig(Section, strict=True):
     switches single steps
     pole_bank_per_s: poles of the detection filters after the first. The default is so large that the filter
     uses only the last frame, 1/s
-    fault_profile: assumption about the parameter of a fault, for example its size. `any`: the parameter can
-    change with time. `abrupt`: the parameter is constant from the start of the fault
+    fault_profile: assumption about the parameter of a fault, for example its size. `any`: it can change
+    with time. `abrupt`: it is constant from the start of the fault
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -392,7 +392,7 @@ class EnginePower(Section, strict=True):
 
     enabled: false: the engine keeps its trim setting
     speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This
-    feedback damps the phugoid, the slow oscillation of airspeed and height, inHg per m/s
+    feedback damps the phugoid, inHg per m/s
     attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the pitch attitude is too
     high. More power lowers the nose, inHg per deg
     washout_s: time constant of the mean airspeed. It should be about one period of the phugoid, s
@@ -435,8 +435,7 @@ class ControlConfig(Section, strict=True):
     gains, dB
     phase_margin_deg: smallest phase margin of every loop of the default law, deg
     noise_share: limit for the surface rate that gyro noise causes with the default law: its standard
-    deviation, divided by the rate limit of the surface. With 0.5 the rate is below the rate limit for 95 % of
-    the time
+    deviation, divided by the rate limit of the surface
     proportional_per_s: proportional gain Kp of the tracking error, 1/s
     integral_per_s2: integral gain Ki of the tracking error. With Ki = Kp^2/4 the error has two equal poles at
     Kp/2, 1/s2

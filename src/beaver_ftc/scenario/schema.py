@@ -349,9 +349,8 @@ class Expect(Section):
 
     detected_within_s: largest allowed time from the fault to the first alarm, s
     isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    `unanticipated`. A list contains one name for each fault, in the order of the faults; the diagnosis must
-    give exactly these names. A name that was withdrawn later counts. A name that was given before its fault
-    does not count
+    `unanticipated`. A list has exactly one name for each fault, in their order. A name that was
+    withdrawn later counts, a name that was given before its fault does not
     isolated_type: fault type that the diagnosis must name
     candidate_type: fault type that must be named, or at least must not be excluded
     isolated_within_s: largest allowed time from the fault to its name, s
@@ -400,12 +399,12 @@ class Scenario(Section, title="beaver-ftc scenario"):
 
     name: name of the result folder: letters, digits, - and _
     description: purpose of the flight
-    aircraft: built-in name of an aircraft, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER for
-    an aircraft folder beside this file
+    aircraft: built-in name, jsbsim:NAME of the JSBSim package, or ./FOLDER for an aircraft folder
+    beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
     substeps: number of JSBSim steps in each frame
-    seed: seed of all random numbers of the flight. The same scenario and seed give the same numbers
+    seed: seed of all random numbers of the flight
     initial: flight condition at the start, trimmed
     reference: commanded body rates
     autopilot: flight path that the outer loops follow; left out: only the body rates are controlled

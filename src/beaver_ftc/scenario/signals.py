@@ -421,8 +421,8 @@ class _Leg(Section):
     at_s: Number = number(0.0, "s", "time from which the leg applies", ge=0, le=_LATEST_S, examples=[10])
     hold: Flag = entry(
         False,
-        "true: hold the value that is commanded at this time. If no value is commanded, hold the present "
-        "value of the aircraft. Without `hold: true`, `value` is required",
+        "true: hold the commanded value or, if there is none, the present value of the "
+        "aircraft. Otherwise `value` is required",
     )
     value: Number | None = None
 
@@ -499,9 +499,8 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The flight path. Each quantity has a list of legs. A leg begins at its time `at_s`. It sets a new
-    `value`, or keeps the present value if it has `hold: true`. A quantity that is left out is not
-    controlled."""
+    """Each quantity has a list of legs. From its time `at_s`, a leg sets a new `value`, or with `hold:
+    true` keeps the present value. A quantity that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
         "legs of the altitude"

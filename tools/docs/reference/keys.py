@@ -25,7 +25,7 @@ _NAMED = {  # sections that stand in many places: heading, part
     "QuantileLevel": ("LIMIT", "a time or an error"),
 }
 _HEAD = ("in", "key", "what it is", "value", "default")
-_WORDS = {"string": "text", "boolean": "true or false", "integer": "whole number", "number": "number"}
+_WORDS = {"string": "text", "boolean": "flag", "integer": "whole number", "number": "number"}
 
 
 class Kind(NamedTuple):

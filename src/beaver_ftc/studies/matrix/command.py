@@ -35,7 +35,7 @@ class Matrix(StudyCommand):
       beaver-ftc matrix --airspeed 45
       beaver-ftc matrix --declared --turbulence light --airspeed 45
 
-    out: Folder in which the result folder `fault-matrix` or `pitch-lost` is written.
+    out: Folder of the result folder `fault-matrix` or `pitch-lost`.
     airspeed: Airspeed, m/s. Repeat the option for several. Default: 38, 45 and 52 for the Beaver; for
     another aircraft, shares of its airspeed at the start.
     pitch_lost: Instead, fail elevator and flap together, with and without control by engine power.

@@ -370,7 +370,7 @@ class Power(StudyCommand):
     altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
     aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
     surface: Fly only losses of this surface. The command then prints one line for each loss.
-    out: Folder in which the result folder `power` is written.
+    out: Folder of the result folder `power`.
     """
 
     grid: GridName = GridName.quick

@@ -117,8 +117,8 @@ _NOTES = """Some commands can end with status 1:
 |`mechanisms`|a false alarm of a worst-case detector has no reason|
 |`separate`|a doublet was flown, and both candidates remain|
 
-After Ctrl-C, a command ends with status 130. Only `sitl` ends with status 1: it writes the results of the
-flight until Ctrl-C, with the verdict INTERRUPTED."""
+After Ctrl-C, only `sitl` ends with status 1: it writes the results of the flight until then, with the verdict
+INTERRUPTED."""
 
 
 def statuses() -> str:
@@ -126,7 +126,7 @@ def statuses() -> str:
     _, _, listed = PARSER.help.partition("Exit status: ")
     found = re.findall(r"(\d+) = ([^,.]+)", " ".join(listed.split()))
     raised = {
-        error.exit_code: f"`{error.__name__}`: {' '.join(str(error.__doc__).split())}"
+        error.exit_code: f"`{error.__name__}`"
         for error in vars(errors).values()
         if isinstance(error, type) and issubclass(error, errors.BeaverFtcError)
     }
@@ -134,8 +134,7 @@ def statuses() -> str:
     rows.append(
         (
             "`128 + N`",
-            "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2). Each "
-            "result file is complete or absent",
+            "signal N ended the command: 130 for Ctrl-C. Each result file is complete or absent",
             "",
         )
     )

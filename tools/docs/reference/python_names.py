@@ -1,6 +1,7 @@
 """The public Python names: which there are, in the order of the page, and what each docstring says."""
 
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -106,7 +107,7 @@ def _described(names: Names) -> Iterator[tuple[str, str]]:
 
 
 def _entry(name: str, what: Any) -> tuple[str, str]:
-    return f"`{_signature(name, what)}`", " ".join(_first(what).split())
+    return f"`{_signature(name, what)}`", _first(what)
 
 
 def _signature(name: str, what: Any) -> str:
@@ -123,5 +124,7 @@ def _signature(name: str, what: Any) -> str:
 
 
 def _first(what: Any) -> str:
-    """The first paragraph of the docstring."""
-    return (inspect.getdoc(what) or "").partition("\n\n")[0]
+    """The first sentence of the docstring."""
+    return re.split(r"\.\s", " ".join((inspect.getdoc(what) or "").partition("\n\n")[0].split()))[0].rstrip(
+        "."
+    )

@@ -25,9 +25,7 @@ brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
 _NEXT = """## Next
 
 [Assert in CI](how-to/ci.md) uses the exit statuses."""
-_KINDS = re.compile(
-    r" <(?:str|path|(?:int|float) range|list\[(?:str|Path)\])>"
-)  # said by the text or the range
+_KINDS = re.compile(r" <(?:str|int|path|(?:int|float) range|list\[\w+\])>")  # the text or the range says it
 _SHARED = 3  # so many commands with the same option share its row
 _SHARED_SAYS = "## Options of several commands\n\nEach command lists which of these options it has."
 

@@ -210,7 +210,7 @@ def _value(key: Key, places: list[Place]) -> str:
         return ", ".join(f"`{in_a_line(choice)}`" for choice in dict.fromkeys(key.choices))
     kinds = " or ".join(dict.fromkeys(map(_kind_of_value, key.forms)))
     unit = _unit(key, places) if key.number else ""
-    limit = (" " if key.range[-1:].isdigit() else ", ").join(filter(None, (key.range, unit)))
+    limit = (", " if key.range[-1:].isalpha() else " ").join(filter(None, (key.range, unit)))
     if kinds == "number" and limit:
         return limit
     return ", ".join(filter(None, (kinds, limit, _size(key)))).replace("text, ≤", "text ≤")
@@ -322,26 +322,16 @@ def _preset(of: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 _READ = "[How to read these tables](reference/README.md#tables-of-keys) explains the columns."
-_SCENARIOS, _DERIVED = "reference/scenarios.md", "explanation/derived-aircraft.md"
-_REAL = f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)"
+_DERIVED = "explanation/derived-aircraft.md"
 _LINKS = {
-    "`reference`": f"[reference signals]({_SCENARIOS}#reference-signals)",
-    "`autopilot`": f"[flight path]({_SCENARIOS}#flight-path), [outer loops](explanation/laws.md#outer-loops)",
-    "`faults[]`": f"[faults]({_SCENARIOS}#faults), [fault types](explanation/fault-types.md), "
+    "`autopilot`": "[outer loops](explanation/laws.md#outer-loops)",
+    "`faults[]`": "[fault types](explanation/fault-types.md), "
     "[signs of the surfaces](results/validation.md#surfaces-and-signs)",
-    "`faults[]` of a sensor": f"[instruments that fail]({_SCENARIOS}#instruments-that-fail)",
-    "`uncertainty`": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
-    "`actuators`": _REAL,
-    "`sensors`": _REAL,
-    "`environment`": _REAL,
     "`fdi`": "[declare errors](how-to/declare-errors.md), [detection](explanation/detection.md), "
     "[isolation](explanation/isolation.md), [sensor monitor](explanation/instruments.md), "
     "[statistical detector](explanation/statistical.md), "
     "[active probing](explanation/fault-types.md#active-probing)",
     "`control`": "[control laws](explanation/laws.md)",
-    "`changes[]`": f"[changes in flight]({_SCENARIOS}#changes-in-flight)",
-    "`design_model`": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
-    "`expect`": f"[expectations]({_SCENARIOS}#expectations)",
 }
 _AIRCRAFT_LINKS = {
     "`surfaces.NAME`": "[properties of the Beaver](reference/properties.md), "

@@ -210,7 +210,8 @@ def _value(key: Key, places: list[Place]) -> str:
         return ", ".join(f"`{in_a_line(choice)}`" for choice in dict.fromkeys(key.choices))
     kinds = " or ".join(dict.fromkeys(map(_kind_of_value, key.forms)))
     unit = _unit(key, places) if key.number else ""
-    limit = (", " if key.range[-1:].isalpha() else " ").join(filter(None, (key.range, unit)))
+    in_words = key.range[-1:].isalpha() or unit.startswith(("as ", "the "))
+    limit = (", " if in_words else " ").join(filter(None, (key.range, unit)))
     if kinds == "number" and limit:
         return limit
     return ", ".join(filter(None, (kinds, limit, _size(key)))).replace("text, ≤", "text ≤")

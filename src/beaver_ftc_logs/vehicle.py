@@ -169,8 +169,7 @@ class Vehicle(Section):
         min_length=1,
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
-        "each multiplied by a weight. The positive sense of each deflection is your choice. Can be left out "
-        "as `commands` can",
+        "each multiplied by a weight. Can be left out as `commands` can",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
@@ -186,8 +185,8 @@ class Vehicle(Section):
     )
     acceleration: ColumnSpec | None = Field(
         default=None,
-        description="column of the specific force along the z axis. It shows a wrong unit, because the "
-        "median of its magnitude must be about 1 g. Its sign does not matter",
+        description="column of the specific force along the z axis, whose median must be about 1 g. Its "
+        "sign does not matter",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
@@ -234,8 +233,7 @@ class Vehicle(Section):
     )
     outputs: dict[str, ColumnSpec] = Field(
         default={},
-        description="columns of the servo outputs. Only `compare --flights` uses them, for a published "
-        "detector called the freeze rule",
+        description="columns of the servo outputs, for the freeze rule of `compare --flights`",
         examples=[{"left": "left_pwm"}],
     )
     false_alarms_per_hour: Number | None = number(
@@ -255,15 +253,15 @@ class Vehicle(Section):
     )
     other_laws: bool | None = Field(
         default=None,
-        description="true: the diagnosed flights can have another control law than the flights of the fit. "
-        "An alarm and a name then require more evidence; left out: false for logs with labels, otherwise "
+        description="true: the diagnosed flights can have another control law. An alarm and a name then "
+        "require more evidence; left out: false for logs with labels, otherwise "
         "true",
         examples=[True],
     )
     moving_air: bool | None = Field(
         default=None,
-        description="true: gusts can move the aircraft. The diagnosis then uses every sample, and estimates "
-        "the spectrum of the noise from the flight; left out: false for logs with labels, otherwise true",
+        description="true: gusts can move the aircraft. The diagnosis then estimates the spectrum of "
+        "the noise from the flight; left out: false for logs with labels, otherwise true",
         examples=[True],
     )
     max_rate_hz: Number | None = number(

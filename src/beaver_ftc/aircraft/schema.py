@@ -279,8 +279,8 @@ class TrimSection(Section):
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="surfaces that move together in trim. Example: the rudder moves with the aileron, by "
-        "0.2 of its deflection",
+        description="surfaces that move together in trim: here the rudder with the aileron, by 0.2 of "
+        "its deflection",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
@@ -365,8 +365,8 @@ class EngineSection(Section):
     """Settings of the engine, and limits for trim. The name of a setting is its key in the section `initial`
     of a scenario.
 
-    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start them, and
-    this takes time. `off`: they do not run
+    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start
+    them. `off`: they do not run
     settings: settings that a scenario can have
     limits: properties that must be within a range in trim
     thrust: force at each value of the power setting; left out: the airspeed is held with `forces` alone
@@ -475,8 +475,7 @@ class ErrorMapSection(Section):
     )
     until_s: Ages = entry(
         ...,
-        "times since the start of the flight, rising. The error depends on the time, because fuel burns and "
-        "the inertia changes, s",
+        "times since the start of the flight, rising, because fuel burns and the inertia changes, s",
         examples=[[600]],
     )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
@@ -563,8 +562,7 @@ class AircraftFile(Section):
     envelope: range in which the terms are valid
     trim: power setting, and surfaces that move together in trim
     engine: settings and limits of the engine
-    effectors: engines with a lever of their own. If the surfaces are not sufficient, the law turns the
-    aircraft with these engines
+    effectors: engines with which the law turns the aircraft if the surfaces are not sufficient
     start: flight condition at the start, if the scenario has no other
     """
 

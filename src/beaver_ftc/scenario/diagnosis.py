@@ -142,19 +142,17 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 class Bounds(Section, strict=True):
     """Declared uncertainty. The thresholds follow from this uncertainty [Zhang2005, sec. VII].
 
-    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is the bound in
-    the published study [Zhang2005]
-    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is the bound in
-    the published study, rad/s2
-    coefficients: largest relative error of the moment coefficients. One number is for all terms; a mapping
-    has a number for each term
+    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is that
+    of [Zhang2005]
+    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is that
+    of [Zhang2005], rad/s2
+    coefficients: largest relative error of the moment coefficients: of all terms, or of each by name
     inertia: largest relative error of Ix, Iy, Iz and Jxz
     sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
     deflection_deg: largest difference between the position of a surface and the model of its actuator, deg
-    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, and depends on
-    the height. Airspeed and flow angles contain the translation of the air
-    vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor uses it when it compares
-    altitude and climb, m/s
+    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, because
+    airspeed and flow angles contain its translation
+    vertical_wind_mps: strongest steady vertical wind, up or down, for the sensor monitor, m/s
     """
 
     inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1", examples=[{"p": 0.1}])
@@ -245,8 +243,8 @@ class FdiConfig(Section, strict=True):
     fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
     elevator or rudder; sensors are assumed to be sound (A11). `all`: all fault types on all surfaces, and
     faults of sensors
-    pairs: true: also look for simultaneous faults of two surfaces. On the Beaver, the pairs are elevator with
-    flap, and aileron with rudder. This requires `fault_class: all`
+    pairs: true: also look for simultaneous faults of two surfaces (Beaver: elevator with flap, aileron
+    with rudder). This requires `fault_class: all`
     sensor_monitor: whether instruments are compared with each other. `never`: they are assumed to be
     sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a former
     value: as left out
@@ -257,18 +255,16 @@ class FdiConfig(Section, strict=True):
     probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
     statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
     left out: off
-    authority: detector that can raise the alarm and exclude candidates: one of the two, or both (`either`).
-    This key matters only with `statistical`
+    authority: detector that can raise the alarm and exclude candidates, with `statistical`
     thresholds: isolation tests. `interval`: the residual must stay between two bounds. `published`: its
     magnitude must stay below one bound, as in the published study
     detection_pole_per_s: pole of the first detection filter. The published study has only this filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
     period of the reference, s
-    sharpen: steps beyond the published scheme. `all`: every step is on. `none`: every step is off. A section
-    switches single steps
-    pole_bank_per_s: poles of the detection filters after the first. The default is so large that the filter
-    uses only the last frame, 1/s
+    sharpen: steps beyond the published scheme: all, none, or single ones
+    pole_bank_per_s: poles of the detection filters after the first. With the default, the filter uses
+    only the last frame, 1/s
     fault_profile: assumption about the parameter of a fault, for example its size. `any`: it can change
     with time. `abrupt`: it is constant from the start of the fault
     """

@@ -273,8 +273,7 @@ class DesignModel(Section):
     same factor, 1
     inertia: inertia of the design model
     coefficients: factors on aerodynamic terms of the design model, by name of the term. 1: no error
-    actuators: actuators as the diagnosis and the laws know them, in the forms of `actuators`. Left out: as
-    `actuators`
+    actuators: actuators for the diagnosis and the laws. Left out: as `actuators`
     sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`
     """
 
@@ -360,10 +359,10 @@ class Expect(Section):
     over the whole flight
     post_fault_rms_deg_s: largest allowed RMS tracking error after the fault
     altitude_within_m: largest allowed deviation from the commanded altitude, m
-    airspeed_within_mps: largest allowed deviation from the commanded airspeed. The deviation first passes a
-    first-order lag of 10 s, m/s
-    airspeed_within_limits_mps: as `airspeed_within_mps`, but the commanded airspeed is first limited to the
-    airspeeds that the aircraft can hold after the fault, m/s
+    airspeed_within_mps: largest allowed deviation from the commanded airspeed, after a first-order lag
+    of 10 s, m/s
+    airspeed_within_limits_mps: as `airspeed_within_mps`, with the commanded airspeed limited to those
+    that the aircraft can hold after the fault, m/s
     heading_within_deg: largest allowed deviation from the commanded heading. After each change of the
     command, 30 s do not count, deg
     stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave

@@ -228,7 +228,7 @@ class Csv(Section):
     as `time_s` and `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
-    column: name of the column with the rates in deg/s. The times in s are in the column `t_s`
+    column: name of the column with the rates in deg/s
     time_s: times of the rows. Usually they are read from the file, s
     values_deg_s: rates of the rows. Usually they are read from the file, deg/s
     """

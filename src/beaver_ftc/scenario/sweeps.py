@@ -66,8 +66,7 @@ class Variation(Section):
     loguniform: [lowest, highest]: the logarithms of the values are equally likely
     normal: [mean, standard deviation] of a normal distribution
     within: [lowest, highest]: limits for the values of `normal`. Allowed only together with `normal`
-    linspace: [first, last, count]: evenly spaced values from first to last, as many as `count`. They are
-    flown in this order
+    linspace: [first, last, count]: evenly spaced values, flown in this order
     choice: list of values: all are equally likely
     """
 
@@ -191,13 +190,11 @@ class SweepExpect(Section):
     departure_rate: share of flights in which the aircraft was lost
     failure_rate: share of flights that could not be flown
     pass_rate: share of flights that met every expectation of the base scenario
-    detection_delay_s: time from the fault to the alarm. For a missed fault this time counts as infinite
-    isolation_delay_s: time from the fault to the correct name. For a missing or wrong name this time counts
-    as infinite
-    post_fault_rms_deg_s: root mean square (RMS) of the tracking error after the fault. For a lost aircraft it
-    counts as infinite
-    tracking_ratio: RMS tracking error after the fault, divided by the same error before the fault. For a lost
-    aircraft it counts as infinite
+    detection_delay_s: time from the fault to the alarm, infinite for a missed fault
+    isolation_delay_s: time from the fault to the correct name, infinite for a missing or wrong name
+    post_fault_rms_deg_s: RMS tracking error after the fault, infinite for a lost aircraft
+    tracking_ratio: RMS tracking error after the fault, divided by that before the fault. Infinite for a
+    lost aircraft
     """
 
     detection_rate: Level | None = number(None, "share of 1")

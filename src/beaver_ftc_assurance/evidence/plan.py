@@ -93,10 +93,9 @@ class Requirement(Section):
 
     id: name of the requirement: letters, digits, - and _
     text: the requirement in words
-    clause: clause of the regulation or standard from which the requirement comes. You can add how you
-    interpret it
-    over: flights that must meet the requirement: names from `flights`, names of built-in scenarios and
-    sweeps, or files in the folder of the plan or below it
+    clause: clause of the regulation or standard from which the requirement comes
+    over: flights that must meet the requirement: names from `flights`, built-in names, or files in the
+    folder of the plan or below it
     expect: conditions that each flight must meet, as in `expect` of a scenario
     formula: formula of signal temporal logic over columns of the log. It must be true in each flight.
     Times are in s: `always[12.5:29](...)`. Operators: `always`, `eventually`,

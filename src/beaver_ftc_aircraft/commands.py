@@ -39,9 +39,9 @@ def derive(
     folder of an aircraft.
     envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg;
     and with the names of the model's surfaces, if they are not the usual ones: surfaces.
-    out: Folder in which the aircraft folder is written. Default: the cache.
-    engines: Give each engine a lever of its own. The law can then turn the aircraft with different thrusts.
-    This option requires --out.
+    out: Folder of the aircraft folder. Default: the cache.
+    engines: Give each engine a lever of its own, with which the law can turn the aircraft. Requires
+    --out.
     """
     from beaver_ftc_aircraft.derive.derivation import derive
     from beaver_ftc_aircraft.derive.derived import document_of, text_of
@@ -73,7 +73,7 @@ def gtm(
       beaver-ftc import gtm T2_polynomial_aerodatabase.mat
 
     database: Path of your copy of the database.
-    out: Folder in which the aircraft folder is written. Default: the cache.
+    out: Folder of the aircraft folder. Default: the cache.
     """
     from beaver_ftc_aircraft.gtm.conversion import convert, document_of, text_of
 

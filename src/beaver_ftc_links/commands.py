@@ -59,11 +59,11 @@ def command(options: Options) -> None:
     host: Address to listen on.
     port: Port for the autopilot. 0 selects any free port. Default: 9002 for ardupilot, 4560 for px4.
     rate: Frame rate of the autopilot, Hz. Default: the rate in the first packet of ardupilot, 250 for px4.
-    speed: Speed of the simulation as a multiple of real time. 0 is as fast as the autopilot answers. Default:
-    0 for ardupilot, 1 for px4.
+    speed: Multiple of real time. 0 is as fast as the autopilot answers. Default: 0 for ardupilot, 1 for
+    px4.
     hold: Time at the start in which the scenario's own law flies, s.
     ground: Elevation of the ground above sea level for the autopilot, m. Default: 0.
-    mavlink: Address of a ground station. It receives the results of the diagnosis, and can inject failures.
+    mavlink: Address of a ground station, which receives the results and can inject failures.
     page: Port of a live page that shows the flight and can inject faults. 0 selects any free port. Default:
     no page.
     """

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Paths of recorded flights.")]
 ReaderOption = Annotated[
     str | None,
-    typer.Option(
-        help="Format of the log: table, alfa, ulog or ardupilot. Default: the format is found from the file."
-    ),
+    typer.Option(help="Format of the log: table, alfa, ulog or ardupilot. Default: found from the file."),
 ]
 
 
@@ -44,14 +42,12 @@ def identify(
     Examples:
       beaver-ftc identify my-logs/healthy.csv --vehicle my-logs/vehicle.yaml --out wing.json
 
-    vehicle: Path of a vehicle file, or the built-in name `alfa`. `beaver-ftc new NAME --log` writes an
-    example with every key.
+    vehicle: Path of a vehicle file, or the built-in name `alfa`.
     out: Path of the model file; required without --check. With --check: path of the proposed vehicle file.
     Default: the proposal is printed.
-    check: Do not fit a model. Report the content of the logs, and propose a vehicle file if --vehicle is left
-    out.
-    false_alarms_per_hour: Number of false alarms that `diagnose` may raise in one hour of healthy flight.
-    Default: the number in the vehicle file.
+    check: Only report the content of the logs, and propose a vehicle file if --vehicle is left out.
+    false_alarms_per_hour: False alarms of `diagnose` in one hour of healthy flight. Default: the number
+    in the vehicle file.
     """
     if check:
         _check_logs(flights, vehicle, out, reader, format)

@@ -49,8 +49,8 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class QuantityColumn(Section):
-    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. If the
-    numbers in the log are in the SI unit, write only the name of the column instead of this section."""
+    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. For
+    numbers in the SI unit, the name of the column is enough."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
     unit: Literal[tuple(SI_UNITS)] | None = Field(  # type: ignore[valid-type]
@@ -153,9 +153,9 @@ class Vehicle(Section):
     commands: list[ColumnSpec] = Field(
         min_length=1,
         max_length=20,
-        description="columns of the commands that the autopilot sends to the servos. Do not use measured "
-        "positions of the servos, because a fault of a servo changes them. For a log of PX4 or ArduPilot you "
-        "can leave out this key, if the parameters in the log state the surfaces",
+        description="columns of the commands that the autopilot sends to the servos, not of measured "
+        "positions. Can be left out for a log of PX4 or ArduPilot, if the parameters in the "
+        "log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[ColumnSpec] = Field(
@@ -169,9 +169,7 @@ class Vehicle(Section):
         min_length=1,
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
-        "each multiplied by a weight. The numbers are the weights. The positive sense of each deflection "
-        "is your choice, for example that of its servo. For a log of PX4 or ArduPilot you can leave out this "
-        "key, if the parameters in the log state the surfaces",
+        "each multiplied by a weight. Can be left out as `commands` can",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
@@ -187,8 +185,8 @@ class Vehicle(Section):
     )
     acceleration: ColumnSpec | None = Field(
         default=None,
-        description="column of the specific force along the z axis. It shows a wrong unit, because the "
-        "median of its magnitude must be about 1 g. Its sign does not matter",
+        description="column of the specific force along the z axis, whose median must be about 1 g. Its "
+        "sign does not matter",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
@@ -235,8 +233,7 @@ class Vehicle(Section):
     )
     outputs: dict[str, ColumnSpec] = Field(
         default={},
-        description="columns of the servo outputs. Only `compare --flights` uses them, for a published "
-        "detector called the freeze rule",
+        description="columns of the servo outputs, for the freeze rule of `compare --flights`",
         examples=[{"left": "left_pwm"}],
     )
     false_alarms_per_hour: Number | None = number(
@@ -256,15 +253,15 @@ class Vehicle(Section):
     )
     other_laws: bool | None = Field(
         default=None,
-        description="true: the diagnosed flights can have another control law than the flights of the fit. "
-        "An alarm and a name then require more evidence; left out: false for logs with labels, otherwise "
+        description="true: the diagnosed flights can have another control law. An alarm and a name then "
+        "require more evidence; left out: false for logs with labels, otherwise "
         "true",
         examples=[True],
     )
     moving_air: bool | None = Field(
         default=None,
-        description="true: gusts can move the aircraft. The diagnosis then uses every sample, and estimates "
-        "the spectrum of the noise from the flight; left out: false for logs with labels, otherwise true",
+        description="true: gusts can move the aircraft. The diagnosis then estimates the spectrum of "
+        "the noise from the flight; left out: false for logs with labels, otherwise true",
         examples=[True],
     )
     max_rate_hz: Number | None = number(

@@ -185,7 +185,7 @@ def test_each_example_loads(kind, section, beside):
 @pytest.mark.parametrize("kind", keys.KINDS)
 def test_the_example_of_a_whole_file_loads(kind, tmp_path):
     text = (keys.EXAMPLES / f"{kind}.yaml").read_text()
-    assert f"```yaml\n{text}```" in page(kind)
+    assert any(f"```yaml\n{text}```" in page(name) for name, of in keys.PAGES.items() if kind in of[2])
     if kind == "plan-keys":
         (tmp_path / "plan.yaml").write_text(text)
         load_plan(str(tmp_path / "plan.yaml"))
@@ -213,7 +213,7 @@ def test_every_page_can_be_printed():
         assert text.startswith("# ")
         assert "?" in text.split("\n\n")[1], name  # the question that the page answers
         widths = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
-        assert widths or name == "python-names"
+        assert widths
         assert 0 not in widths
 
 

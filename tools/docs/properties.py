@@ -16,19 +16,18 @@ from beaver_ftc.plant.model_file import with_systems
 _XML = "aircraft/beaver/beaver.xml"
 _OPERATIONS = ("product", "sum", "max", "ifthen")
 _SURFACE = re.compile(rf"({'|'.join(SURFACES)})")
+_AXIS = re.compile(r"(?<=inertia-coupling/)[pqr]|(?<=sinusoid/)[pqr]|(?<=uncertainty/)[pqr](?=dot)")
+_COEFFICIENT = re.compile(r"(?<=aero/coefficient/)C[XYZlmn]$")
 
 _TEXTS = Path(__file__).with_suffix(".yaml")
 
 _HEAD = """# Properties of the aircraft
 
-Which JSBSim properties does the Beaver have, and what does each of them mean? This page is for readers who
-fly the model in JSBSim alone, or who read a property in Python. A scenario file contains no property names:
-its sections `faults`, `uncertainty` and `actuators` set the properties
+Which JSBSim properties does the Beaver have, and what does each of them mean? A scenario file contains no
+property names: its sections `faults`, `uncertainty` and `actuators` set the properties
 ([scenarios](reference/scenarios.md)). In JSBSim alone, set a property by its name:
-`fdm["failures/elevator/effectiveness"] = 0.6`.
-
-*Example.* This program flies 1 s and prints the position of the elevator in rad
-([simulation](reference/python.md)):
+`fdm["failures/elevator/effectiveness"] = 0.6`. *Example.* This program flies 1 s and prints the position of
+the elevator in rad:
 
 ```python
 import beaver_ftc as bf
@@ -39,41 +38,25 @@ print(sim["fcs/elevator-pos-rad"])
 ```
 
 The names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of the files of its
-actuators. The page has three tables:
+actuators:
 
-- [Properties that can be set](#properties-that-can-be-set): actuators, failures, engine, errors of the truth
-- [Properties that JSBSim computes](#properties-that-jsbsim-computes): positions, air data, coefficients
-- [Aerodynamic terms](#aerodynamic-terms): value and factors of each term
-
-How to read the tables:
-
-- `<s>` stands for one of the surfaces aileron, elevator, rudder and flap.
-- A name ends with its unit: `rad_sec` is rad/s, `rad_sec2` is rad/s², `mps` is m/s, `lbs` is pound-force,
-  `lbsft` is pound-force times foot. A name without a unit is dimensionless.
-- The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
-  these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw. A force is its
-  coefficient times the dynamic pressure times S. For a moment in roll or yaw, the
-  product is also multiplied by b. For a moment in pitch, it is multiplied by c.
-- *Incidence* is the angle of attack, alpha.
-- Symbols of the motion: p, q and r are the body rates in rad/s, V is the airspeed in m/s, and rho is the
-  density in kg/m3. A name with `dot` is a derivative with respect to time.
-- Symbols of the aircraft: b is the span in m, c is the chord in m, and S is the wing area in m2. Ix, Iy,
-  Iz and Jxz are the [moments of inertia](results/validation.md#data-sheet-of-the-beaver) in kg m2.
-- Symbols of the engine: n is the engine speed in rpm, pz is the manifold pressure in inHg, and P is the shaft
-  power in kW.
+- `<s>` stands for aileron, elevator, rudder or flap, `<a>` for p, q or r, and `<c>` for CX, CY, CZ, Cl, Cm or
+  Cn.
+- A name ends with its unit: `rad_sec` is rad/s, `mps` is m/s, `lbs` is pound-force, `lbsft` is pound-force
+  times foot. A name without a unit is dimensionless.
+- The body axes are X forward, Y to the right and Z down. A force is its coefficient (CX, CY, CZ) times the
+  dynamic pressure times the wing area S. A moment is its coefficient (Cl, Cm, Cn), times the same product,
+  times the span b in roll and yaw, or the chord c in pitch.
+- p, q, r: body rates. V: airspeed. rho: air density. Ix, Iy, Iz, Jxz:
+  [moments of inertia](results/validation.md#data-sheet-of-the-beaver). n: engine speed, rpm. pz: manifold
+  pressure, inHg. P: shaft power, kW. [TM88]: [source](../REFERENCES.md).
 - The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to
-  the stops. The demand is the input of the actuator.
-- A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
+  the stops. The demand is the input of the actuator."""
 _TILTED = "aero/coefficient/CY_betadot-tilted"
 _PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))
-_SOURCE = "[TM88] "  # of every term
-_TERMS = """Each coefficient is the sum of its terms. A term is the product of three factors: its value, the
-quantities in the column "times", and its scale `uncertainty/<term>-scale`. The scale is 1 by default and
-can be set. Angles and positions are in rad. The position of a surface is `fcs/<s>-effective-rad`. The
-values are those of [TM88].
-
-*Example.* `{name}` is {value} times {times} times `uncertainty/{term}-scale`."""
-_EXAMPLE = "aero/coefficient/CX_dfa"
+_TERMS = """Each coefficient is the sum of its terms. A term is the product of its value [TM88], the
+quantities in the column "times", and its scale `uncertainty/<term>-scale`, which is 1 and can be
+set. Angles and positions are in rad. The position of a surface is `fcs/<s>-effective-rad`."""
 _NEXT = """## Next
 
 The [data sheet](results/validation.md#data-sheet-of-the-beaver) has mass, travel and trim of the Beaver.
@@ -89,18 +72,13 @@ def as_markdown() -> str:
     return "\n\n".join([
         _HEAD,
         "## Properties that can be set",
-        "The defaults are the values after the model is loaded. With these defaults, a surface follows its "
-        "command.",
-        "*Table 1. Properties that can be set, with the value after the model is loaded.*",
+        "With the defaults, a surface follows its command.",
         _table(("property", "default", "meaning"), _input_rows(inputs)),
         "## Properties that JSBSim computes",
-        "JSBSim computes these properties in each step. A program can read them.",
-        "*Table 2. Properties that can be read.*",
         _table(("property", "meaning"), _output_rows(others)),
         "## Aerodynamic terms",
-        _example(next(element for element in terms if element.get("name") == _EXAMPLE)),
-        "*Table 3. Terms of the coefficients. \"times\": the quantities by which the value is multiplied.*",
-        _table(("term", "value", "times", "meaning"), [_term_row(element) for element in terms]),
+        _TERMS,
+        _table(("term", "value", "times"), [_term_row(element) for element in terms]),
         _NEXT,
     ]) + "\n"  # fmt: skip
 
@@ -140,12 +118,13 @@ def _input_rows(inputs: Iterable[tuple[str, float]]) -> list[tuple[str, ...]]:
     defaults: dict[str, dict[str, float]] = {}
     for name, value in inputs:
         surface = _SURFACE.search(name)
-        defaults.setdefault(_shared(name), {})[surface.group() if surface else ""] = value
+        defaults.setdefault(shared(name), {})[surface.group() if surface else ""] = value
     return [(f"`{name}`", _default(values), meaning_of(name)) for name, values in defaults.items()]
 
 
-def _shared(name: str) -> str:
-    return _SURFACE.sub("<s>", name, count=1)
+def shared(name: str) -> str:
+    """A name with what stands for a surface, an axis or a coefficient."""
+    return _COEFFICIENT.sub("<c>", _AXIS.sub("<a>", _SURFACE.sub("<s>", name, count=1)))
 
 
 def _default(values: dict[str, float]) -> str:
@@ -170,26 +149,15 @@ def meaning_of(name: str) -> str:
 
 
 def _output_rows(elements: Sequence[Element]) -> list[tuple[str, ...]]:
-    rows = {_shared(e.get("name", "")): _description(e) for e in elements}
+    rows = {shared(e.get("name", "")): _description(e) for e in elements}
     first = list(rows).index(_TILTED)  # the parts of one correction stand together
     names = sorted(rows, key=lambda name: first if name in _PARTS else list(rows).index(name))
     return [(f"`{name}`", texts()["read"].get(name, rows[name])) for name in names]
 
 
 def _term_row(element: Element) -> tuple[str, ...]:
-    meaning = _description(element).removeprefix(_SOURCE)
-    meaning = meaning.replace(", growing with angle of attack", " times angle of attack")
-    return f"`{element.get('name')}`", _value(element), ", ".join(_factors(element)), meaning
-
-
-def _example(element: Element) -> str:
-    name = element.get("name", "")
-    times = " times ".join(_factors(element))
-    return _TERMS.format(name=name, value=_value(element), times=times, term=name.rpartition("/")[2])
-
-
-def _value(element: Element) -> str:
-    return next((_text(part) for part in element.iter("value")), "")
+    value = next((_text(part) for part in element.iter("value")), "")
+    return f"`{element.get('name')}`", value, ", ".join(_factors(element))
 
 
 def _factors(element: Element) -> list[str]:

@@ -213,9 +213,9 @@ class TermSection(Section):
     )
     of: dict[str, Power] = Field(
         default_factory=dict,
-        description="exponent of each signal. Signals are `alpha` and `beta` in rad, the dimensionless "
-        "rates ph = p b/(2 V), qh = q c/V and rh = r b/(2 V) with span b, chord c and airspeed V, and "
-        "the entries of `signals`. In `forces`, betadoth = betadot b/(2 V) is allowed too. In `moments`, "
+        description="exponent of each signal: `alpha` and `beta` in rad, ph = p b/(2 V), qh = q c/V, rh "
+        "= r b/(2 V) with span b, chord c and airspeed V, and the entries of `signals`. "
+        "`forces` also allow betadoth = betadot b/(2 V). In `moments`, "
         "a term with a `surface` must not contain a rate",
         examples=[{"alpha": 1}],
     )
@@ -279,8 +279,8 @@ class TrimSection(Section):
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="surfaces that move together in trim. Example: the rudder moves with the aileron, by "
-        "0.2 of its deflection",
+        description="surfaces that move together in trim: here the rudder with the aileron, by 0.2 of "
+        "its deflection",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
@@ -365,8 +365,8 @@ class EngineSection(Section):
     """Settings of the engine, and limits for trim. The name of a setting is its key in the section `initial`
     of a scenario.
 
-    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start them, and
-    this takes time. `off`: they do not run
+    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start
+    them. `off`: they do not run
     settings: settings that a scenario can have
     limits: properties that must be within a range in trim
     thrust: force at each value of the power setting; left out: the airspeed is held with `forces` alone
@@ -379,11 +379,9 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine with a lever of its own. The law moves this lever. If the force of the engine does not go
-    through the centre of gravity, the force also causes a moment.
+    """An engine with a lever of its own, which the law moves.
 
-    throttle: property that moves the lever of this engine alone. Its value is added to the common lever, in
-    the unit of the setting
+    throttle: property that moves the lever of this engine alone. Its value is added to the common lever
     share: share of the thrust of all engines, `engine.thrust`
     """
 
@@ -396,7 +394,7 @@ class EffectorSection(Section):
 
 
 class ModelErrorSection(Section):
-    """Largest error of each angular acceleration. `derive` measures this error after the fit of the terms."""
+    """Largest error of each angular acceleration, in addition to `fdi.bounds`. `derive` measures it."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
@@ -477,8 +475,7 @@ class ErrorMapSection(Section):
     )
     until_s: Ages = entry(
         ...,
-        "times since the start of the flight, rising. The error depends on the time, because fuel burns and "
-        "the inertia changes, s",
+        "times since the start of the flight, rising, because fuel burns and the inertia changes, s",
         examples=[[600]],
     )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
@@ -503,9 +500,8 @@ class ErrorMapSection(Section):
 
 
 class StartSection(Section):
-    """Flight condition at the start, if the scenario does not state one. Without an airspeed here, flights
-    start at 45 m/s. If `envelope` does not contain this airspeed, they start in the middle of the envelope.
-    Without an altitude here, flights start at 1828.8 m."""
+    """Flight condition at the start, if the scenario has none. Left out: 45 m/s, or the middle of
+    `envelope` if it does not contain 45 m/s; 1828.8 m."""
 
     airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
     altitude_m: Number | None = number(
@@ -566,8 +562,7 @@ class AircraftFile(Section):
     envelope: range in which the terms are valid
     trim: power setting, and surfaces that move together in trim
     engine: settings and limits of the engine
-    effectors: engines with a lever of their own. If the surfaces are not sufficient, the law turns the
-    aircraft with these engines
+    effectors: engines with which the law turns the aircraft if the surfaces are not sufficient
     start: flight condition at the start, if the scenario has no other
     """
 

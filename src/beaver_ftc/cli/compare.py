@@ -67,25 +67,20 @@ def command(options: Options) -> None:
     sweep: Compare on the flights of this sweep.
     benchmark: Compare on the benchmark's standard sets of flights, and update the ranking.
     tune: Choose parameters of schemes and laws on the calibration flights.
-    grade: With --tune: use only flights of this grade. exact: ideal sensors and actuators. actuators:
-    actuators that lag. errors: errors of sensors or air. Default: all three grades.
+    grade: With --tune: use only flights of this grade: exact, actuators (they lag) or errors (of
+    sensors or air). Default: all.
     trials: With --tune: number of trials of each search.
-    restarts: With --tune: largest number of further searches for each method and grade. Each has a seed of
-    its own. The search ends earlier if two further searches in a row gain less than 1 %.
-    seed: With --tune: seed of the random numbers of the search.
-    draw: With --tune: number of the set of calibration flights. 0 is the standard set. With another set, the
-    command also compares tuned and default parameters.
-    tuned: With --sweep or --benchmark: read the parameters from this file instead of the parameters of the
-    package.
-    schemes: Names of schemes, separated by commas. Without --schemes and --laws, all registered schemes and
-    laws are compared.
-    laws: Names of laws, separated by commas. Without --schemes and --laws, all registered schemes and laws
-    are compared.
+    restarts: With --tune: largest number of further searches for each method and grade.
+    seed: With --tune: seed of the search.
+    draw: With --tune: number of the set of calibration flights. Another set than 0 also compares tuned
+    and default parameters.
+    tuned: With --sweep or --benchmark: read the parameters from this file.
+    schemes: Names of schemes, separated by commas. Default: all registered schemes and laws.
+    laws: Names of laws, separated by commas. Default: all registered schemes and laws.
     only: With --benchmark: fly only this set of flights.
-    flights: A number N: fly at most N flights of each sweep. A FOLDER: compare detectors on the recorded
-    flights in it.
-    other_days: With --flights FOLDER: diagnose changed copies of the labelled flights, as if they were flown
-    on other days.
+    flights: N: at most N flights of each sweep. FOLDER: compare detectors on its recorded flights.
+    other_days: With --flights FOLDER: diagnose changed copies of the labelled flights, as of other
+    days.
     out: Folder for the comparison.
     leaderboard: With --benchmark or --flights FOLDER: path of the page with the ranking.
     """

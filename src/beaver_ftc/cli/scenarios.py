@@ -107,8 +107,7 @@ def new(
 
     name: Name of the scenario, and of its file.
     like: Copy this built-in scenario instead of the template.
-    log: Write a folder NAME with two recorded flights and their vehicle file, as examples for `identify` and
-    `diagnose`.
+    log: Write a folder NAME with two recorded flights and their vehicle file.
     out: Folder of the new file.
     """
     if not _NAME.fullmatch(name):

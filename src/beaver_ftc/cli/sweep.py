@@ -75,8 +75,7 @@ def command(arguments: Arguments) -> None:
     resume: Continue an interrupted sweep from its finished flights.
     keep_logs: Which flights keep a result folder: none, failed, missed, worst, all, or indices such as 3,17.
     replay: Fly only the flight with this index again, and write its result folder as `run` does.
-    search: Search for the flight with the worst value of this objective, instead of drawing flights at
-    random.
+    search: Search for the flight with the worst value of this objective.
     certificate: Write a certificate into each kept result folder. Without --keep-logs, the worst flights are
     kept.
     rare: Estimate the probability that a flight misses this expectation, by subset simulation.

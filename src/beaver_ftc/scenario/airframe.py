@@ -160,10 +160,8 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The flight condition at the start: trimmed straight flight with wings level. The settings of the engine
-    and the deflections of surfaces are those of the Beaver. For another
-    aircraft, the names of the settings are in `engine.settings` of its aircraft file. Its surfaces here are
-    those that its trim does not move."""
+    """The flight condition at the start: trimmed straight flight with wings level. Another aircraft has
+    the settings in `engine.settings` of its file, and the surfaces that its trim does not move."""
 
     airspeed_mps: Number = number(
         45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70
@@ -171,8 +169,7 @@ class Initial(Section):
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
         None,
-        "true: the aircraft stands on the ground, and `altitude_m` is the elevation of the ground. Only "
-        "`sitl` accepts true; left out: the flight starts in the air",
+        "true: the aircraft stands on the ground, whose elevation is `altitude_m`. Only `sitl` accepts true",
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -311,9 +308,8 @@ class OfSurfaces(Section, extra="allow"):
 
 
 class Actuators(OfSurfaces):
-    """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
-    in the section of a surface applies only to this surface, and replaces the common value. The surfaces
-    below are those of the Beaver. For another aircraft, use the names of its surfaces."""
+    """A preset, or a key directly in this section, applies to all surfaces. A key in the section of a
+    surface replaces it for this surface. Another aircraft has the names of its own surfaces."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
     of_one, presets = ActuatorDynamics, PRESETS
@@ -431,7 +427,7 @@ class Environment(Section):
         | None
     ) = entry(
         None,
-        "one gust, or a list of gusts that do not overlap",
+        "one gust, or a list of gusts that do not overlap. Its velocity rises, stays constant, and falls",
         examples=[[{"at_s": 10, "velocity_mps": [0, 0, -3]}]],
     )
 

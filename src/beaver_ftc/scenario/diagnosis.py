@@ -173,24 +173,20 @@ class ActuatorBounds(OfSurfaces):
 class Bounds(Section, strict=True):
     """Declared uncertainty. The thresholds follow from this uncertainty [Zhang2005, sec. VII].
 
-    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is the bound in
-    the published study [Zhang2005]
-    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is the bound in
-    the published study, rad/s2
-    coefficients: largest relative error of the moment coefficients. One number is for all terms; a mapping
-    has a number for each term
+    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is that
+    of [Zhang2005]
+    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is that
+    of [Zhang2005], rad/s2
+    coefficients: largest relative error of the moment coefficients: of all terms, or of each by name
     inertia: largest relative error of Ix, Iy, Iz and Jxz
     sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
-    actuators: largest errors of the actuators. Each frame, the position of a surface is between those of the
-    slowest and the fastest actuator
+    actuators: largest errors of the actuators: the position of a surface is between those of the slowest and
+    the fastest actuator
     deflection_deg: largest further difference between the position of a surface and the model of its
     actuator, deg
-    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, and depends on
-    the height. Its smallest value is that above 2000 ft. The translation of the air needs no bound, because
-    airspeed and flow angles contain it. The statistical detector can subtract pitching and yawing gusts,
-    which the vanes measure. No instrument measures rolling gusts
-    vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor uses it when it compares
-    altitude and climb, m/s
+    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, because
+    airspeed and flow angles contain its translation
+    vertical_wind_mps: strongest steady vertical wind, up or down, for the sensor monitor, m/s
     """
 
     inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1", examples=[{"p": 0.1}])
@@ -282,11 +278,11 @@ class FdiConfig(Section, strict=True):
     fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
     elevator or rudder; sensors are assumed to be sound (A11). `all`: all fault types on all surfaces, and
     faults of sensors
-    pairs: true: also look for simultaneous faults of two surfaces. On the Beaver, the pairs are elevator with
-    flap, and aileron with rudder. This requires `fault_class: all`
-    sensor_monitor: whether the sensor monitor compares the instruments with each other. `never`: sensors are
-    assumed to be sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a
-    former value and means the same as left out
+    pairs: true: also look for simultaneous faults of two surfaces (Beaver: elevator with flap, aileron
+    with rudder). This requires `fault_class: all`
+    sensor_monitor: whether instruments are compared with each other. `never`: they are assumed to be
+    sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a former
+    value: as left out
     slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface in the fault class `all`,
     rad/s
     slowest_rate_deg_s: lowest rate limit of a slow surface in the fault class `all`. A slower surface counts
@@ -294,20 +290,18 @@ class FdiConfig(Section, strict=True):
     probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
     statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
     left out: off
-    authority: detector that can raise the alarm and exclude candidates: one of the two, or both (`either`).
-    This key matters only with `statistical`
-    thresholds: bound of the isolation tests. `interval`: the residual must stay between a lower and an upper
-    bound. `published`: its magnitude must stay below one bound, as in the published study
+    authority: detector that can raise the alarm and exclude candidates, with `statistical`
+    thresholds: isolation tests. `interval`: the residual must stay between two bounds. `published`: its
+    magnitude must stay below one bound, as in the published study
     detection_pole_per_s: pole of the first detection filter. The published study has only this filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
     period of the reference, s
-    sharpen: steps beyond the published scheme. `all`: every step is on. `none`: every step is off. A section
-    switches single steps
-    pole_bank_per_s: poles of the detection filters after the first. The default is so large that the filter
-    uses only the last frame, 1/s
-    fault_profile: assumption about the parameter of a fault, for example its size. `any`: the parameter can
-    change with time. `abrupt`: the parameter is constant from the start of the fault
+    sharpen: steps beyond the published scheme: all, none, or single ones
+    pole_bank_per_s: poles of the detection filters after the first. With the default, the filter uses
+    only the last frame, 1/s
+    fault_profile: assumption about the parameter of a fault, for example its size. `any`: it can change
+    with time. `abrupt`: it is constant from the start of the fault
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -429,7 +423,7 @@ class EnginePower(Section, strict=True):
 
     enabled: false: the engine keeps its trim setting
     speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This
-    feedback damps the phugoid, the slow oscillation of airspeed and height, inHg per m/s
+    feedback damps the phugoid, inHg per m/s
     attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the pitch attitude is too
     high. More power lowers the nose, inHg per deg
     washout_s: time constant of the mean airspeed. It should be about one period of the phugoid, s
@@ -472,8 +466,7 @@ class ControlConfig(Section, strict=True):
     gains, dB
     phase_margin_deg: smallest phase margin of every loop of the default law, deg
     noise_share: limit for the surface rate that gyro noise causes with the default law: its standard
-    deviation, divided by the rate limit of the surface. With 0.5 the rate is below the rate limit for 95 % of
-    the time
+    deviation, divided by the rate limit of the surface
     proportional_per_s: proportional gain Kp of the tracking error, 1/s
     integral_per_s2: integral gain Ki of the tracking error. With Ki = Kp^2/4 the error has two equal poles at
     Kp/2, 1/s2
@@ -489,7 +482,8 @@ class ControlConfig(Section, strict=True):
     command, 1/s
     least_effectiveness: smallest effectiveness with which the law still uses a surface
     hand_over_s: duration of the reallocation from a failed surface to its stand-in, s
-    power: control of pitch by engine power, if elevator and flap are both lost
+    power: control of pitch by engine power, if elevator and flap are both lost. It requires the law
+    `fault-tolerant` with `fault_class: all`, or the law `oracle`
     """
 
     law: Law = entry("fault-tolerant", examples=["nominal"])

@@ -232,11 +232,14 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 class Uncertainty(Section):
     """Differences between the truth and the design model.
 
-    inertia_coupling: relative errors of the inertia coupling
-    sinusoid: sinusoidal errors of the angular accelerations
+    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates. In
+    [Zhang2005] they are at most 0.25
+
+    sinusoid: for each axis, an error of the angular acceleration: amplitude times sin(frequency t)
     coefficients: factors on aerodynamic terms of the truth, by name of the term. 1: no error
     mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
-    inertia: inertia of the truth
+    inertia: inertia of the truth, divided by the inertia in the aircraft file
+
     cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
     actuators: actuators of the truth, compared with `actuators`
     """
@@ -273,8 +276,7 @@ class DesignModel(Section):
     same factor, 1
     inertia: inertia of the design model
     coefficients: factors on aerodynamic terms of the design model, by name of the term. 1: no error
-    actuators: actuators as the diagnosis and the laws know them, in the forms of `actuators`. Left out: as
-    `actuators`
+    actuators: actuators for the diagnosis and the laws. Left out: as `actuators`
     sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`
     """
 
@@ -349,9 +351,8 @@ class Expect(Section):
 
     detected_within_s: largest allowed time from the fault to the first alarm, s
     isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    `unanticipated`. A list contains one name for each fault, in the order of the faults; the diagnosis must
-    give exactly these names. A name that was withdrawn later counts. A name that was given before its fault
-    does not count
+    `unanticipated`. A list has exactly one name for each fault, in their order. A name that was
+    withdrawn later counts, a name that was given before its fault does not
     isolated_type: fault type that the diagnosis must name
     candidate_type: fault type that must be named, or at least must not be excluded
     isolated_within_s: largest allowed time from the fault to its name, s
@@ -361,16 +362,16 @@ class Expect(Section):
     over the whole flight
     post_fault_rms_deg_s: largest allowed RMS tracking error after the fault
     altitude_within_m: largest allowed deviation from the commanded altitude, m
-    airspeed_within_mps: largest allowed deviation from the commanded airspeed. The deviation first passes a
-    first-order lag of 10 s, m/s
-    airspeed_within_limits_mps: as `airspeed_within_mps`, but the commanded airspeed is first limited to the
-    airspeeds that the aircraft can hold after the fault, m/s
+    airspeed_within_mps: largest allowed deviation from the commanded airspeed, after a first-order lag
+    of 10 s, m/s
+    airspeed_within_limits_mps: as `airspeed_within_mps`, with the commanded airspeed limited to those
+    that the aircraft can hold after the fault, m/s
     heading_within_deg: largest allowed deviation from the commanded heading. After each change of the
     command, 30 s do not count, deg
     stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave
     this envelope
-    arrives: largest allowed deviations from the commanded flight path at the end of the flight. A lost
-    aircraft does not meet this condition
+    arrives: largest allowed deviations from the commanded flight path at the end of the flight, after a
+    first-order lag of 10 s. A lost aircraft does not meet this condition
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
@@ -400,12 +401,12 @@ class Scenario(Section, title="beaver-ftc scenario"):
 
     name: name of the result folder: letters, digits, - and _
     description: purpose of the flight
-    aircraft: built-in name of an aircraft, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER for
-    an aircraft folder beside this file
+    aircraft: built-in name, jsbsim:NAME of the JSBSim package, or ./FOLDER for an aircraft folder
+    beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
     substeps: number of JSBSim steps in each frame
-    seed: seed of all random numbers of the flight. The same scenario and seed give the same numbers
+    seed: seed of all random numbers of the flight
     initial: flight condition at the start, trimmed
     reference: commanded body rates
     autopilot: flight path that the outer loops follow; left out: only the body rates are controlled

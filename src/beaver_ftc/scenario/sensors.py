@@ -323,8 +323,7 @@ SensorName = Annotated[
     among(sensors_there, "{!r} is no sensor"),
     entry(
         ...,
-        "instrument that fails: the name of one of the instruments in `sensors`, such as `p`, `alpha` or "
-        "`altitude`",
+        "instrument that fails, a name in `sensors`",
         json_schema_extra=_examples,
     ),
 ]

@@ -228,7 +228,7 @@ class Csv(Section):
     as `time_s` and `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
-    column: name of the column with the rates in deg/s. The times in s are in the column `t_s`
+    column: name of the column with the rates in deg/s
     time_s: times of the rows. Usually they are read from the file, s
     values_deg_s: rates of the rows. Usually they are read from the file, deg/s
     """
@@ -337,13 +337,21 @@ class Signal(Section):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    sine: Sine | None = entry(None, "sine")
-    doublet: Doublet | None = entry(None, "two opposite pulses")
-    step: Step | None = entry(None, "constant")
-    square: Square | None = entry(None, "square wave")
-    ramp: Ramp | None = entry(None, "straight line, then constant")
-    chirp: Chirp | None = entry(None, "sine with changing frequency")
-    csv: Csv | None = entry(None, "table from a CSV file")
+    sine: Sine | None = entry(
+        None, "amplitude sin(2 pi frequency tau + phase). tau is the time since start_s"
+    )
+    doublet: Doublet | None = entry(None, "+amplitude for width_s, then -amplitude for width_s")
+    step: Step | None = entry(None, "amplitude from start_s to end_s")
+    square: Square | None = entry(
+        None, "+amplitude in the first half of each period, -amplitude in the second half"
+    )
+    ramp: Ramp | None = entry(None, "straight line from 0 at start_s to amplitude at end_s, then constant")
+    chirp: Chirp | None = entry(
+        None, "sine whose frequency changes linearly from start_frequency_hz to end_frequency_hz"
+    )
+    csv: Csv | None = entry(
+        None, "table in a CSV file, interpolated linearly, constant before its first and after its last row"
+    )
 
     @model_validator(mode="after")
     def _exactly_one_kind(self) -> Self:
@@ -413,8 +421,8 @@ class _Leg(Section):
     at_s: Number = number(0.0, "s", "time from which the leg applies", ge=0, le=_LATEST_S, examples=[10])
     hold: Flag = entry(
         False,
-        "true: hold the value that is commanded at this time. If no value is commanded, hold the present "
-        "value of the aircraft. Without `hold: true`, `value` is required",
+        "true: hold the commanded value or, if there is none, the present value of the "
+        "aircraft. Otherwise `value` is required",
     )
     value: Number | None = None
 
@@ -491,9 +499,8 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The flight path. Each quantity has a list of legs. A leg begins at its time `at_s`. It sets a new
-    `value`, or keeps the present value if it has `hold: true`. A quantity that is left out is not
-    controlled."""
+    """Each quantity has a list of legs. From its time `at_s`, a leg sets a new `value`, or with `hold:
+    true` keeps the present value. A quantity that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
         "legs of the altitude"

@@ -66,8 +66,7 @@ class Variation(Section):
     loguniform: [lowest, highest]: the logarithms of the values are equally likely
     normal: [mean, standard deviation] of a normal distribution
     within: [lowest, highest]: limits for the values of `normal`. Allowed only together with `normal`
-    linspace: [first, last, count]: evenly spaced values from first to last, as many as `count`. They are
-    flown in this order
+    linspace: [first, last, count]: evenly spaced values, flown in this order
     choice: list of values: all are equally likely
     """
 
@@ -126,8 +125,8 @@ class Variation(Section):
 
 
 class Level(Section):
-    """A limit for a rate that is estimated from the flights. Without `confidence`, the estimate must meet the
-    limit. With `confidence`, its one-sided confidence bound must meet the limit: the lower bound for
+    """Without `confidence`, the estimate must meet the limit. With `confidence`, its one-sided
+    confidence bound must meet it: the lower bound for
     `at_least`, the upper bound for `at_most`.
 
     at_least: smallest allowed value
@@ -191,13 +190,11 @@ class SweepExpect(Section):
     departure_rate: share of flights in which the aircraft was lost
     failure_rate: share of flights that could not be flown
     pass_rate: share of flights that met every expectation of the base scenario
-    detection_delay_s: time from the fault to the alarm. For a missed fault this time counts as infinite
-    isolation_delay_s: time from the fault to the correct name. For a missing or wrong name this time counts
-    as infinite
-    post_fault_rms_deg_s: root mean square (RMS) of the tracking error after the fault. For a lost aircraft it
-    counts as infinite
-    tracking_ratio: RMS tracking error after the fault, divided by the same error before the fault. For a lost
-    aircraft it counts as infinite
+    detection_delay_s: time from the fault to the alarm, infinite for a missed fault
+    isolation_delay_s: time from the fault to the correct name, infinite for a missing or wrong name
+    post_fault_rms_deg_s: RMS tracking error after the fault, infinite for a lost aircraft
+    tracking_ratio: RMS tracking error after the fault, divided by that before the fault. Infinite for a
+    lost aircraft
     """
 
     detection_rate: Level | None = number(None, "share of 1")
@@ -219,16 +216,15 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     description: purpose of the sweep
     base: scenario that is varied: a built-in name, a scenario file beside this file, or the keys of a
     scenario
-    set: new values of keys of the base, the same in all flights. A key is written with dots, e.g.
-    `initial.airspeed_mps`. An item of a list has its number from 0 in brackets: `faults[0].magnitude` is the
-    magnitude of the first fault
-    runs: number of flights. If it is smaller than the grid, only the first points of the grid are flown. If
-    it is larger, the grid is flown again; left out: one flight for each point of the grid. Without a key with
-    `linspace` and without `sampling: grid`, `runs` is required
+    set: new values of keys of the base, the same in all flights. A key is written with dots;
+    `faults[0].magnitude` is that of the first fault
+    runs: number of flights. Fewer than the points of the grid: only its first points are flown. More: the
+    grid is repeated. Required without `linspace` and `sampling: grid`; left out: one
+    flight for each point of the grid
     seed: seed of all random values of the sweep
-    sampling: how the values are chosen. `random`: each flight independently. `lhs`: Latin hypercube. `sobol`:
-    Sobol sequence. Both fill the ranges more evenly than `random`. `grid`: all combinations, only for
-    `linspace` and `choice`. With each kind of sampling, the values of `linspace` are flown in their order
+    sampling: `random`: each flight independently. `lhs` (Latin hypercube) and `sobol` fill the ranges
+    more evenly. `grid`: all combinations of `linspace` and `choice`. The values of `linspace` are
+    always flown in their order
     vary: keys of the base that vary, and how each key varies. A key is written as in `set`
     expect: conditions that the statistics must meet
     """

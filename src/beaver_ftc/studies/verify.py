@@ -446,8 +446,7 @@ class Verify(StudyCommand):
     faults: Number of flights with one random fault.
     seed: Seed of all random draws.
     out: Folder for the flights. An interrupted command continues from this folder.
-    steps: Also fly the schemes between the published and the sharpened scheme. Each of them has one step more
-    than the one before it.
+    steps: Also fly the schemes between the published and the sharpened scheme, each with one step more.
     """
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0

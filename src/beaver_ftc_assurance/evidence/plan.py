@@ -66,18 +66,16 @@ class OfSweep(SweepExpect):
 
 
 class OfHandling(Section):
-    """Required level of handling qualities of the standard MIL-F-8785C. If the scenario has a fault, the
-    level at the end of the flight counts. Otherwise the level in trim counts. The level is computed for each
-    flight in `over`, and each flight must meet it."""
+    """Required level of handling qualities of MIL-F-8785C: at the end of a flight with a fault,
+    otherwise in trim. Each flight in `over` must meet it."""
 
     type: Literal["handling_qualities"]
     level: Whole = number(1, "1", "worst allowed level. 1 is the best level", ge=1, le=3)
 
 
 class OfMargins(Section):
-    """Required stability margins of the loop of each surface. The margins must hold for the healthy aircraft,
-    and also after each loss for which the default law is designed. They are computed for each flight in
-    `over`, and the scenario of each flight must meet them."""
+    """Required stability margins of the loop of each surface, healthy and after each loss for which the
+    default law is designed. The scenario of each flight in `over` must meet them."""
 
     type: Literal["margins"]
     gain_db: Number = number(
@@ -95,13 +93,12 @@ class Requirement(Section):
 
     id: name of the requirement: letters, digits, - and _
     text: the requirement in words
-    clause: clause of the regulation or standard from which the requirement comes. You can add how you
-    interpret it
-    over: flights that must meet the requirement: names from `flights`, names of built-in scenarios and
-    sweeps, or files in the folder of the plan or below it
-    expect: conditions that each flight must meet, as in the `expect` of a scenario
-    formula: formula of signal temporal logic over columns of the log. It must be true in each flight. Times
-    in brackets are in s: `always[12.5:29](...)` is from 12.5 s to 29 s. Operators: `always`, `eventually`,
+    clause: clause of the regulation or standard from which the requirement comes
+    over: flights that must meet the requirement: names from `flights`, built-in names, or files in the
+    folder of the plan or below it
+    expect: conditions that each flight must meet, as in `expect` of a scenario
+    formula: formula of signal temporal logic over columns of the log. It must be true in each flight.
+    Times are in s: `always[12.5:29](...)`. Operators: `always`, `eventually`,
     `until`, `once`, `historically`, `not`, `and`, `or`, `implies`
     bar: limit that the result of a study must meet
     """

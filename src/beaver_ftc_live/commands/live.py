@@ -37,8 +37,8 @@ def command(
     aircraft: Fly this aircraft instead of the scenario's aircraft, without the scenario's uncertainty.
     port: Port of the page. 0 selects any free port.
     host: Network address of the page. With 0.0.0.0 other machines can open it, e.g. those of a class.
-    guests: Number of links for guests. A guest opens the page with such a link. If you allow it on the page,
-    guests can inject faults. Default: 10 if other machines can open the page, otherwise 0.
+    guests: Number of links for guests, who can inject faults if you allow it on the page. Default: 10
+    if other machines can open the page, otherwise 0.
     out: Folder for flights that you save on the page.
     open_browser: Also open the page in a browser.
     """

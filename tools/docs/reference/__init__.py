@@ -8,7 +8,7 @@ from tools.docs.reference import columns, commands, keys, python_names
 
 # Name of each page, and what prints it; the order is that of the site.
 PAGES: dict[str, Callable[[], str]] = {
-    **{name: lambda name=name: keys.page(name) for name in keys.KINDS},  # type: ignore[misc]
+    **{name: lambda of=of: keys.page(*of) for name, of in keys.PAGES.items()},  # type: ignore[misc]
     "columns": columns.page,
     "commands": commands.page,
     "properties": properties.as_markdown,

@@ -34,6 +34,9 @@ _WORDS = {
     "SIGNAL": "|".join(load().signals),
     "SOURCE": "|".join(SOURCES),
     "WITHIN": "[0-9.]+",
+    "MODE": "adaptive|reallocated|unanticipated",
+    "QUANTITY": "altitude_m|airspeed_mps|heading_deg|bank_deg",
+    "END": "lower|upper|low|high|from|to|lowest|highest",
 }
 
 Columns = Mapping[str, str]  # name -> type
@@ -92,9 +95,8 @@ TABLES: dict[str, Callable[[], Columns]] = {
 }
 
 
-_SAYS = """Which columns do the log of a flight and the tables of studies have? This page is for readers who
-evaluate results with a program of their own. *Example.* This program prints the time at which the residual of
-the pitch axis first exceeds its threshold, 12.01 s:
+_SAYS = """Which columns do the log of a flight and the tables of studies have? *Example.* This program prints
+the time at which the residual of the pitch axis first exceeds its threshold, 12.01 s:
 
 ```python
 import beaver_ftc as bf
@@ -104,41 +106,29 @@ ratio = (log.q_alarm_residual_rad_s / log.q_alarm_threshold_rad_s).abs()
 print(log.t_s[ratio > 1].iloc[0])
 ```
 
-## How to read a table
-
-- **column**: the name. If the name ends with a unit, the values have this unit. A word in capitals stands
-  for several words (Table 1). For example, `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
-- **type**: number, whole number, text, or true or false.
-- **unit**: `1` is a pure number. An empty cell means that the column has no unit.
-- **what it is**: the meaning. The [glossary](reference/glossary.md) explains the terms, and the
-  [nomenclature](reference/nomenclature.md) has symbols and signs.
-
-*Table 1. Words in capitals, and the names that each word stands for.*
+The unit `1` is a pure number. The [glossary](reference/glossary.md) explains the terms, and the
+[nomenclature](reference/nomenclature.md) has symbols and signs. In a name, a word in capitals stands for:
 
 | word | stands for |
 | --- | --- |
-| AXIS | `p` (roll), `q` (pitch) and `r` (yaw) |
-| SURFACE | the name of each control surface, for example `elevator` |
-| ESTIMATOR | the name of each isolation estimator: a surface, or a surface and a fault type |
-| SIGNAL | the name of each signal that the aircraft file declares, for example `dpt` |
+| AXIS | `p` (roll), `q` (pitch), `r` (yaw) |
+| SURFACE | each surface, for example `elevator` |
+| ESTIMATOR | each isolation estimator: a surface, or a surface and a fault type |
+| SIGNAL | each signal that the aircraft file declares, for example `dpt` |
+| END | lower and upper end: `lower`, `upper`, `low`, `high`, `lowest`, `highest`; `from`, `to` |
+| MODE | `adaptive`, `reallocated`, `unanticipated` |
+| QUANTITY | `altitude_m`, `airspeed_mps`, `heading_deg`, `bank_deg` |
 | SOURCE | each source of the mismatch: {sources} |
 | WITHIN | a number of seconds: {within} |"""
 _NEXT = """## Next
 
-[Open a flight in other tools](reference/python.md#other-tools) shows how to read the files. The
-[nomenclature](reference/nomenclature.md) has the symbol of each quantity."""
-
-
-_LOSS_OR_ANGLE = (
-    "isolation.estimate", "isolation.estimate_interval.low", "isolation.estimate_interval.high",
-)  # fmt: skip
+[Open a flight in other tools](reference/python.md#other-tools) shows how to read the files."""
 
 
 def page() -> str:
     """The page."""
     texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
-    tables = [_table(number, name, texts[name]) for number, name in enumerate(TABLES, 3)]
-    return "\n\n".join(["# Columns", _said(), _contents(texts), *tables, _NEXT]) + "\n"
+    return "\n\n".join(["# Columns", _said(), *(_table(name, texts[name]) for name in TABLES), _NEXT]) + "\n"
 
 
 def _said() -> str:
@@ -148,38 +138,16 @@ def _said() -> str:
     return _SAYS.replace("{sources}", sources).replace("{within}", within)
 
 
-def _contents(texts: Mapping[str, Mapping[str, str]]) -> str:
-    """A row for each table, which links to it."""
-    rows = [
-        (f"[{text['title']}](#{_anchor(text['title'])})", *_first(text["says"]))
-        for text in (texts[name] for name in TABLES)
-    ]
-    listed = markdown_table(("table", "written by", "one row for each"), rows)
-    caption = (
-        "*Table 2. The tables of this page, the commands that write each table, and the meaning of a row.*"
-    )
-    return f"## Contents\n\n{caption}\n\n{listed}"
-
-
-def _first(says: str) -> tuple[str, str]:
-    """The commands that write a table, and what has a row, from the first two sentences of its text."""
-    written, row, *_ = says.split(". ")
-    commands = dict.fromkeys(re.findall(r"`(\w+)`", written))
-    return ", ".join(f"`{name}`" for name in commands), row.rpartition("one row for each ")[2].rstrip(".")
-
-
-def _anchor(heading: str) -> str:
-    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
-
-
-def _table(number: int, name: str, text: Mapping[str, str]) -> str:
+def _table(name: str, text: Mapping[str, str]) -> str:
     rows = markdown_table(("column", "type", "unit", "what it is"), list(_rows(name, text["columns"])))
-    caption = f"*Table {number}. Columns of {text['title']}.*"
-    return f"## {text['title']}\n\n{text['says']}\n\n{caption}\n\n{rows}"
+    return f"## {text['title']}\n\n{text['says']}\n\n{rows}"
 
 
 def _unit(pattern: str, name: str) -> str:
-    return "1 or rad" if pattern in _LOSS_OR_ANGLE else unit_of(name)
+    if pattern.endswith("QUANTITY"):
+        return "in the name"
+    either = pattern in ("isolation.estimate", "isolation.estimate_interval.END")
+    return "1 or rad" if either else unit_of(name)
 
 
 def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:

@@ -15,26 +15,19 @@ _HEAD = ("option", "what it is")
 PARSER: Any = typer.main.get_command(app)
 
 
-_SAYS = """Which options does each command have, and which exit status? This page lists every command of
-`beaver-ftc` for readers who already know the command. If you do not know it, begin with [which command
-answers my question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints more
-about one command: what it computes, and which files it writes.
+_SAYS = """Which options does each command have, and which exit status? If you do not know the command, begin
+with [which command answers my question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND
+--help` prints more about one command: its usage, examples, what it computes, and which files it writes.
 
-## How to read an entry
-
-- **Usage line.** A word in capitals stands for a value that you give. `{X}` is required, and `[X]` can be
-  left out. Several values are allowed if `...` follows the word.
-- **Options.** The kind of a value is in `<...>`; `list` means that the option can be given several times. In
-  brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
-- **Results.** [Columns](reference/columns.md) lists the columns of the tables that commands write."""
+A word in capitals stands for a value that you give. `...` follows what can be given several times. In
+brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
+[Columns](reference/columns.md) lists the columns of the tables that commands write."""
 _NEXT = """## Next
 
-[Assert in CI](how-to/ci.md) uses the exit statuses. [Columns](reference/columns.md) has the columns of the
-tables that commands write."""
+[Assert in CI](how-to/ci.md) uses the exit statuses."""
+_KINDS = re.compile(r" <(?:str|int|path|(?:int|float) range|list\[\w+\])>")  # the text or the range says it
 _SHARED = 3  # so many commands with the same option share its row
-_SHARED_SAYS = """## Options of several commands
-
-*Table 1. Options that several commands have. Each command lists which of them it has.*"""
+_SHARED_SAYS = "## Options of several commands\n\nEach command lists which of these options it has."
 
 # Purpose -> commands. A command that is not here is listed under "other".
 _PURPOSES = {
@@ -59,10 +52,10 @@ def page() -> str:
     counted = Counter(row for of in rows.values() for row in of)
     shared = [row for row, count in counted.items() if count >= _SHARED]
     parts = ["# Commands", _SAYS, _contents(purposes), _SHARED_SAYS, markdown_table(_HEAD, shared)]
-    parts += ["## beaver-ftc", *_described(PARSER, "beaver-ftc", _options(PARSER, "beaver-ftc"), [])]
+    parts += ["## beaver-ftc", *_described(PARSER, _options(PARSER, "beaver-ftc"), [])]
     for commands in purposes.values():
         for name in commands:
-            parts += [f"## {name}", *_described(known[name], f"beaver-ftc {name}", rows[name], shared)]
+            parts += [f"## {name}", *_described(known[name], rows[name], shared)]
     return "\n\n".join([*parts, statuses(), _NEXT]) + "\n"
 
 
@@ -87,32 +80,27 @@ def _options(command: Any, called: str) -> list[tuple[str, str]]:
     """(option, what it is) of each; what every command has, `--help`, is not an option of its own."""
     context = command.make_context(called, [], resilient_parsing=True)
     records = (each.get_help_record(context) for each in command.params)
-    return [(f"`{name}`", _in_html(says)) for name, says in filter(None, records)]
+    return [
+        (f"`{_KINDS.sub('...' if ' <list[' in name else '', name)}`", _in_html(says))
+        for name, says in filter(None, records)
+    ]
 
 
-def _described(
-    command: Any, called: str, rows: list[tuple[str, str]], shared: list[tuple[str, str]]
-) -> Iterator[str]:
-    """What it does, how it is called, its options, its examples."""
-    context = command.make_context(called, [], resilient_parsing=True)
-    yield f"```text\n{' '.join([called, *command.collect_usage_pieces(context)])}\n```"
+def _described(command: Any, rows: list[tuple[str, str]], shared: list[tuple[str, str]]) -> Iterator[str]:
+    """What it does, and its options."""
     yield _in_html(command.help.split("\n\n")[0])
     own = [row for row in rows if row not in shared]
     if own:
         yield markdown_table(_HEAD, own)
-    if also := [option for option, _ in rows if (option, _) in shared]:
-        yield f"Options of several commands: {', '.join(also)}."
-    _, _, examples = (command.epilog or "").partition("Examples:\n")
-    if examples:
-        yield "```console\n" + re.sub(r"^ +", "$ ", examples.rstrip(), flags=re.MULTILINE) + "\n```"
+    if also := [f"{option.split()[0].strip('`')}" for option, _ in rows if (option, _) in shared]:
+        yield f"Also: `{'`, `'.join(also)}`."
 
 
 def _in_html(text: str) -> str:
     return " ".join(text.split()).replace("<", "&lt;")
 
 
-_CAPTION = """*Table 2. Exit statuses. "exception": the exception that the same error raises in Python.*"""
-_NOTES = """*Table 3. Commands that can end with status 1, and the reason.*
+_NOTES = """Some commands can end with status 1:
 
 |command|status 1 means|
 |---|---|
@@ -127,8 +115,8 @@ _NOTES = """*Table 3. Commands that can end with status 1, and the reason.*
 |`mechanisms`|a false alarm of a worst-case detector has no reason|
 |`separate`|a doublet was flown, and both candidates remain|
 
-After Ctrl-C, a command ends with status 130. Only `sitl` ends with status 1: it writes the results of the
-flight until Ctrl-C, with the verdict INTERRUPTED."""
+After Ctrl-C, only `sitl` ends with status 1: it writes the results of the flight until then, with the verdict
+INTERRUPTED."""
 
 
 def statuses() -> str:
@@ -136,7 +124,7 @@ def statuses() -> str:
     _, _, listed = PARSER.help.partition("Exit status: ")
     found = re.findall(r"(\d+) = ([^,.]+)", " ".join(listed.split()))
     raised = {
-        error.exit_code: f"`{error.__name__}`: {' '.join(str(error.__doc__).split())}"
+        error.exit_code: f"`{error.__name__}`"
         for error in vars(errors).values()
         if isinstance(error, type) and issubclass(error, errors.BeaverFtcError)
     }
@@ -144,12 +132,9 @@ def statuses() -> str:
     rows.append(
         (
             "`128 + N`",
-            "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2). Each "
-            "result file is complete or absent",
+            "signal N ended the command: 130 for Ctrl-C. Each result file is complete or absent",
             "",
         )
     )
-    return (
-        f"## Exit statuses\n\n{_CAPTION}\n\n"
-        f"{markdown_table(('status', 'meaning', 'exception'), rows)}\n\n{_NOTES}"
-    )
+    table = markdown_table(("status", "meaning", "exception in Python"), rows)
+    return f"## Exit statuses\n\n{table}\n\n{_NOTES}"

@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -12,21 +12,17 @@ from beaver_ftc.studies.present.tables import markdown_table
 
 HEAD = """# Python names
 
-Which names does `import beaver_ftc as bf` give, and what does each take and return? This page lists every
-public function, class and record, for readers who write Python. [Python](reference/python.md) shows how to
-use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
-READING = """## How to read an entry
-
-The name stands without `beaver_ftc.` in front. Arguments after `*` must be given by name. This page has
-the first sentence of each entry. The whole text, with types, defaults, fields, shapes, units and errors, is
-in the docstring: the web site shows it on this page, and Python prints it by `help(bf.fly)`. The records of a
-flight have the fields of `metrics.json`; [columns](reference/columns.md) lists them with their units."""
+Which names does `import beaver_ftc as bf` give, and what does each take and return? This page has the first
+sentence of each entry, for names after `beaver_ftc.`. Arguments after `*` must be given by name. The whole
+text, with types, defaults, shapes, units and errors, is in the docstring: the web site shows it on this page,
+and Python prints it by `help(bf.fly)`. [Python](reference/python.md) shows programs, and the
+[glossary](reference/glossary.md) explains the terms."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
 
 RECORDS = "results.model"
-_CONTENTS = "*Table 1. The sections of this page, and the names in each.*"
+Names = Mapping[str, tuple[str, ...]]
 # Headings, the names below each as after `beaver_ftc.`, and the members that are shown where not all are.
 NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Scenarios and flights": {
@@ -57,79 +53,37 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Errors": {"BadInput": (), "SimulationFailed": ()},
 }  # fmt: skip
 SAYS = {
-    "Scenarios and flights": "Load or write a scenario, fly it, and read the result:\n\n```python\n"
-    "import beaver_ftc as bf\n\n"
-    'scenario = bf.load("elevator-partial-loss").with_({"faults[0].magnitude": 0.2})\n'
-    "flight = bf.fly(scenario)\n"
-    "print(flight.detection.delay_s, flight.isolation.fault)  # 0.01 elevator\n```",
-    "Records of a flight": "The attributes of a `Flight` are records. This section lists their fields.",
-    "Step by step": "Advance a flight with `Simulation`, or diagnose your own data with `Diagnosis`.",
-    "Many flights": "Fly variations of a scenario:\n\n```python\n"
-    "import beaver_ftc as bf\n\n"
-    'losses = {"faults[0].magnitude": {"linspace": [0.2, 0.8, 4]}}\n'
-    'rows = bf.sweep("elevator-partial-loss", losses)\n'
-    'print(rows["detection.delay_s"])\n```',
-    "Aircraft, trim and linear models": "Read an aircraft file, trim the aircraft, and linearise it:\n\n"
-    "```python\nimport beaver_ftc as bf\n\n"
-    "point = bf.trim(airspeed_mps=40)\n"
-    "model = bf.linearise(airspeed_mps=40)\n"
-    "print(point.elevator_rad, model.states)\n```\n\n"
-    "`bf.aircraft(NAME)` calls `aircraft.load`, and does more: it derives an aircraft `jsbsim:NAME` at the "
-    "first use, and it checks an aircraft `./FOLDER` against the JSBSim model in the folder.",
-    "Plug-ins": "This section has the two classes that you can write, and the records that these classes "
-    "receive and return.",
-    "Errors": "Both errors have a message for the user, and an `exit_code` for a script: "
-    "2 for `BadInput`, 3 for `SimulationFailed`. `BadInput` has "
-    "these subclasses:\n\n"
-    "- `ScenarioError`: a file has mistakes. The message has one line for each mistake.\n"
-    "- `UnknownAircraft`: there is no aircraft of this name.\n"
-    "- `NotDerived`, a subclass of `UnknownAircraft`: the aircraft is one of JSBSim, and its design model is "
-    "not derived yet.",
+    "Records of a flight": "The attributes of a `Flight` are records, with the fields of `metrics.json`. "
+    "[Columns](reference/columns.md) has their units.",
+    "Aircraft, trim and linear models": "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives "
+    "an aircraft `jsbsim:NAME` at the first use, and checks an aircraft `./FOLDER` against its JSBSim model.",
+    "Errors": "Both errors have an `exit_code` for a script: 2 for `BadInput`, 3 for `SimulationFailed`. "
+    "`ScenarioError`, `UnknownAircraft` and its subclass `NotDerived` are subclasses of `BadInput`.",
 }
 
 
 def page() -> str:
     """The page for a terminal or a reader of Markdown: signatures, and the first words of each docstring."""
-    return _joined(_described)
+    return _joined(lambda names: [markdown_table(("name", "what it is"), list(_described(names)))])
 
 
 def directives() -> str:
     """The page for a generator that reads docstrings by itself: a directive a name."""
-    return _joined(lambda name, members: iter((_directive(name, members),)))
+    return _joined(lambda names: [_directive(name, members) for name, members in names.items()])
 
 
-def _joined(described: Callable[[str, tuple[str, ...]], Iterator[str]]) -> str:
-    parts = [HEAD, "## Contents", _contents(), READING]
+def _joined(described: Callable[[Names], list[str]]) -> str:
+    parts = [HEAD]
     for heading, names in NAMES.items():
-        parts += [f"## {heading}", SAYS[heading]]
-        parts += [part for name, members in names.items() for part in described(name, members)]
+        parts += [f"## {heading}", *filter(None, [SAYS.get(heading)])]
+        parts += described(names)
     return "\n\n".join([*parts, NEXT]) + "\n"
-
-
-def _contents() -> str:
-    """A row for each section, which links to it."""
-    rows = [
-        (f"[{heading}](#{anchor(heading)})", ", ".join(f"`{_listed(name)}`" for name in names))
-        for heading, names in NAMES.items()
-    ]
-    return f"{_CONTENTS}\n\n{markdown_table(('section', 'names'), rows)}"
-
-
-def _listed(name: str) -> str:
-    """A name without its module, unless the package itself has another thing of this name."""
-    last = name.rpartition(".")[2]
-    return name if last != name and hasattr(bf, last) else last
 
 
 def _directive(name: str, members: tuple[str, ...]) -> str:
     options = [f"      members: [{', '.join(members)}]"] if members else []
     options += ["      inherited_members: false"] if name.startswith(RECORDS) else []
     return "\n".join([f"::: beaver_ftc.{name}", *(["    options:"] if options else []), *options])
-
-
-def anchor(heading: str) -> str:
-    """The place of a heading in a link."""
-    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
 
 
 def found(name: str) -> Any:
@@ -140,23 +94,20 @@ def found(name: str) -> Any:
     return getattr(bf, name) if hasattr(bf, name) else getattr(import_module(module), last)
 
 
-def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
+def _described(names: Names) -> Iterator[tuple[str, str]]:
     """Signature and docstring, of a class those of its methods too; of a record, its own methods alone."""
-    what = found(name)
-    own = vars(what) if name.startswith(RECORDS) else None
-    yield f"### {name}"
-    yield f"`{_signature(name.rpartition('.')[2], what)}`: {_first(what)}"
-    if inspect.isclass(what):
-        for member, of in inspect.getmembers(what, inspect.isfunction):
+    for name, members in names.items():
+        what = found(name)
+        yield _entry(name, what)
+        for member, of in inspect.getmembers(what, inspect.isfunction) if inspect.isclass(what) else ():
             shown = member in members if members else not member.startswith("_")
-            if (
-                shown
-                and (own is None or member in own)
-                and (of.__doc__ or "").strip()
-                and of.__module__.startswith("beaver_ftc")
-            ):
-                called = f"{name.rpartition('.')[2]}.{member}"
-                yield f"`{_signature(called, of)}`: {_first(of)}"
+            own = member in vars(what) or not name.startswith(RECORDS)
+            if shown and own and of.__doc__ and of.__module__.startswith("beaver_ftc"):
+                yield _entry(f"{name}.{member}", of)
+
+
+def _entry(name: str, what: Any) -> tuple[str, str]:
+    return f"`{_signature(name, what)}`", _first(what)
 
 
 def _signature(name: str, what: Any) -> str:
@@ -173,5 +124,7 @@ def _signature(name: str, what: Any) -> str:
 
 
 def _first(what: Any) -> str:
-    """The first paragraph of the docstring."""
-    return (inspect.getdoc(what) or "").partition("\n\n")[0]
+    """The first sentence of the docstring."""
+    return re.split(r"\.\s", " ".join((inspect.getdoc(what) or "").partition("\n\n")[0].split()))[0].rstrip(
+        "."
+    )

@@ -189,10 +189,14 @@ def limits(node: Node) -> str:
     """The range of a number in words; empty where it has none."""
     least, most = (node.get(name, node.get(short)) for name, short in (("minimum", "ge"), ("maximum", "le")))
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
-    if least is not None and most is not None:
-        return f"{_inward(least, ceil)} to {_inward(most, floor)}"
-    words = ((least, "{} or more"), (above, "above {}"), (most, "{} or less"), (below, "below {}"))
-    return ", ".join(text.format(shown(value)) for value, text in words if value is not None)
+    low = f"({shown(above)}" if above is not None else "" if least is None else _inward(least, ceil)
+    high = f"{shown(below)})" if below is not None else "" if most is None else _inward(most, floor)
+    if not low or not high:
+        words = ((above, ">"), (least, "≥"), (below, "<"), (most, "≤"))
+        return "".join(f"{sign} {shown(value)}" for value, sign in words if value is not None)
+    if above is None and below is None:
+        return f"{low} to {high}"
+    return f"{low if above is not None else f'[{low}'}, {high if below is not None else f'{high}]'}"
 
 
 def _inward(limit: float, towards: Callable[[float], int]) -> str:

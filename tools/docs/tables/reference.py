@@ -1,8 +1,6 @@
-"""Tables of docs/reference: the defaults of a scenario in words, and the data sheet of the Beaver."""
+"""Tables of the data sheet of the Beaver."""
 
 import math
-from collections.abc import Iterator
-from typing import Any
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
@@ -15,68 +13,6 @@ _SENSE = {  # moment that a surface gives first, and the movement of a positive 
     "rudder": ("Cn", "yaws right", "yaws left"),
     "flap": ("Cm", "pitches up", "pitches down"),
 }
-
-
-def scenario_defaults() -> str:
-    """What a scenario with nothing but a name flies."""
-    scenario = bf.load({"name": "nothing-but-a-name"})
-    rows = [(question, answer, f"`{keys}`") for question, answer, keys in _answers(scenario)]
-    return markdown_table(("question", "answer", "key"), rows)
-
-
-def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
-    initial, bounds, fdi = scenario.initial, scenario.fdi.bounds, scenario.fdi
-    aircraft = bf.aircraft(scenario.aircraft)
-    yield "which aircraft?", f"`{aircraft.name}`: {aircraft.file.description}", "aircraft"
-    yield "for how long?", f"{scenario.duration_s:g} s", "duration_s"
-    yield "how many frames a second?", f"{scenario.rate_hz:g}", "rate_hz"
-    yield (
-        "how fast?",
-        f"{initial.airspeed_mps:g} m/s true airspeed, trimmed, wings level",
-        "initial.airspeed_mps",
-    )
-    yield (
-        "how high?",
-        f"{initial.altitude_m:g} m ({initial.altitude_m / 0.3048:.0f} ft) above sea level",
-        "initial.altitude_m",
-    )
-    power = (
-        f"engine speed {initial.engine_rpm:g} rpm, manifold pressure "
-        f"{initial.manifold_pressure_inhg:g} inHg, constant"
-    )
-    yield "with which power?", power, "initial.engine_rpm`, `initial.manifold_pressure_inhg"
-    yield "with how much flap?", f"{initial.flap_deg:g} deg", "initial.flap_deg"
-    yield "which manoeuvre?", _none(scenario.reference.p, "none: all commanded body rates are 0"), "reference"
-    yield "which flight path?", _none(scenario.autopilot, "none: only body rates are controlled"), "autopilot"
-    yield "which fault?", _none(scenario.faults, "none"), "faults"
-    yield "which sensors?", "exact: no noise, bias, delay or quantisation", "sensors"
-    yield "which servos?", "ideal: a surface follows its command at once, within its travel", "actuators"
-    yield (
-        "which air?",
-        f"still: turbulence `{scenario.environment.turbulence}`, no wind, no gust",
-        "environment",
-    )
-    yield "does the design model differ from the simulated aircraft?", "no", "uncertainty"
-    yield "which law?", f"`{scenario.control.law}`", "control.law"
-    yield "which diagnosis?", f"`{fdi.scheme}`", "fdi.scheme"
-    if fdi.fault_class != "published":
-        raise AssertionError(f"{fdi.fault_class}: the default is no longer loss of effectiveness")
-    yield "which faults does it test for?", "`published`: loss of effectiveness", "fdi.fault_class"
-    constant, share = bounds.constant_rad_s2.q, bounds.inertia_coupling.q
-    declared = (
-        f"on each axis, a model error of {constant:g} rad/s², and an error of {100 * share:.0f} % in the "
-        "inertia coupling, the angular acceleration from products of two rates"
-    )
-    yield "which errors are declared?", declared, "fdi.bounds"
-    yield "is the statistical detector on?", "no" if fdi.statistical is None else "yes", "fdi.statistical"
-    yield "which seed?", f"{scenario.seed}", "seed"
-    yield "which result is required?", "none: the verdict says *flown*, and the exit status is 0", "expect"
-
-
-def _none(value: Any, words: str) -> str:
-    if value:
-        raise AssertionError(f"{value}: the default is no longer empty")
-    return words
 
 
 def beaver_mass() -> str:

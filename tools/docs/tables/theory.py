@@ -7,25 +7,22 @@ from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, parity, statistical
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.plant import instruments
-from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
 DERIVED_IN = {
     2: "explanation/detection.md#the-bound-on-the-model-error",
     3: "explanation/detection.md#a-bank-of-poles",
-    4: "explanation/isolation.md",
     7: "explanation/statistical.md",
     9: "explanation/instruments.md",
 }  # section of the page: where it is derived
-OF_TYPES = ("slowest_oscillation_rad_s", "slowest_rate_deg_s")  # keys of section 4 that another page derives
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rotation rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
-    (2, "limit of instrument noise: number of standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
-    (2, "limit of gusts: number of standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
+    (2, "limit of instrument noise, standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
+    (2, "limit of gusts, standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
     (
         2,
-        "bound outside the boxes of a derived model; it is so large that no conclusion is possible",
+        "bound outside the boxes of a derived model",
         bounds,
         "UNMAPPED_ERROR_RAD_S2",
         "rad/s²",
@@ -34,14 +31,14 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "number of onsets that are tested together", likelihood, "N_SLOTS", ""),
     (
         7,
-        "factor for overshoot in room, the largest effect of bounded model error",
+        "factor for overshoot of the largest effect of model error",
         likelihood,
         "RINGING_FACTOR",
         "",
     ),
     (
         7,
-        "share of the alarm level that is kept for noise if there is model error",
+        "share of the alarm level for noise if there is model error",
         statistical,
         "LEVEL_NOISE_SHARE",
         "",
@@ -49,7 +46,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "growth rate in the signature of a growing loss", statistical, "KAPPA_PER_S", "1/s"),
     (
         7,
-        "a loss is excluded only if its log-likelihood ratio is below this share of the largest ratio",
+        "largest log-likelihood ratio of an excluded loss, share of the largest ratio",
         statistical,
         "MIN_LLR_SHARE",
         "",
@@ -60,59 +57,43 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (9, "poles of the filters of the sensor monitor", redundancy, "FILTER_POLES_PER_S", "1/s"),
     (
         9,
-        "turn rate of the local horizontal during flight over the round Earth",
+        "turn rate of the local horizontal over the round Earth",
         redundancy,
         "EARTH_TURN_RAD_S",
         "rad/s",
     ),
     (
         9,
-        "bound on Coriolis acceleration, centrifugal acceleration and change of gravity",
+        "bound on Coriolis and centrifugal acceleration and change of gravity",
         redundancy,
         "EARTH_M_S2",
         "m/s²",
     ),
     (
         9,
-        "climb after which the air density is lower by the factor e",
+        "climb in which the air density falls by a factor of e",
         redundancy,
         "DENSITY_SCALE_HEIGHT_M",
         "m",
     ),
     (9, "largest pitch attitude of the attitude tests", redundancy, "MAX_PITCH_RAD", "rad"),
 )
-SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, unit)
-    (3, "pole of the published filter", "detection_pole_per_s", FdiConfig(), "1/s"),
-    (3, "poles of further filters", "pole_bank_per_s", FdiConfig(), "1/s"),
-    (4, "pole of the isolation estimators", "isolation_pole_per_s", FdiConfig(), "1/s"),
-    (4, "time constant of the estimates", "forgetting_time_s", FdiConfig(), "s"),
-    (4, "lowest frequency of an oscillating surface", "slowest_oscillation_rad_s", FdiConfig(), "rad/s"),
-    (4, "slowest rate limit; a slower surface counts as jammed", "slowest_rate_deg_s", FdiConfig(), "deg/s"),
-    (7, "declared rate of false alarms", "false_alarms_per_h", Statistical(), "1/h"),
-    (7, "probability that noise excludes the true fault in a second", "misnaming", Statistical(), ""),
-    (7, "largest angular frequency of the model error", "uncertainty_rad_s", Statistical(), "rad/s"),
-    (9, "largest vertical wind", "vertical_wind_mps", Bounds(), "m/s"),
-)
 
 
 def theory_constants() -> str:
-    """The constants of the page, and the defaults of its keys, by section."""
-    rows = [(at, meaning, name, getattr(module, name), unit) for at, meaning, module, name, unit in CONSTANTS]
-    rows += [(at, meaning, key, getattr(section, key), unit) for at, meaning, key, section, unit in SETTINGS]
+    """The constants of the page, by the page that derives them."""
     return markdown_table(
-        ("section", "constant", "name", "value", "unit", "derived in"),
+        ("constant", "name", "value", "unit", "derived in"),
         [
-            (str(at), meaning, f"`{name}`", _said(value), unit, derived_in(name, at))
-            for at, meaning, name, value, unit in sorted(rows, key=lambda row: row[0])
+            (meaning, f"`{name}`", _said(getattr(module, name)), unit, derived_in(at))
+            for at, meaning, module, name, unit in sorted(CONSTANTS, key=lambda row: row[0])
         ],
     )
 
 
-def derived_in(name: str, section: int) -> str:
+def derived_in(section: int) -> str:
     """The page that derives a constant, as a link."""
-    where = (
-        "explanation/fault-types.md#from-a-position-to-a-type" if name in OF_TYPES else DERIVED_IN[section]
-    )
+    where = DERIVED_IN[section]
     return f"[{where.split('/')[1].split('.')[0]}]({where})"
 
 

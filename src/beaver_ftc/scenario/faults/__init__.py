@@ -127,8 +127,8 @@ class Gradual(SurfaceFault):
 
     profile: Literal["abrupt", "incipient"] = entry(
         "abrupt",
-        "time course of the fault. `abrupt`: the full size at once. `incipient`: the size grows as 1 - "
-        "exp(-kappa (t - at_s)), where kappa is `kappa_per_s`",
+        "time course. `abrupt`: the full size at once. `incipient`: growth as 1 - "
+        "exp(-kappa (t - at_s)), kappa is `kappa_per_s`",
         needs={"kappa_per_s": 2},
         examples=["incipient"],
     )

@@ -204,7 +204,7 @@ class Decay(StudyCommand):
 
     flights: Number of flights for each row of the table, i.e. for each error and size.
     seed: Seed of all random draws.
-    out: Folder in which the result folder SCENARIO-decay is written, with a page, a figure, CSV and JSON.
+    out: Folder of the result folder SCENARIO-decay.
     """
 
     scenario: ScenarioArgument

@@ -58,7 +58,7 @@ class Mechanisms(StudyCommand):
 
     draws: Number of random flights for each combination of fault, bandwidth, error and instruments.
     seed: Seed of all random draws.
-    out: Folder in which the result folder `mechanisms` is written, with a page, a figure, CSV and JSON.
+    out: Folder of the result folder `mechanisms`.
     """
 
     draws: Annotated[int, typer.Option(min=1, max=1000)] = DRAWS

@@ -369,8 +369,8 @@ class Power(StudyCommand):
     airspeed: Airspeed, m/s. Default: the airspeed at the start of a scenario without this key.
     altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
     aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
-    surface: Fly only losses of this surface. The command then prints one line for each loss.
-    out: Folder in which the result folder `power` is written.
+    surface: Fly only losses of this surface, with one line for each loss.
+    out: Folder of the result folder `power`.
     """
 
     grid: GridName = GridName.quick

@@ -316,7 +316,7 @@ class Reproduce(StudyCommand):
     Examples:
       beaver-ftc reproduce --out runs
 
-    out: Folder in which the result folder `reproduction` is written.
+    out: Folder of the result folder `reproduction`.
     """
 
     out: Path = Path("runs")

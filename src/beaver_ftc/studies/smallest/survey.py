@@ -278,7 +278,7 @@ class Smallest(StudyCommand):
     surface: The surface that loses effectiveness.
     within: Longest time from the loss to the alarm, s.
     seed: Seed of all random draws.
-    out: Folder in which the result folder SCENARIO-smallest-SURFACE is written, with a page, CSV and JSON.
+    out: Folder of the result folder SCENARIO-smallest-SURFACE.
     """
 
     scenario: ScenarioArgument

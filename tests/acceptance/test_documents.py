@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.cli.main import every_command
 from samples import AT_NIGHT
 
-from .documents import commands_of, examples_of_help, shown
+from .documents import examples_of_help, shown
 from .exceptions import TABLE, tried
 from .materials import lay_out
 

@@ -2,7 +2,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tools.docs.properties import as_markdown
+from tools.docs.properties import as_markdown, shared
 
 from beaver_ftc.commands import registered as registered_commands
 from beaver_ftc.plant.adapter import Plant

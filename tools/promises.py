@@ -53,9 +53,9 @@ def is_spared(test: str) -> bool:
     return bool(parts and crc32(test.encode()) % max(parts))
 
 
-def is_at_night(test: str, lists: tuple[tuple[str, ...], tuple[str, ...]] | None = None) -> bool:
+def is_at_night(test: str) -> bool:
     """Whether `make test` leaves a test out."""
-    night, day = lists or at_night()
+    night, day = at_night()
     return test.startswith(night) and not (day and test.startswith(day))
 
 
@@ -74,16 +74,12 @@ def _tests_of(body: list[ast.stmt]) -> Iterator[str]:
     return (node.name for node in body if isinstance(node, ast.FunctionDef) and node.name.startswith("test"))
 
 
-def doubts(
-    promised: dict[str, Any],
-    known: Collection[str],
-    lists: tuple[tuple[str, ...], tuple[str, ...]] | None = None,
-) -> Iterator[str]:
+def doubts(promised: dict[str, Any], known: Collection[str]) -> Iterator[str]:
     """What is wrong with a table: a line a promise without a test, and a test that is not there."""
     for name, row in promised.items():
         found = {test: [each for each in known if fnmatchcase(each, test)] for test in row["tests"]}
         yield from (f"{name}: no such test: {test}" for test, there in found.items() if not there)
-        if not [each for there in found.values() for each in there if not is_at_night(each, lists)]:
+        if not [each for there in found.values() for each in there if not is_at_night(each)]:
             yield f"{name}: no test of every day holds it"
 
 

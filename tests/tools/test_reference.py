@@ -2,16 +2,12 @@
 
 import json
 import re
-import subprocess
-import sys
-from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import pytest
 import yaml
 from tools.docs.reference import PAGES, columns, commands, keys, page, python_names
-from tools.docs.reference.schema import ITEM, NAME, Key, Sections
+from tools.docs.reference.schema import ITEM, NAME, Sections
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
@@ -26,7 +22,6 @@ from beaver_ftc_assurance.evidence.plan import load_plan
 from beaver_ftc_logs.vehicle import Vehicle
 from scenario.damageable import damageable
 
-ROOT = Path(__file__).parents[2]
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
 PROFILE = {"altitude_m": [{"value": 1900}], "airspeed_mps": [{"value": 45}], "heading_deg": [{"value": 90}]}
 CASE = "left-wing-tip-off"  # the example's
@@ -193,20 +188,6 @@ def test_the_example_of_a_whole_file_loads(kind, tmp_path):
         LOADERS[kind](text, tmp_path)
 
 
-def test_an_example_out_of_range_does_not_load(tmp_path):
-    found = sections("scenario-keys").found["LossOfEffectiveness"]
-    key = next(key for key in found.keys if key.name == "magnitude")
-    wrong = replace(key, node={**key.node, "examples": [40]})
-    with pytest.raises(BadInput, match="40 is out of range"):
-        load_text(json.dumps(document("scenario-keys", found, wrong)), folder=tmp_path)
-
-
-def test_a_key_that_says_nothing_is_not_whole():
-    found = sections("scenario-keys").found["LossOfEffectiveness"]
-    bare = Key("size", {"type": "number"}, ({"type": "number"},), True, ())
-    assert lacks(found, bare) == ["meaning", "example", "range", "unit"]
-
-
 def test_every_page_can_be_printed():
     for name in PAGES:
         text = page(name)
@@ -215,22 +196,6 @@ def test_every_page_can_be_printed():
         widths = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
         assert widths
         assert 0 not in widths
-
-
-def test_a_page_that_there_is_not():
-    with pytest.raises(BadInput, match="allowed: scenario-keys"):
-        page("scenario")
-
-
-def test_the_command_prints_a_page():
-    printed = subprocess.run(
-        [sys.executable, "-m", "tools.docs", "reference", "vehicle-keys"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert printed.stdout.strip() == page("vehicle-keys").strip()
 
 
 def test_every_command_and_option_is_there():
@@ -261,11 +226,6 @@ def test_every_meaning_is_of_a_column(table):
     patterns = yaml.safe_load(columns.TEXTS.read_text())[table]["columns"]
     used = {columns.pattern_of(name, patterns) for name in columns.TABLES[table]()}
     assert used == set(patterns)
-
-
-def test_a_column_without_a_meaning_is_refused():
-    with pytest.raises(BadInput, match="yaw_rate_rad_s"):
-        columns.pattern_of("yaw_rate_rad_s", ["t_s"])
 
 
 def test_public_names_are_all_there():

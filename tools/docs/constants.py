@@ -1,7 +1,7 @@
 """The constants that prose cites, read from the code: `python -m tools.docs constants`."""
 
-import ast
 import math
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib import import_module
@@ -15,6 +15,7 @@ from beaver_ftc.documents.errors import BeaverFtcError
 from tools.docs.pages import ROOT
 
 PACKAGE = "beaver_ftc"
+_ASSIGNED = re.compile(r"^([A-Z_][A-Z\d_, ]*?)(?::[^=\n]*)? =", re.MULTILINE)
 _LONGEST = 64  # elements of a constant that is shown
 
 
@@ -58,7 +59,8 @@ def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
     goes by its path below the package.
     """
     for path in sorted((ROOT / "src").rglob("*.py")):
-        names = _constants_of(path)
+        lines = _ASSIGNED.findall(path.read_text(encoding="utf-8"))
+        names = [name for line in lines for name in re.split(r"\W+", line) if name.isupper()]
         if names:
             parts = path.relative_to(ROOT / "src").with_suffix("").parts
             dotted = ".".join(part for part in parts if part != "__init__")
@@ -69,18 +71,6 @@ def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
                 shown = {name: value for name, value in found.items() if _is_shown(value)}
                 if shown:
                     yield dotted.removeprefix(f"{PACKAGE}."), shown
-
-
-def _constants_of(path: Path) -> list[str]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    found: list[str] = []
-    for node in tree.body:
-        targets = node.targets if isinstance(node, ast.Assign) else []
-        targets = [node.target] if isinstance(node, ast.AnnAssign) else targets
-        for target in targets:
-            names = target.elts if isinstance(target, ast.Tuple) else [target]
-            found += [name.id for name in names if isinstance(name, ast.Name) and name.id.isupper()]
-    return found
 
 
 def _is_shown(value: Any) -> bool:

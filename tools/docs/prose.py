@@ -5,6 +5,7 @@ A page that is older than a rule may break it as often as `prose.yaml` says, and
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -42,18 +43,14 @@ _PLAIN = re.compile(r"`[^`]*`|\$[^$]*\$|!?\[([^\]]*)\]\([^)]*\)")
 
 def check(pages: Sequence[Page]) -> list[Finding]:
     """A finding for each rule that a page breaks more often than it may."""
-    allowed = _allowed()
-    findings: list[Finding] = []
-    for page in pages:
-        if is_generated(page.text):
-            continue
-        broken: dict[str, list[Finding]] = {}
-        for kind, line, words in faults(page.name, page.text):
-            broken.setdefault(kind, []).append(Finding(page.name, line, words))
-        for kind, found in broken.items():
-            if len(found) > allowed.get(page.name, {}).get(kind, 0):
-                findings += found
-    return findings
+    allowed, found = _allowed(), counts(pages)
+    return [
+        Finding(page.name, line, words)
+        for page in pages
+        if page.name in found
+        for kind, line, words in faults(page.name, page.text)
+        if found[page.name][kind] > allowed.get(page.name, {}).get(kind, 0)
+    ]
 
 
 @cache
@@ -63,12 +60,9 @@ def _allowed() -> Mapping[str, Mapping[str, int]]:
 
 def counts(pages: Sequence[Page]) -> dict[str, dict[str, int]]:
     """{page: {rule: how often it is broken}} of pages that break one."""
-    found: dict[str, dict[str, int]] = {}
-    for page in pages:
-        for kind, _, _ in () if is_generated(page.text) else faults(page.name, page.text):
-            kinds = found.setdefault(page.name, {})
-            kinds[kind] = kinds.get(kind, 0) + 1
-    return found
+    written = (page for page in pages if not is_generated(page.text))
+    found = {page.name: Counter(kind for kind, *_ in faults(page.name, page.text)) for page in written}
+    return {name: dict(broken) for name, broken in found.items() if broken}
 
 
 def faults(name: str, text: str) -> Iterator[tuple[str, int, str]]:

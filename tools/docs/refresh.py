@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -225,12 +226,8 @@ def linked(text: str, page: str) -> str:
 
 def _first_difference(old: str, new: str) -> tuple[int, str, str]:
     """(row, what stands, what is printed) where two texts differ first."""
-    before, after = old.splitlines(), new.splitlines()
-    for row in range(max(len(before), len(after))):
-        stands, prints = ("".join(rows[row : row + 1]) for rows in (before, after))
-        if stands != prints:
-            return row, stands, prints
-    return 0, old, new
+    rows = enumerate(zip_longest(old.splitlines(), new.splitlines(), fillvalue=""))
+    return next(((row, *both) for row, both in rows if both[0] != both[1]), (0, old, new))
 
 
 def _quoted(text: str) -> str:

@@ -1,43 +1,40 @@
 """A number out of a document, as prose has it."""
 
+from collections import Counter
 from typing import Any
 
-from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput
 from tools.docs.marks import Number
+
+_LONGEST = 200  # of what is listed
 
 
 def at(document: Any, path: str) -> Any:
     """What stands under a dotted path: keys of a mapping (dots in a key are its own), the index of a list, or
     `key=value`, the one element of a list that has it. Raises BadInput where there is nothing.
     """
-    value, parts, taken = document, path.split("."), 0
-    while taken < len(parts):
-        width, value = _next(value, parts[taken:], path)
-        taken += width
+    value, rest = document, path
+    while rest:
+        steps, allowed = _steps(value)
+        fits = [name for name in steps if f"{rest}.".startswith(f"{name}.")]
+        if not fits:
+            raise BadInput(f"{path}: no {rest.partition('.')[0]}, allowed: {allowed}")
+        name = max(fits, key=len)
+        value, rest = steps[name], rest[len(name) + 1 :]
     return value
 
 
-def _next(value: Any, parts: list[str], path: str) -> tuple[int, Any]:
-    """How many parts of the path lead one step further, and where to."""
+def _steps(value: Any) -> tuple[dict[str, Any], str]:
+    """What is one step below, by its name; and what is allowed there, in words."""
     if isinstance(value, dict):
-        for width in range(len(parts), 0, -1):
-            key = ".".join(parts[:width])
-            if key in value:
-                return width, value[key]
-        raise BadInput(f"{path}: no {parts[0]}{suggestion(parts[0], [str(key) for key in value])}")
+        return {str(key): of for key, of in value.items()}, ", ".join(map(str, value))[:_LONGEST]
     if not isinstance(value, list):
-        raise BadInput(f"{path}: nothing is below {value!r}, allowed: a path to a value")
-    for width in range(len(parts), 0, -1):
-        key, equals, wanted = ".".join(parts[:width]).partition("=")
-        found = [element for element in value if equals and str(element.get(key)) == wanted]
-        if len(found) == 1:
-            return width, found[0]
-    index = parts[0].removeprefix("-")
-    if not index.isdigit() or not -len(value) <= int(parts[0]) < len(value):
-        raise BadInput(
-            f"{path}: no {parts[0]}, allowed: an index below {len(value)}, or key=value of one row"
-        )
-    return 1, value[int(parts[0])]
+        return {}, "a path to a value"
+    rows = [(f"{key}={of}", row) for row in value if isinstance(row, dict) for key, of in row.items()]
+    count = Counter(name for name, _ in rows)
+    known = {name: row for name, row in rows if count[name] == 1}
+    known |= {str(i): row for k, row in enumerate(value) for i in (k, k - len(value))}
+    return known, f"an index below {len(value)}, or key=value of one row"
 
 
 def printed(document: Any, number: Number) -> str:

@@ -6,9 +6,7 @@ calls the package's public names or its commands; no number is typed in. What it
 table that few readers need it saves as CSV in the same way, by `aside`.
 """
 
-import ast
 import csv
-import inspect
 import io
 import os
 import pickle
@@ -26,37 +24,26 @@ from beaver_ftc.documents.errors import BadInput, suggestion
 from tools.docs.commands import BIN, SHARED
 
 T = TypeVar("T")
+_MAKER = re.compile(r"^def ([a-z]\w*)\(\) -> str:", re.MULTILINE)
 
 
 def makers() -> dict[str, str]:
     """{name: module} of every table maker; a name that two modules have is refused."""
     found: dict[str, str] = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        if path.name == "__init__.py":
-            continue
-        for name in _public_functions(path):
-            if name in found:
+    for path in sorted(Path(__file__).parent.glob("[!_]*.py")):
+        for name in _MAKER.findall(path.read_text(encoding="utf-8")):
+            if found.setdefault(name.replace("_", "-"), path.stem) != path.stem:
                 raise BadInput(f"{path.name}: a second table is called {name}, allowed: one of each name")
-            found[name] = path.stem
     return found
-
-
-def _public_functions(path: Path) -> list[str]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
-    return [f.name.replace("_", "-") for f in functions if not f.name.startswith("_")]
 
 
 def table(name: str) -> str:
     """What the maker of this name returns. Raises BadInput where there is none."""
-    known = makers()
-    name = name.replace("_", "-")
+    known, name = makers(), name.replace("_", "-")
     if name not in known:
         raise BadInput(f"{name}: no such table{suggestion(name, known)}")
-    make = getattr(import_module(f"tools.docs.tables.{known[name]}"), name.replace("-", "_"))
-    if inspect.signature(make).parameters:
-        raise BadInput(f"{name}: a table maker takes nothing, allowed: a helper's name that begins with _")
-    return make()
+    made: str = getattr(import_module(f"tools.docs.tables.{known[name]}"), name.replace("-", "_"))()
+    return made
 
 
 def beaver(*arguments: str) -> list[str]:

@@ -10,7 +10,6 @@ from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import (
     LAW,
-    PASSIVE,
     SCHEME,
     STATISTICAL,
     Entry,
@@ -45,7 +44,7 @@ _RATIO_90 = "Tracking error divided by the oracle's, not exceeded in 90 % of the
 _SHARES = "Wilson 95 % intervals of the shares in Tables 2 and 3, %"
 _LOWER, _UPPER = "Lower 95 % limit of the median {}", "Upper 95 % limit of the median {}"
 ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
-PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
+PASSIVE_LAWS = ("nominal", "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
 
 
 def benchmark() -> str:

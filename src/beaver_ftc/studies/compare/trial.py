@@ -78,7 +78,6 @@ def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
 STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
-PASSIVE = "nominal"  # the law that takes nothing from any diagnosis and adapts to nothing
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from statistics_of import Statistical
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
-from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
     N_GROUP_TESTS,
@@ -25,7 +24,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 )
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
 from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.scenario.declared import Declared, SensorErrors
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -231,9 +230,3 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
     Gu[:, 1, 1] = -size * wave[:, 1]
     Gu[:, 0, 2], Gu[:, 2, 2] = 0.2 * size * wave[:, 2], -size * wave[:, 2]
     return Gu, 0.05 + 0.01 * wave[:, 1]
-
-
-def gust_jitter(sensors, design, span_m):
-    """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = bounds.flow_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return bounds.gust_noise(flow, design, *LEVEL_FLIGHT[1:], span_m)

@@ -204,6 +204,23 @@ def test_the_rates_and_a_frozen_angle_decide_between_a_gyro_and_the_attitude(ver
     assert suspects(ratios, gyro_verdict=verdicts, n_same=same) == who
 
 
+@pytest.mark.parametrize("wrong", range(3))
+def test_the_error_of_one_angle_leaves_nothing_beyond_it(wrong):
+    """In random attitudes the reading of one angle is off by random steps: the tests of turning show nothing
+    beyond that angle."""
+    rng, monitor, y = np.random.default_rng(wrong), new_monitor(H), np.ones(N_SENSORS)
+    red = monitor["redundancy"]
+    red["config"]["decay"] = red["memory"]["y_past"] = 1.0
+    for _ in range(20):
+        angles = rng.uniform((-3.0, -1.2, -3.0), (3.0, 1.2, 3.0))
+        red["memory"]["predicted_reading"][PHI : PHI + 3] = y[PHI : PHI + 3] = angles
+        y[PHI + wrong] += rng.uniform(-1e-3, 1e-3)
+        redundancy.fill_residuals(red, y, redundancy.attitude(red["memory"]["predicted_reading"]))
+        sensor_monitor.filter_beyond(monitor, y)
+    beyond = abs(monitor["memory"]["beyond"]).max(axis=(1, 2))
+    assert (beyond < 1e-8).tolist() == [i == wrong for i in range(3)]
+
+
 def judged(error=0.0, then=0.0, innovation=0.0, noise=0.0, spike=0.0, **fields):
     """What the rates say of the first gyro; the bound of a frame is 1 rad/s2, of 0.02 s."""
     first = {"w_att": error, "w_att_past": then, "peak_older": spike, **fields}

@@ -98,9 +98,10 @@ def _share(kept: Any, found: Any, size: float) -> float | None:
 
 def in_short(array: Any) -> list[float]:
     """An array of numbers in three: the sums, by weights that differ, of those above and of those below zero,
-    and how many are finite.
+    and how many are finite. A complex number is two.
     """
-    flat = np.asarray(array, float).ravel()
+    parts = [array.real, array.imag] if np.iscomplexobj(array) else array
+    flat = np.asarray(parts, float).ravel()
     finite = np.isfinite(flat)
     numbers = np.where(finite, flat, 0.0)
     weighted = numbers * (1.0 + 0.618034 * np.arange(1, flat.size + 1) % 1.0)

@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from kernels import fill, new_fdi
 
 from beaver_ftc.diagnosis import monitors
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, YAW
 from telling import apart
 
 ENGINES = {"one": (0.2, -5.0), "two": (0.5, 1.5), "three": (0.3, 4.0)}  # share of the thrust; right_m
@@ -48,3 +51,34 @@ def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(sign
     config = np.zeros(1, monitors.BALANCE_CONFIG)[0]
     monitors.configure_balance(config, aircraft(signals, knows_engines))
     assert not any(config.tolist())
+
+
+@pytest.mark.parametrize(
+    ("excess", "thrust", "levers", "engines", "failed"),
+    [
+        (0.0129, 0.4, (0, 0, 9.0), 2, 0), (0.0131, 0.4, (0, 0, 9.0), 2, 1), (-0.0131, 0.4, (0, 0, 0), 2, 1),
+        (0.0129, -0.4, (0, 0, 0), 2, 0), (0.0131, -0.4, (0, 0, 0), 2, 1), (0.0131, 0.4, (0, 0.1, 0), 2, 0),
+        (0.0131, 0.4, (-0.1, 0, 0), 2, 0), (0.0131, 0.4, (0, 0, 0), 0, 0),
+    ],
+)  # fmt: skip
+def test_engines_under_one_lever_that_yaw_beyond_the_bound_have_failed_and_stay_so(
+    excess, thrust, levers, engines, failed
+):
+    """|Cn + 0.1 CT| > 0.005 + 0.02 |CT|, which is 0.013 here."""
+    monitor = fill(
+        np.zeros(1, monitors.ENGINE_MONITOR_RECORD).view(np.recarray)[0],
+        n_engines=engines, i_T=3, i_n=1,
+        yaw_per_thrust=-0.1, slack=0.02,
+    )  # fmt: skip
+    monitors.disable_if_apart(monitor, np.array(levers))
+    y = np.array([7.0, -0.1 * thrust + excess, 7.0, thrust])
+    assert monitors.detect_engine_failure(monitor, 0.005, y) == failed
+    assert monitors.detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
+    fdi = new_fdi()
+    fdi["engine_monitor"], fdi["bound"]["error_map"]["yaw_now"] = monitor, 0.005
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    axis = adaptive_estimators.find_alarm_axis(fdi, y, 7.5)
+    verdict = fdi["verdict"]["isolated_estimator"], fdi["verdict"]["isolated_at_s"]
+    assert (axis, *verdict) == ((YAW, UNANTICIPATED, 7.5) if failed else (-1, NOT_ISOLATED, 0.0))
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = 1, NOT_ISOLATED
+    assert adaptive_estimators.find_alarm_axis(fdi, y, 7.5) == -1

@@ -38,7 +38,7 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_slopes
-from beaver_ftc.diagnosis.detection.filters import advance_gyro, leak
+from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -96,15 +96,24 @@ THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
 H_ALPHA, H_BETA, H_AIRSPEED, H_PHI, H_THETA = range(5)
-N_INITIAL, N_EFFECTS = 5, 14
+N_INITIAL = 5
+# What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
+EVIDENCE = (
+    (H_PHI, TURN_TEST + 1, TURN_TEST + 2), (H_PHI, SPEED_TEST, BETA_TEST),
+    (H_THETA, TURN_TEST, TURN_TEST + 2), (H_THETA, SPEED_TEST, BETA_TEST),
+    (H_ALPHA, BETA_TEST, BETA_TEST), (H_BETA, ALPHA_TEST, ALPHA_TEST), (H_ALPHA, CLIMB_TEST, CLIMB_TEST),
+    (H_AIRSPEED, ALPHA_TEST, ALPHA_TEST), (H_AIRSPEED, BETA_TEST, BETA_TEST),
+    (H_AIRSPEED, DENSITY_TEST, DENSITY_TEST),
+)  # fmt: skip
+N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
 # sample, the first for each second of it; past_bound: bound_per_sample of the sample before. gust_gain:
-# effect on the residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; B_s, B_n: its
-# parts by bound_per_s and by bound_per_sample. ratio: largest |r| / B over the poles.
+# effect on the residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e: the
+# part of it that the filter sums. ratio: largest |r| / B over the poles.
 TEST_RECORD = record(
     residual=float, bound_per_s=float, bound_per_sample=float, past_bound=float, gust_gain=float,
-    r=N_POLES, B=N_POLES, B_s=N_POLES, B_n=N_POLES, ratio=float,
+    r=N_POLES, B=N_POLES, e=N_POLES, ratio=float,
 )  # fmt: skip
 
 REDUNDANCY_RECORD = record(
@@ -126,7 +135,7 @@ REDUNDANCY_RECORD = record(
         # m/s2: |a| in the elapsed step and in the two before it; of a_past
         a_size=3, a_size_past=float,
         e_first=float,  # m/s2, in the first step only: no sample precedes it
-        predicted_reading=N_SENSORS, scratch=3,
+        predicted_reading=N_SENSORS,
         engine_commands=2,  # engine speed rpm, manifold pressure inHg
     ),
     test=(TEST_RECORD, N_TESTS),
@@ -135,7 +144,8 @@ REDUNDANCY_RECORD = record(
 INITIAL_ERRORS_RECORD = record(
     # Symbols: initial_errors.py
     e_start=N_INITIAL, e=N_INITIAL, e_alarm=N_INITIAL, d=N_INITIAL,
-    H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES), C=N_EFFECTS, C_m=(N_EFFECTS, N_POLES),
+    H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
+    C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
     refuted=(int, N_INITIAL, N_TESTS),  # since the alarm
 )  # fmt: skip
 
@@ -144,7 +154,8 @@ MONITOR_CONFIG_RECORD = record(
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
     noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
-    D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
+    # 1/s: body rates decay with rate' = -D rate; |D|, with -D_ii on its diagonal
+    D=(3, 3), D_size=(3, 3),
 )  # fmt: skip
 
 MONITOR_MEMORY_RECORD = record(
@@ -202,7 +213,8 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     initial = cast("Any", declared.initial)  # whose keys the aircraft names
     config["substeps"], config["has_engine"] = (declared.substeps, declared.aircraft.has_engine_instruments)
     config["y_trim"][3:7] = y[:4]
-    config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
+    config["D"] = D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
+    config["D_size"] = np.where(np.eye(3) > 0.0, -D, abs(D))
     monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine"]:
         monitor["redundancy"]["memory"]["engine_commands"] = (
@@ -294,6 +306,8 @@ MIN_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
 # of a reading that its constant error leaves, at least, under a logarithm
 MIN_SHARE_LEFT = 0.01
 READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
+# of a test that compares a reading with its prediction: that reading
+READING_OF = ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE))
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
 AB_NOW, AB_PAST = 1.5, 0.5
@@ -309,9 +323,9 @@ def times(p, q):
 
 
 @kernel
-def inverse_times(p, q):
-    """p* q: the turn from attitude p to q."""
-    return times((p[0].conjugate(), -p[1]), q)
+def inverse(q):
+    """q*: the turn back."""
+    return q[0].conjugate(), -q[1]
 
 
 @kernel
@@ -334,7 +348,7 @@ def turn_of_step(w, h):
 @kernel
 def turned(q, v):
     """q* v q: the components of a constant vector v (3,) in axes that have turned by q."""
-    z1, z2 = times(inverse_times(q, (complex(0.0, v[0]), complex(v[1], v[2]))), q)
+    z1, z2 = times(times(inverse(q), (complex(0.0, v[0]), complex(v[1], v[2]))), q)
     return z1.imag, z2.real, z2.imag
 
 
@@ -360,9 +374,27 @@ def dot(v, w):
 
 
 @kernel
+def combined(a, v, b, w):
+    """a v + b w of vectors (3,)."""
+    return a * v[0] + b * w[0], a * v[1] + b * w[1], a * v[2] + b * w[2]
+
+
+@kernel
 def vector_length(v):
     """|v| of a vector (3,)."""
     return np.sqrt(dot(v, v))
+
+
+@kernel
+def exceeds(r, k, B, x, H):
+    """Whether no error of a set explains a filtered residual: |r_m| > k B_m + x H_m for some pole m.
+
+    B (poles,): bound for sound sensors; H (poles,): on the effect of a unit of an error, of at most x.
+    """
+    for m in range(r.size):
+        if abs(r[m]) > k * B[m] + x * H[m]:
+            return True
+    return False
 
 
 @kernel
@@ -370,7 +402,7 @@ def bound_readings(red, y):
     """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and e_new = e - const."""
     c, M = red.config, red.memory
     for i in range(N_SENSORS):
-        size = abs(wrapped(y[i])) if i == PSI else abs(y[i])
+        size = abs(wrapped(y[i]) if i == PSI else y[i])
         e = (c.e_zero[i] + c.e_slope[i] * size) / (1.0 - c.e_slope[i])
         M.e_new[i] = e - c.const[i] + READING_ROUNDING * abs(y[i])
         M.reading_bound[i] = e + M.e_drift if PHI <= i <= PSI else e
@@ -379,12 +411,11 @@ def bound_readings(red, y):
 @kernel
 def store_sample(red, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    M, g = red.memory, down(y)
+    M = red.memory
     M.y_past[:] = y
     M.e_older[:] = M.e_past
     M.e_past[:] = M.reading_bound
-    for i in range(3):
-        M.a[i] = force[i] + red.config.g * g[i]
+    M.a[:] = combined(1.0, force, red.config.g, down(y))
 
 
 @kernel
@@ -396,7 +427,7 @@ def predict_readings(red):
         phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
     """
     M, h = red.memory, red.config.sample_time_s
-    y, y_past, x = M.predicted_reading, M.y_past, M.scratch
+    y, y_past = M.predicted_reading, M.y_past
     step = turn_of_step(y_past, h)
     q = times(attitude(y_past), step)
     roll = q[0] * q[0] - (q[1] * q[1]).conjugate()
@@ -407,23 +438,23 @@ def predict_readings(red):
     alpha, beta, V = y_past[ALPHA], y_past[BETA], y_past[AIRSPEED]
     v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     y[ALTITUDE] = y_past[ALTITUDE] - h * dot(v, down(y_past))
+    a = combined(AB_NOW, M.a, -AB_PAST, M.a_past)
+    M.a_size_past = vector_length(M.a_past)
     M.a_size[2] = M.a_size[1]
     M.a_size[1] = M.a_size[0]
-    M.a_size_past = vector_length(M.a_past)
-    for i in range(3):
-        x[i] = AB_NOW * M.a[i] - AB_PAST * M.a_past[i]
-    M.a_size[0] = vector_length(x)
-    for i in range(3):
-        x[i] = v[i] + h * x[i]
-    v = turned(step, x)
-    a = turned(step, M.a)
-    for i in range(3):
-        M.a_past[i] = a[i]
-    V = vector_length(v)
-    y[AIRSPEED] = V
+    M.a_size[0] = vector_length(a)
+    M.a_past[:] = turned(step, M.a)
+    v = turned(step, combined(1.0, v, h, a))
+    y[AIRSPEED] = vector_length(v)
     y[ALPHA] = np.arctan2(v[2], v[0])
-    y[BETA] = np.arcsin(v[1] / max(V, MIN_SPEED_MPS))
+    y[BETA] = np.arcsin(v[1] / max(y[AIRSPEED], MIN_SPEED_MPS))
     return q
+
+
+@kernel
+def half_density(y):
+    """qdyn / V^2, kg/m3."""
+    return max(y[QDYN] / y[AIRSPEED] ** 2, MIN_HALF_DENSITY)
 
 
 @kernel
@@ -431,16 +462,15 @@ def fill_residuals(red, y, q):
     """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
     log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
     """
-    tests, y_pred, y_past = red.test, red.memory.predicted_reading, red.memory.y_past
-    z1, z2 = inverse_times(q, attitude(y))
-    turn = (z1.imag, z2.real, z2.imag)
-    for i in range(3):
-        tests[TURN_TEST + i].residual = 2.0 * turn[i] if z1.real >= 0.0 else -2.0 * turn[i]
+    tests, y_pred = red.test, red.memory.predicted_reading
+    z1, z2 = times(inverse(q), attitude(y))
+    side = 2.0 if z1.real >= 0.0 else -2.0
+    for i, turn in enumerate((z1.imag, z2.real, z2.imag)):
+        tests[TURN_TEST + i].residual = side * turn
         tests[ANGLE_TEST + i].residual = wrapped(y[PHI + i] - y_pred[PHI + i])
-    for j, i in ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE)):
+    for j, i in READING_OF:
         tests[j].residual = y[i] - y_pred[i]
-    rho = max(y[QDYN] / y[AIRSPEED] ** 2, MIN_HALF_DENSITY)
-    tests[DENSITY_TEST].residual = np.log(rho / max(y_past[QDYN] / y_past[AIRSPEED] ** 2, MIN_HALF_DENSITY))
+    tests[DENSITY_TEST].residual = np.log(half_density(y) / half_density(red.memory.y_past))
 
 
 @kernel
@@ -470,26 +500,24 @@ def too_steep(red, y):
 
 
 @kernel
-def extrapolate_bound(red, i):
-    """Bound the error of 3/2 y - 1/2 y_before of sensor i: 3/2 e_past + 1/2 e_older - const."""
-    return AB_NOW * red.memory.e_past[i] + AB_PAST * red.memory.e_older[i] - red.config.const[i]
-
-
-@kernel
 def bound_acceleration(red, w_max, e_w):
     """e_a: bound on the error of the acceleration of the elapsed step, m/s2.
 
-    Its parts: errors of the accelerometers; gravity in the direction that the attitude gives it (e_tilt);
-    turning the previous acceleration into the present axes (e_turn).
+    A sensor adds to 3/2 y - 1/2 y_before the error 3/2 e_past + 1/2 e_older - const at most: accelerometers,
+    and the attitude, which gives gravity its direction. Turning the previous acceleration into the present
+    axes adds more.
     """
     c, M = red.config, red.memory
-    e_tilt = extrapolate_bound(red, PHI) + extrapolate_bound(red, THETA)
-    e_force2 = 0.0
-    e_a = c.g * (c.const[PHI] + c.const[THETA])
-    for i in range(AX, AX + 3):
-        e_force2 += extrapolate_bound(red, i) ** 2
-        e_a += c.const[i]
-    e_turn = c.sample_time_s * (w_max * e_a + AB_PAST * e_w * M.a_size_past)
+    e_force2, e_tilt, e_const = 0.0, 0.0, 0.0
+    for i in (PHI, THETA, AX, AX + 1, AX + 2):
+        e = AB_NOW * M.e_past[i] + AB_PAST * M.e_older[i] - c.const[i]
+        if i < AX:
+            e_tilt += e
+            e_const += c.g * c.const[i]
+        else:
+            e_force2 += e**2
+            e_const += c.const[i]
+    e_turn = c.sample_time_s * (w_max * e_const + AB_PAST * e_w * M.a_size_past)
     return EARTH_M_S2 + M.e_first + c.g * e_tilt + np.sqrt(e_force2) + e_turn
 
 
@@ -499,25 +527,23 @@ def bound_attitude(red, y, w_max, e_w):
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error (e_brief) turns an axis when it begins, and back when it ends with another
-    J. sec: largest 1 / cos(theta).
+    J. sec: largest 1 / cos(theta); n: e_new of phi, theta, psi.
     """
     tests, c, M = red.test, red.config, red.memory
-    e, e_new = M.e_past, M.e_new
+    e, n = M.e_past, M.e_new[PHI:]
     sec = secant(highest(red, y, THETA))
     turn = c.sample_time_s * w_max
     tilt = abs(y[PHI] - M.y_past[PHI]) + abs(y[THETA] - M.y_past[THETA])
-    e_brief = e[THETA] - c.const[THETA] + e[PSI] - c.const[PSI] + e_new[THETA] + e_new[PSI]
+    e_brief = e[THETA] - c.const[THETA] + e[PSI] - c.const[PSI] + n[1] + n[2]
     e_axes = w_max * (e[PHI] + e[THETA] + e[PSI] + sec * e[THETA]) + tilt * e_brief / c.sample_time_s
     e_rate = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + 2.0 * sec * w_max * (e[PHI] + e[THETA])
-    s_theta = abs(np.sin(y[THETA])) + e_new[THETA]
-    s_phi = abs(np.sin(y[PHI])) + e_new[PHI]
-    for i in range(3):
+    s_theta = abs(np.sin(y[THETA])) + n[1]
+    s_phi = abs(np.sin(y[PHI])) + n[0]
+    for i, coupled in enumerate((s_theta * n[2], s_phi * n[2], s_phi * n[1])):
         tests[TURN_TEST + i].bound_per_s = EARTH_TURN_RAD_S + 2.0 * c.drift + e[P + i] + turn * e_w + e_axes
+        tests[TURN_TEST + i].bound_per_sample = n[i] + coupled
         tests[ANGLE_TEST + i].bound_per_s = sec * e_rate + c.drift
-        tests[ANGLE_TEST + i].bound_per_sample = e_new[PHI + i]
-    tests[TURN_TEST].bound_per_sample = e_new[PHI] + s_theta * e_new[PSI]
-    tests[TURN_TEST + 1].bound_per_sample = e_new[THETA] + s_phi * e_new[PSI]
-    tests[TURN_TEST + 2].bound_per_sample = e_new[PSI] + s_phi * e_new[THETA]
+        tests[ANGLE_TEST + i].bound_per_sample = n[i]
 
 
 @kernel
@@ -550,33 +576,25 @@ def bound_flow(red, y, w_max, e_w):
         + e_V
         + POSITION_FACTOR * h * max(a, M.a_size[1], M.a_size[2])
     )
-    for j, i in ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE)):
+    for j, i in READING_OF:
         tests[j].bound_per_sample = M.e_new[i]
 
 
 @kernel
-def bound_log(red, y, i):
-    """Bound the apparent change of log(y) of sensor i (qdyn or airspeed) by its constant error e:
-
-    e |1 / y - 1 / y_past| / (1 - e / y_min)
-    """
-    e = red.config.const[i]
-    y_past = red.memory.y_past[i]
-    y_min = max(min(y[i], y_past), 1.0)
-    first = e * abs(1.0 / max(y[i], 1.0) - 1.0 / max(y_past, 1.0))
-    return first / max(1.0 - e / y_min, MIN_SHARE_LEFT)
-
-
-@kernel
 def bound_density(red, y):
-    """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height."""
+    """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height, and
+    log(y) of the dynamic pressure and, twice, of the airspeed: of a constant error e
+
+        e |1 / y - 1 / y_past| / (1 - e / y_min)
+    """
     test, c, M = red.test[DENSITY_TEST], red.config, red.memory
-    e, e_new = M.reading_bound, M.e_new
     climb = M.y_past[AIRSPEED] + M.e_past[AIRSPEED] + c.wind_max + c.gust_max
-    e_log = bound_log(red, y, QDYN) + 2.0 * bound_log(red, y, AIRSPEED)
-    test.bound_per_s = climb / DENSITY_SCALE_HEIGHT_M + e_log / c.sample_time_s
-    test.bound_per_sample = e_new[QDYN] / max(y[QDYN] - e[QDYN], MIN_QDYN_PA)
-    test.bound_per_sample += 2.0 * e_new[AIRSPEED] / max(y[AIRSPEED] - e[AIRSPEED], MIN_AIRSPEED_MPS)
+    test.bound_per_s, test.bound_per_sample = climb / DENSITY_SCALE_HEIGHT_M, 0.0
+    for i, n, least in ((QDYN, 1.0, MIN_QDYN_PA), (AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
+        e, now, past = c.const[i], max(y[i], least), max(M.y_past[i], least)
+        e_log = e * abs(1.0 / now - 1.0 / past) / max(1.0 - e / min(now, past), MIN_SHARE_LEFT)
+        test.bound_per_s += n * e_log / c.sample_time_s
+        test.bound_per_sample += n * M.e_new[i] / max(y[i] - M.reading_bound[i], least)
 
 
 @kernel
@@ -587,9 +605,9 @@ def bound_residuals(red, y):
     The errors of the sample before act through the prediction, those of this sample through the reading that
     is compared with it.
     """
-    e, y_past = red.memory.e_past, red.memory.y_past
+    e, w = red.memory.e_past, red.memory.y_past
     e_w = e[P] + e[Q] + e[R]
-    w_max = abs(y_past[P]) + abs(y_past[Q]) + abs(y_past[R]) + e_w
+    w_max = abs(w[P]) + abs(w[Q]) + abs(w[R]) + e_w
     bound_attitude(red, y, w_max, e_w)
     bound_flow(red, y, w_max, e_w)
     bound_density(red, y)
@@ -599,14 +617,15 @@ def bound_residuals(red, y):
 def filter_test(red, test):
     """Pass one test's residual through its filters, a = exp(-pole h); find its largest ratio to the bound:
 
-    r <- a r + residual,    B = B_s + B_n + bound_per_sample + gust_gain gust_change,    ratio = max |r| / B
+    r <- a r + residual,    B = e + bound_per_sample + gust_gain gust_change,    ratio = max |r| / B
+
+    e, the part that the filter sums, as that of a detection filter.
     """
     c, test.ratio = red.config, 0.0
     leak(test.r, c.decay, test.residual)
-    leak(test.B_s, c.decay, c.sample_time_s * test.bound_per_s)
     for m, a in enumerate(c.decay):
-        test.B_n[m] = advance_gyro(test.B_n[m], test.past_bound, a)
-        test.B[m] = test.B_s[m] + test.B_n[m] + test.bound_per_sample + test.gust_gain * c.gust_change[m]
+        test.e[m] = advance_bound(test.e[m], test.bound_per_s, a, c.sample_time_s, test.past_bound)
+        test.B[m] = test.e[m] + test.bound_per_sample + test.gust_gain * c.gust_change[m]
         test.ratio = max(test.ratio, abs(test.r[m]) / test.B[m])
     test.past_bound = test.bound_per_sample
 
@@ -615,8 +634,8 @@ def filter_test(red, test):
 def restart_test(test):
     """Restart a test with this sample: its filters are empty, and the whole bound per sample is still due."""
     test.ratio = test.residual = 0.0
-    test.r[:] = test.B_s[:] = 0.0
-    test.B_n[:] = test.past_bound = test.bound_per_sample
+    test.r[:] = 0.0
+    test.e[:] = test.past_bound = test.bound_per_sample
 
 
 @kernel

@@ -58,7 +58,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
-    effect_at_alarm,
     explains_exceeded,
     latch_refuted,
     start_bounds,
@@ -92,13 +91,14 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     N_INITIAL,
     N_TESTS,
     NO_SENSOR,
-    PRESSURE_TEST,
     QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
     TURN_TEST,
     compare_duplicates,
+    dot,
+    exceeds,
     run_tests,
     start_tests,
     store_sample,
@@ -129,12 +129,98 @@ CLEAR_FACTOR = 3.0
 MIN_AXIS_SHARE = 0.5
 TIME_ROUNDING_S = 1e-9
 
+# A smaller share of the largest of three residuals is the effect of its error on the two other axes or angles
+COUPLING_SHARE = 0.03
+# stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
+# the next frame on: only then the innovation contains the change of a gyro's error between two frames
+FULL_STAGE = 3
+MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
+INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
+VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
+# index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
+RATE_POLE = 1
+
+# Gyro or attitude (judge_gyros)
+# innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
+MAX_DYNAMICS_PER_S = 10.0
+JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
+MIN_ESTIMATED_SHARE = 0.7  # of a gyro's error, which w shows
+SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
+MIN_TRANSIENT = 2.0  # of the size of a transient to the bound on noise: else noise may be all of it
+TRANSIENT_LEFT = 0.003  # of a jump of the attitude within a frame, in the next frame
+RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
+
+# Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign.
+# For the gyro that turns the flow by all of its error, also the margin on the bound of the flow's test.
+HIDDEN_FACTOR = 2.0
 
 # By the test of the flow, from SPEED_TEST on: the flow sensor that it compares with the accelerometers, and
 # the hypothesis that this sensor was broken when the monitor began (initial_errors.py)
 FLOW_SENSOR, FLOW_HYPOTHESIS = (AIRSPEED, ALPHA, BETA), (H_AIRSPEED, H_ALPHA, H_BETA)
 # The sensor of each such hypothesis
 INITIAL_SENSOR = ALPHA, BETA, AIRSPEED, PHI, THETA
+# By the test from DENSITY_TEST on: the sensor that takes part in no other test
+LONE_SENSOR = QDYN, ALTITUDE, ENGINE_SPEED, MANIFOLD
+
+
+@kernel
+def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
+    """Test the sensors at t s, and replace in `measured` the readings of broken ones.
+
+    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
+    """
+    M, red, y = mon.memory, mon.redundancy, measured.signal
+    if not M.stage:  # the first sample: there is none to compare it with
+        M.stage, M.t_start = 1, t
+        red.memory.e_drift = red.config.drift * t
+        start_tests(red, y, measured.force)
+        start_bounds(mon.initial_errors, y)
+        M.y_older[:] = red.memory.y_past
+    else:
+        if M.substep == 0:
+            advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
+        run_tests(red, y, mon.config.has_engine)
+        if N_TESTS > N_EQUATIONS:
+            compare_duplicates(red, y, measured.fresh)
+            latch_agreed(mon, measured.fresh)
+        update_bounds(red, mon.initial_errors, y)
+        count_same(mon, y)
+        follow_gyro_errors(mon)
+        if too_steep(red, y):
+            restart_comparison(M)
+        else:
+            advance_stage(mon)
+            if mon.config.noisy:
+                exclude_gyros(mon)
+        isolate_sensor(mon, measured, found, bank, bound, dt, t)
+        replace_readings(mon, pred, measured)
+        M.y_older[:] = red.memory.y_past
+        store_sample(red, y, measured.force)
+    M.substep = (M.substep + 1) % mon.config.substeps
+
+
+@kernel
+def advance_gyro_estimate(mon, nu, eta, dt):
+    """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
+
+    w <- w + dt (nu - D w),    B <- B + dt (eta + |D| B), with -D_ii on the diagonal of |D|
+
+    nu, eta (3,): innovation and its bound, rad/s2.
+    """
+    w, B, D = mon.memory.w, mon.memory.w_bound, mon.config.D
+    w_past, B_past = (w[0], w[1], w[2]), (B[0], B[1], B[2])
+    for i in range(3):
+        w[i] += dt * (nu[i] - dot(D[i], w_past))
+        B[i] = max(B[i] + dt * (eta[i] + dot(mon.config.D_size[i], B_past)), 0.0)
+
+
+@kernel
+def latch_agreed(mon, fresh):
+    """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
+    for d in range(DUPLICATE.size):
+        agrees = mon.redundancy.test[N_EQUATIONS + d].ratio <= 1.0
+        if fresh[DUPLICATE[d] - N_IN_EQUATIONS] and agrees and not mon.output.alarmed:
+            mon.memory.agreed[d] = 1
 
 
 @kernel
@@ -157,17 +243,216 @@ def is_frozen(mon, i):
 
 
 @kernel
+def stands_still(mon, i):
+    """Whether a sensor is frozen at a reading that is not zero: a sound one may read zero."""
+    return mon.redundancy.memory.y_past[i] != 0.0 and is_frozen(mon, i)
+
+
+@kernel
+def follow_gyro_errors(mon):
+    """Keep the error of each gyro, if the attitude is right: as a frame begins, and its largest and smallest
+    size in the other samples of the frame."""
+    M, red = mon.memory, mon.redundancy
+    if M.substep == 0:
+        M.w_att_past[:] = M.w_att
+        M.peak_older[:] = M.peak_past
+        M.peak_past[:] = M.peak
+        M.floor_past[:] = M.floor
+        M.peak[:] = M.floor[:] = 0.0
+    for i in range(3):
+        w = -red.test[TURN_TEST + i].residual / red.config.sample_time_s
+        if M.substep == 0:
+            M.w_att[i] = w
+        else:
+            M.peak[i] = max(M.peak[i], abs(w))
+            M.floor[i] = abs(w) if M.substep == 1 else min(M.floor[i], abs(w))
+
+
+@kernel
+def restart_comparison(M):
+    """Compare w with the attitude only from the next sample on: a test that restarts has no residual, and
+    shows neither an error nor its absence.
+    """
+    M.stage = 1
+    M.gap[:] = 0.0
+    M.gap_bound[:] = 0.0
+    M.beyond[:] = 0.0
+    M.swing[:] = 0.0
+    M.c_max[:] = 0.0
+
+
+@kernel
+def advance_stage(mon):
+    """Widen the bound on w by a gyro's error of the first sample, which has caused no innovation. The first
+    frame shows no change of an error.
+    """
+    M = mon.memory
+    if M.stage < FULL_STAGE and M.substep == 0:
+        M.stage += 1
+        if M.stage == FULL_STAGE - 1:
+            for i in range(3):
+                M.w_bound[i] += abs(M.w_att[i])
+
+
+@kernel
+def exclude_gyros(mon):
+    """Record that no gyro can be broken: w and the attitude disagree by more than both bounds.
+
+    gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
+    """
+    M, c = mon.memory, mon.redundancy.config
+    h = c.sample_time_s
+    for i in range(3):
+        test = mon.redundancy.test[TURN_TEST + i]
+        leak(M.gap[i], c.decay, test.residual + h * M.w[i])
+        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(M.w[i])))
+        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, test.B):
+            rule_out_gyros(mon)
+
+
+@kernel
+def isolate_sensor(mon, measured, found, bank, bound, dt, t):
+    """Raise the alarm, and isolate the sensor once it is the only suspect."""
+    o, M = mon.output, mon.memory
+    if M.substep == 0:  # the test with the largest ratio, of the samples of this frame
+        o.worst_test_index, o.top_ratio = 0, 0.0
+    for j, test in enumerate(mon.redundancy.test):
+        if test.ratio > o.top_ratio:
+            o.worst_test_index, o.top_ratio = j, test.ratio
+    for i in range(N_SENSORS):
+        if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
+            raise_alarm(mon, found, t)
+            mark_isolated(mon, i, t)
+    if o.isolated_sensor != NO_SENSOR:
+        return
+    if o.top_ratio > 1.0 and not o.alarmed:
+        raise_alarm(mon, found, t)
+        o.alarm_test = o.worst_test_index
+        mon.initial_errors.e_alarm[:] = mon.initial_errors.e
+    if o.alarmed:
+        filter_beyond(mon, measured.signal)
+        if M.substep == 0 and M.stage == FULL_STAGE:
+            judge_gyros(mon, bank, bound, dt)
+        latch_exceeded(mon)
+        clear_sensors(mon, measured.signal)
+        find_suspects(mon)
+        n, last = 0, NO_SENSOR
+        for i in range(N_SENSORS):
+            if o.suspect[i]:
+                n, last = n + 1, i
+        if n == 1:
+            mark_isolated(mon, last, t)
+
+
+@kernel
+def raise_alarm(mon, found, t):
+    """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
+    and stays detected. Otherwise the conclusion about surfaces is void."""
+    o = mon.output
+    if o.alarmed:
+        return
+    o.alarmed, o.alarmed_at_s = 1, t
+    if found.detected and found.detected_at_s < t - MIN_LEAD_S:
+        o.keeps_surface = 1
+        return
+    if found.detected:
+        # the same fault, which the rates have shown first
+        o.alarmed_at_s = found.detected_at_s
+    o.had_surface = found.isolated_estimator >= 0
+
+
+@kernel
+def mark_isolated(mon, i, t):
+    """Isolate a sensor at t s."""
+    mon.output.isolated_sensor, mon.output.isolated_at_s = i, t
+    mon.output.is_reading_unused[i] = 1
+
+
+@kernel
+def filter_beyond(mon, y):
+    """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi.
+
+    An error that changes by x within a sample moves the residual of its angle by x and that of body axis j by
+    c_j x (turn_share). If this angle alone is wrong, r_j - c_j r_i contains noise alone.
+    """
+    M, tests, a = mon.memory, mon.redundancy.test, mon.redundancy.config.decay
+    for i in range(3):
+        r = tests[ANGLE_TEST + i].residual
+        leak(M.swing[i], a, abs(r))
+        for j in range(3):
+            c = turn_share(y, j, i)
+            M.c_max[i, j] = max(M.c_max[i, j], abs(c))
+            leak(M.beyond[i, j], a, tests[TURN_TEST + j].residual - c * r)
+
+
+@kernel
+def judge_gyros(mon, bank, bound, dt):
+    """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
+
+        innovation changes as   the dynamics     verdict
+        by this jump of a gyro  show an error
+        (fits)                  (shows)
+        no                      yes or no        refuted
+        yes                     yes              confirmed
+        yes                     no               refuted if the error is a transient (brief), or so large that
+                                                 w would show it (not allowed)
+        yes                     no               undecided otherwise
+
+    A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
+    a gyro stays, and one that varies is not as small in every sample. If an error is there in every sample
+    and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
+    innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
+    """
+    M, c, nu, axis = mon.memory, mon.redundancy.config, bank.output.innovation, bank_axis(bank)
+    for i in range(3):
+        if M.gyro_verdict[i] != GYRO_OPEN:
+            continue
+        w, past, estimate = abs(M.w_att[i]), abs(M.w_att_past[i]), abs(M.w[i])
+        peak, B = M.peak_past[i], M.w_bound[i]
+        jump = (M.w_att[i] - M.w_att_past[i]) / dt  # rad/s2
+        # of w, rad/s, by the attitude's noise
+        noise = SAMPLES_IN_JUMP * mon.redundancy.test[TURN_TEST + i].bound_per_sample / c.sample_time_s
+        nu_max = bound.nu_max[i] + RATE_ROUNDING
+        shows = abs(nu[i]) > nu_max or axis >= 0 or estimate > B + RATE_ROUNDING
+        late = max(past, peak, w)
+        brief = late < TRANSIENT_LEFT * M.peak_older[i] and M.peak_older[i] > MIN_TRANSIENT * noise
+        tol = MAX_DYNAMICS_PER_S * max(w, past) + JUMP_TOLERANCE * abs(jump)
+        fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
+        varies = noise < M.floor_past[i] < peak / (1.0 + JUMP_TOLERANCE)
+        allowed = MIN_ESTIMATED_SHARE * w <= B + estimate + noise
+        if not (fits or varies) or (not shows and (brief or not allowed)):
+            M.gyro_verdict[i] = GYRO_REFUTED
+        elif shows and fits:
+            M.gyro_verdict[i] = GYRO_CONFIRMED
+
+
+@kernel
+def latch_exceeded(mon):
+    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
+    that exceed them by more than an error on another axis explains.
+    """
+    tests, exceeded = mon.redundancy.test, mon.memory.exceeded
+    for j in range(N_TESTS):
+        most, first = 0.0, j - j % 3
+        for i in range(first, min(first + 3, SPEED_TEST)):
+            most = max(most, abs(tests[i].r[0]))
+        coupled = j < SPEED_TEST and abs(tests[j].r[0]) <= COUPLING_SHARE * most
+        if tests[j].ratio > 1.0 and not coupled:
+            exceeded[j] = 1
+    latch_refuted(mon.redundancy, mon.initial_errors, exceeded)
+
+
+@kernel
 def clear_sensors(mon, y):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
     M, alarm = mon.memory, mon.output.alarm_test
     if not SPEED_TEST <= alarm <= BETA_TEST:
         return
     flow = FLOW_SENSOR[alarm - SPEED_TEST]
-    soon = M.n_since * mon.redundancy.config.sample_time_s < JUMP_WINDOW_S - TIME_ROUNDING_S
-    sound = soon and flow_jumped(mon, y)
-    sum_flow(mon, y)
-    if sound or is_frozen(mon, flow) or (alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]):
+    sound = is_frozen(mon, flow) or flow_jumped(mon, y, flow)
+    if sound or (alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]):
         M.cleared[AX:] = 1
+    sum_flow(mon, y)
     broken = sum_exceeds_range(mon) or other_test_contradicts(mon, y)
     for i in range(AX, N_IN_EQUATIONS):
         broken = broken or is_frozen(mon, i)
@@ -177,36 +462,20 @@ def clear_sensors(mon, y):
 
 
 @kernel
-def clear_gyros(mon, y):
-    """Clear each gyro whose axis does not turn in this sample as an error would that explains the incidence,
-    or the sideslip. Near the vertical the attitude shows no turn.
+def flow_jumped(mon, y, i):
+    """Whether, soon after the alarm, the residual exceeds any jump of an accelerometer in one sample, and the
+    reading of the flow sensor i jumps with it.
 
-    turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
-    """
-    M, red, alarm = mon.memory, mon.redundancy, mon.output.alarm_test
-    if alarm == SPEED_TEST or too_steep(red, y) or M.turn_max == 0.0:
-        return
-    for i in range(3):
-        turn = abs(red.test[TURN_TEST + i].residual)
-        if turn < M.turn_max < abs(red.test[alarm].residual) - red.test[alarm].B[0]:
-            M.cleared[i] = 1
-
-
-@kernel
-def flow_jumped(mon, y):
-    """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
-    jumps with it.
-
-    per_v, per_a: residual for a velocity error of 1 m/s, for an acceleration error of 1 m/s2 in one sample.
-    ddy: second difference of the reading.
+    per_a: residual for an acceleration error of 1 m/s2 in one sample. ddy: second difference of the reading.
     """
     alarm, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
-    i, y_past, test = FLOW_SENSOR[alarm - SPEED_TEST], red.memory.y_past, red.test[alarm]
-    per_v = 1.0 if alarm == SPEED_TEST else 1.0 / max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    per_a = red.config.sample_time_s * per_v
+    y_past, test, h = red.memory.y_past, red.test[alarm], red.config.sample_time_s
+    per_a = h if alarm == SPEED_TEST else h / max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
     ddy = abs(y[i] - 2.0 * y_past[i] + M.y_older[i])
     r = abs(test.residual)
-    return r > test.B[0] + FORCE_JUMP_M_S2 * per_a and ddy >= MIN_JUMP_SHARE * r > AB_NOW * M.jump * per_a
+    soon = M.n_since * h < JUMP_WINDOW_S - TIME_ROUNDING_S
+    leaps = r > test.B[0] + FORCE_JUMP_M_S2 * per_a
+    return soon and leaps and ddy >= MIN_JUMP_SHARE * r > AB_NOW * M.jump * per_a
 
 
 @kernel
@@ -232,8 +501,7 @@ def sum_flow(mon, y):
         M.y_min[n] = min(M.y_min[n], y_n)
         M.y_max[n] = max(M.y_max[n], y_n)
     alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
-    climb = h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA])
-    leak(M.climb, red.config.decay, climb)
+    leak(M.climb, red.config.decay, h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     M.n_since += 1
 
 
@@ -242,133 +510,211 @@ def sum_exceeds_range(mon):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     M, j = mon.memory, mon.output.alarm_test - SPEED_TEST
     span = M.y_max[j] - M.y_min[j]
-    sound = M.B_sum[j] + M.e_sum[j]
-    return span > 0.0 and abs(M.r_sum[j]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * sound
+    return span > 0.0 and abs(M.r_sum[j]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[j] + M.e_sum[j])
 
 
 @kernel
 def other_test_contradicts(mon, y):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
-    red, ini = mon.redundancy, mon.initial_errors
-    alarm = mon.output.alarm_test
+    red, ini, alarm = mon.redundancy, mon.initial_errors, mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.memory.exceeded[other]:
         return False
     h = FLOW_HYPOTHESIS[alarm - SPEED_TEST]
-    for m in range(red.config.decay.size):
-        r = abs(mon.memory.climb[m])
-        speed = red.test[SPEED_TEST]
-        if alarm == SPEED_TEST:  # log(density) changes by twice the relative change of the airspeed
-            r = 2.0 * (abs(speed.r[m]) - speed.B[m]) / max(y[AIRSPEED], MIN_AIRSPEED_MPS)
-            r *= 1.0 - min(ini.e_alarm[h], 1.0)
-        if r > CLEAR_FACTOR * (red.test[other].B[m] + effect_at_alarm(ini, h, other, m)):
+    e, H, B = ini.e_alarm[h], ini.H_m[h, other], red.test[other].B
+    if alarm == ALPHA_TEST:
+        return exceeds(mon.memory.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
+    # log(density) changes by twice the relative change of the airspeed
+    speed, per_V = red.test[SPEED_TEST], 2.0 * (1.0 - min(e, 1.0)) / max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+    for m in range(B.size):
+        if per_V * (abs(speed.r[m]) - speed.B[m]) > CLEAR_FACTOR * (B[m] + e * H[m]):
             return True
     return False
 
 
 @kernel
+def clear_gyros(mon, y):
+    """Clear each gyro whose axis does not turn in this sample as an error would that explains the incidence,
+    or the sideslip. Near the vertical the attitude shows no turn.
+
+    turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
+    """
+    M, red, alarm = mon.memory, mon.redundancy, mon.output.alarm_test
+    if alarm == SPEED_TEST or too_steep(red, y) or M.turn_max == 0.0:
+        return
+    for i in range(3):
+        turn = abs(red.test[TURN_TEST + i].residual)
+        if turn < M.turn_max < abs(red.test[alarm].residual) - red.test[alarm].B[0]:
+            M.cleared[i] = 1
+
+
+@kernel
+def find_suspects(mon):
+    """Fill suspect (N_SENSORS,): the sensors whose error explains all tests. An error of another sensor from
+    the start does not explain a frozen suspect."""
+    o, alarm = mon.output, mon.output.alarm_test
+    o.suspect[:] = 0
+    if alarm >= N_EQUATIONS:
+        suspect_duplicate(mon, alarm - N_EQUATIONS)
+        return
+    if alarm < SPEED_TEST:
+        suspect_attitude(mon)
+    elif alarm < DENSITY_TEST:
+        suspect_flow(mon, alarm)
+    else:
+        suspect_lone(mon, alarm)
+    for i in range(N_SENSORS):
+        if o.suspect[i] and stands_still(mon, i):
+            return
+    for i in range(N_INITIAL):
+        if explains_exceeded(mon.initial_errors, i, alarm):
+            o.suspect[INITIAL_SENSOR[i]] = 1
+
+
+@kernel
+def suspect_duplicate(mon, d):
+    """Suspect a duplicate sensor, or the reading that it no longer equals.
+
+    The reading is suspected if its own test shows an error, the sensor if an error of the reading of this
+    size would have exceeded that test, both if neither is certain.
+
+    No test shows an error that a reading has had from the first sample on, nor a frozen reading.
+    """
+    red, M, suspect = mon.redundancy, mon.memory, mon.output.suspect
+    i, j = COUNTERPART[d], COUNTERPART_TEST[d]
+    test = red.test[N_EQUATIONS + d]
+    # of the reading, if it is the broken one
+    least = abs(test.residual) - test.B[0]
+    hidden = least <= HIDDEN_FACTOR * max(red.test[j].B[0], red.memory.reading_bound[i])
+    suspect[DUPLICATE[d]] = not M.exceeded[j]
+    suspect[i] = M.exceeded[j] == 1 or hidden or is_frozen(mon, i) or not M.agreed[d]
+
+
+@kernel
+def suspect_attitude(mon):
+    """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
+    first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
+    M, suspect, tests = mon.memory, mon.output.suspect, mon.redundancy.test
+    n, frozen = 0, False
+    for i in range(3):
+        n += M.exceeded[TURN_TEST + i]
+        frozen = frozen or is_frozen(mon, PHI + i)
+    for i in range(3):
+        alone = n == 0 or (n == 1 and M.exceeded[TURN_TEST + i] == 1)
+        suspect[i] = alone and M.gyro_verdict[i] != GYRO_REFUTED and not frozen
+        explains, axis = explains_turns(mon, i), i
+        for j in range(3):
+            if tests[TURN_TEST + j].ratio > tests[TURN_TEST + axis].ratio:
+                axis = j
+        only = explains_angles(mon, i) and (explains or M.exceeded[ANGLE_TEST + i] == 1)
+        # too early to say
+        early = 0 < M.n_same[PHI + i] < mon.config.n_frozen[PHI + i] < N_FROZEN_NEVER
+        suspect[PHI + i] = (only and M.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
+
+
+@kernel
+def explains_angles(mon, i):
+    """Whether no test of another angle shows an error that one of angle i (phi, theta, psi) from the start
+    does not explain.
+    """
+    exceeded, refuted = mon.memory.exceeded[ANGLE_TEST:], mon.initial_errors.refuted[:, ANGLE_TEST:]
+    for j in range(3):
+        if j != i and (exceeded[j] if i == 2 else refuted[H_PHI + i, j]):
+            return False
+    return True
+
+
+@kernel
+def explains_turns(mon, i):
+    """Whether an error x of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
+    residual of the angle's own test allows now, or as its residuals since the alarm have shown.
+    """
+    M, red, ini = mon.memory, mon.redundancy, mon.initial_errors
+    angle, h = red.test[ANGLE_TEST + i], min(H_PHI + i, N_INITIAL - 1)
+    initial = ini.e_alarm[h] if i < 2 else 0.0
+    tilt = red.memory.reading_bound[PHI] + red.memory.reading_bound[THETA]
+    for j in range(3):
+        turn = red.test[TURN_TEST + j]
+        c = abs(turn_share(red.memory.y_past, j, i)) + tilt
+        for m in range(turn.r.size):
+            sound = turn.B[m] + initial * ini.H_m[h, TURN_TEST + j, m]
+            now = abs(turn.r[m]) > c * (abs(angle.r[m]) + angle.B[m]) + sound
+            since = abs(M.beyond[i, j, m]) > sound + M.c_max[i, j] * angle.B[m] + tilt * M.swing[i, m]
+            if M.exceeded[TURN_TEST + j] and now and since:
+                return False
+    return True
+
+
+@kernel
+def suspect_flow(mon, alarm):
+    """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
+    attitude. No flow sensor moves the attitude's tests.
+    """
+    M, suspect, sensor = mon.memory, mon.output.suspect, FLOW_SENSOR[alarm - SPEED_TEST]
+    n = 0
+    if alarm > SPEED_TEST:
+        for i in range(3):
+            n += M.exceeded[TURN_TEST + i]
+        for i in range(3):
+            explains = gyro_hidden(mon, alarm, i) if n == 0 else n == 1 and M.exceeded[TURN_TEST + i] == 1
+            suspect[i] = explains and not M.cleared[i]
+    suspect_accelerometers(mon, n > 0)
+    suspect[sensor] = n == 0 and not M.cleared[sensor]
+
+
+@kernel
+def gyro_hidden(mon, j, i):
+    """Whether an error of gyro i explains the test j of the flow, and stays within the bound of the test of
+    its axis. All of the error of the gyro across the flow (full) turns it; of another a share, by kinematics;
+    q does not act on the sideslip.
+    """
+    red, flow = mon.redundancy, mon.redundancy.test[j]
+    alpha, beta = red.memory.y_past[ALPHA], red.memory.y_past[BETA]
+    full = i == j - SPEED_TEST
+    share = abs(np.sin(alpha))
+    if j == ALPHA_TEST:
+        share = abs(np.tan(beta) * (np.cos(alpha) if i == 0 else np.sin(alpha)))
+    k, x = (HIDDEN_FACTOR, HIDDEN_FACTOR) if full else (1.0, HIDDEN_FACTOR * share)
+    acts = i != 1 or j == ALPHA_TEST
+    return acts and not exceeds(flow.r, k, flow.B, x, red.test[TURN_TEST + i].B)
+
+
+@kernel
 def suspect_accelerometers(mon, by_gyro):
     """Suspect the accelerometers along whose axis most of the spurious velocity dv is, unless a gyro explains
-    it. along, down, side: of dv, m/s, along and across the flow; sound: bound on |dv| of sound sensors.
+    it. In flow axes dv is r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the
+    bound on |dv| of sound sensors.
     """
-    M, y_past, r, B = mon.memory, mon.redundancy.memory.y_past, mon.memory.r_sum, mon.memory.B_sum
-    alpha, beta, V = y_past[ALPHA], y_past[BETA], max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    along, down, side = r[0], V * np.cos(beta) * r[1], V * r[2]
-    plane = np.cos(beta) * along - np.sin(beta) * side  # along the flow's projection on the plane of symmetry
-    dv = (
-        np.cos(alpha) * plane - np.sin(alpha) * down,
-        np.sin(beta) * along + np.cos(beta) * side,
-        np.sin(alpha) * plane + np.cos(alpha) * down,
-    )
-    sound = B[0] + V * (B[1] + B[2])
-    most, frozen = max(abs(dv[0]), abs(dv[1]), abs(dv[2])), NO_SENSOR
+    M, y, r, B = mon.memory, mon.redundancy.memory.y_past, mon.memory.r_sum, mon.memory.B_sum
+    alpha, beta, V = y[ALPHA], y[BETA], max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+    plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
+    body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
+    dv = abs(body.real), abs(plane.imag), abs(body.imag)
+    least, frozen = MIN_AXIS_SHARE * max(dv) - B[0] - V * (B[1] + B[2]), NO_SENSOR
     for i in range(AX, N_IN_EQUATIONS):
         frozen = i if is_frozen(mon, i) else frozen
     for i in range(AX, N_IN_EQUATIONS):
-        cause = frozen == i or (frozen < 0 and abs(dv[i - AX]) + sound >= MIN_AXIS_SHARE * most)
+        cause = frozen == i or (frozen < 0 and dv[i - AX] >= least)
         mon.output.suspect[i] = cause and not by_gyro and not M.cleared[i]
 
 
 @kernel
-def disable_suspects(mon, measured):
-    """Mark the accelerometers as unusable once one of them may be broken."""
-    for i in range(AX, N_IN_EQUATIONS):
-        if mon.output.is_reading_unused[i] or (mon.output.alarmed and mon.output.suspect[i]):
-            set_inertial(measured, 0)
-
-
-# A smaller share of the largest of three residuals is the effect of its error on the two other axes or angles
-COUPLING_SHARE = 0.03
-# stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
-# the next frame on: only then the innovation contains the change of a gyro's error between two frames
-FULL_STAGE = 3
-MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
-INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
-VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
-# index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
-RATE_POLE = 1
-
-# Gyro or attitude (judge_gyros)
-# innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
-MAX_DYNAMICS_PER_S = 10.0
-JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_ESTIMATED_SHARE = 0.7  # of a gyro's error, which w shows
-SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
-MIN_TRANSIENT = 2.0  # of the size of a transient to the bound on noise: else noise may be all of it
-TRANSIENT_LEFT = 0.003  # of a jump of the attitude within a frame, in the next frame
-RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
-
-# Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign
-HIDDEN_FACTOR = 2.0
-# Margin on the bound of the flow's test, for the gyro that turns the flow by all of its error
-FULL_GYRO_FACTOR = 2.0
-
-
-@kernel
-def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
-    """Test the sensors at t s, and replace in `measured` the readings of broken ones.
-
-    bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
-    """
-    red, ini, y = mon.redundancy, mon.initial_errors, measured.signal
-    M = mon.memory
-    if not M.stage:
-        begin_monitor(mon, measured, t)
-        return
-    if M.substep == 0:
-        advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
-    run_tests(red, y, mon.config.has_engine)
-    if N_TESTS > N_EQUATIONS:
-        compare_duplicates(red, y, measured.fresh)
-        latch_agreed(mon, measured.fresh)
-    update_bounds(red, ini, y)
-    count_same(mon, y)
-    if M.substep == 0:
-        M.w_att_past[:] = M.w_att
-        M.peak_older[:] = M.peak_past
-        M.peak_past[:] = M.peak
-        M.floor_past[:] = M.floor
-        M.peak[:] = M.floor[:] = 0.0
-    for i in range(3):
-        w = -red.test[TURN_TEST + i].residual / red.config.sample_time_s
-        if M.substep == 0:
-            M.w_att[i] = w
-        else:
-            M.peak[i] = max(M.peak[i], abs(w))
-            M.floor[i] = abs(w) if M.substep == 1 else min(M.floor[i], abs(w))
-    if too_steep(red, y):
-        restart_comparison(M)
-    elif M.stage < FULL_STAGE:
-        advance_stage(mon)
-    if mon.config.noisy and not too_steep(red, y):
-        exclude_gyros(mon)
-    isolate_sensor(mon, measured, found, bank, bound, dt, t)
-    replace_readings(mon, pred, measured)
-    disable_suspects(mon, measured)
-    M.y_older[:] = red.memory.y_past
-    store_sample(red, y, measured.force)
-    M.substep = (M.substep + 1) % mon.config.substeps
+def suspect_lone(mon, alarm):
+    """Suspect the sensor that takes part in no other test, of kinematics if none is exceeded; and the
+    airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test."""
+    M, red, ini, suspect = mon.memory, mon.redundancy, mon.initial_errors, mon.output.suspect
+    alone = True
+    for j in range(RPM_TEST):
+        alone = alone and (j == alarm or alarm >= RPM_TEST or not M.exceeded[j])
+    suspect[LONE_SENSOR[alarm - DENSITY_TEST]] = alone
+    if alarm == DENSITY_TEST:
+        e, H = ini.e_alarm[H_AIRSPEED], ini.H_m[H_AIRSPEED, DENSITY_TEST]
+        # a relative change of the airspeed changes log(density) by twice as much
+        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+        hidden = not exceeds(red.test[DENSITY_TEST].r, k, red.test[SPEED_TEST].B, e, H)
+        # its test need not show an error if it is frozen
+        suspect[AIRSPEED] = M.exceeded[SPEED_TEST] == 1 or hidden or M.n_same[AIRSPEED] > 0
 
 
 @kernel
@@ -406,440 +752,18 @@ def expect_pressure(mon, pressure):
 
 
 @kernel
-def begin_monitor(mon, measured, t):
-    """Take the first sample, at t s: there is none to compare it with."""
-    M, red = mon.memory, mon.redundancy
-    M.stage, M.t_start = 1, t
-    red.memory.e_drift = red.config.drift * t
-    start_tests(red, measured.signal, measured.force)
-    start_bounds(mon.initial_errors, measured.signal)
-    M.y_older[:] = red.memory.y_past
-    M.substep = (M.substep + 1) % mon.config.substeps
-
-
-@kernel
-def advance_stage(mon):
-    """Widen the bound on w by a gyro's error of the first sample, which has caused no innovation. The first
-    frame shows no change of an error.
-    """
-    M = mon.memory
-    if M.substep == 0:
-        M.stage += 1
-    if M.stage == FULL_STAGE - 1 and M.substep == 0:
-        for i in range(3):
-            M.w_bound[i] += abs(M.w_att[i])
-
-
-@kernel
-def restart_comparison(M):
-    """Compare w with the attitude only from the next sample on: a test that restarts has no residual, and
-    shows neither an error nor its absence.
-    """
-    M.stage = 1
-    M.gap[:] = 0.0
-    M.gap_bound[:] = 0.0
-    M.beyond[:] = 0.0
-    M.swing[:] = 0.0
-    M.c_max[:] = 0.0
-
-
-@kernel
-def advance_gyro_estimate(mon, nu, eta, dt):
-    """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
-
-    w <- w + dt (nu - D w),    B <- B + dt (eta + |D| B), with -D_ii on the diagonal of |D|
-
-    nu, eta (3,): innovation and its bound, rad/s2.
-    """
-    w, B, D = mon.memory.w, mon.memory.w_bound, mon.config.D
-    w_past, B_past = (w[0], w[1], w[2]), (B[0], B[1], B[2])
-    for i in range(3):
-        for j in range(3):
-            w[i] -= dt * D[i, j] * w_past[j]
-            B[i] += dt * (-D[i, j] if i == j else abs(D[i, j])) * B_past[j]
-        w[i] += dt * nu[i]
-        B[i] = max(B[i] + dt * eta[i], 0.0)
-
-
-@kernel
-def exclude_gyros(mon):
-    """Record that no gyro can be broken: w and the attitude disagree by more than both bounds.
-
-    gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
-    """
-    M, c = mon.memory, mon.redundancy.config
-    h = c.sample_time_s
-    for i in range(3):
-        test = mon.redundancy.test[TURN_TEST + i]
-        leak(M.gap[i], c.decay, test.residual + h * M.w[i])
-        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(M.w[i])))
-        for m in range(c.decay.size):
-            if abs(M.gap[i, m]) > M.gap_bound[i, m] + test.B[m]:
-                rule_out_gyros(mon)
-
-
-@kernel
-def isolate_sensor(mon, measured, found, bank, bound, dt, t):
-    """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o, M = mon.output, mon.memory
-    find_worst(mon)
-    if o.isolated_sensor != NO_SENSOR:
-        return
-    for i in range(N_SENSORS):
-        if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
-            raise_alarm(mon, found, t)
-            mark_isolated(mon, i, t)
-    if o.isolated_sensor != NO_SENSOR:
-        return
-    if o.top_ratio > 1.0 and not o.alarmed:
-        raise_alarm(mon, found, t)
-        o.alarm_test = o.worst_test_index
-        mon.initial_errors.e_alarm[:] = mon.initial_errors.e
-    if o.alarmed:
-        filter_beyond(mon, measured.signal)
-        if M.substep == 0 and M.stage == FULL_STAGE:
-            judge_gyros(mon, bank, bound, dt)
-        latch_exceeded(mon)
-        clear_sensors(mon, measured.signal)
-        find_suspects(mon)
-        n, last = 0, NO_SENSOR
-        for i in range(N_SENSORS):
-            if o.suspect[i]:
-                n, last = n + 1, i
-        if n == 1:
-            mark_isolated(mon, last, t)
-
-
-@kernel
-def find_worst(mon):
-    """Find the test with the largest ratio of residual to bound, of the samples of this frame."""
-    o = mon.output
-    if mon.memory.substep == 0:
-        o.worst_test_index, o.top_ratio = 0, 0.0
-    for j, test in enumerate(mon.redundancy.test):
-        if test.ratio > o.top_ratio:
-            o.worst_test_index, o.top_ratio = j, test.ratio
-
-
-@kernel
-def raise_alarm(mon, found, t):
-    """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
-    and stays detected. Otherwise the conclusion about surfaces is void."""
-    o = mon.output
-    if o.alarmed:
-        return
-    o.alarmed, o.alarmed_at_s = 1, t
-    if found.detected and found.detected_at_s < t - MIN_LEAD_S:
-        o.keeps_surface = 1
-        return
-    if found.detected:
-        # the same fault, which the rates have shown first
-        o.alarmed_at_s = found.detected_at_s
-    o.had_surface = found.isolated_estimator >= 0
-
-
-@kernel
-def mark_isolated(mon, i, t):
-    """Isolate a sensor at t s."""
-    mon.output.isolated_sensor, mon.output.isolated_at_s = i, t
-    mon.output.is_reading_unused[i] = 1
-
-
-@kernel
-def judge_gyros(mon, bank, bound, dt):
-    """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
-
-        innovation changes as   the dynamics     verdict
-        by this jump of a gyro  show an error
-        (fits)                  (shows)
-        no                      yes or no        refuted
-        yes                     yes              confirmed
-        yes                     no               refuted if the error is a transient (brief), or so large that
-                                                 w would show it (not allowed)
-        yes                     no               undecided otherwise
-
-    A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
-    a gyro stays, and one that varies is not as small in every sample. If an error is there in every sample
-    and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
-    innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
-    """
-    M, nu = mon.memory, bank.output.innovation
-    axis = bank_axis(bank)
-    for i in range(3):
-        if M.gyro_verdict[i] != GYRO_OPEN:
-            continue
-        w = M.w_att[i]
-        w_past = M.w_att_past[i]
-        jump = (w - w_past) / dt  # rad/s2
-        tol = MAX_DYNAMICS_PER_S * max(abs(w), abs(w_past)) + JUMP_TOLERANCE * abs(jump)
-        noise = (  # of w, rad/s, by the attitude's noise
-            SAMPLES_IN_JUMP
-            * mon.redundancy.test[TURN_TEST + i].bound_per_sample
-            / mon.redundancy.config.sample_time_s
-        )
-        nu_max = bound.nu_max[i] + RATE_ROUNDING
-        shows = abs(nu[i]) > nu_max or axis >= 0 or abs(M.w[i]) > M.w_bound[i] + RATE_ROUNDING
-        early = M.peak_older[i]
-        late = max(abs(w_past), M.peak_past[i], abs(w))
-        brief = late < TRANSIENT_LEFT * early and early > MIN_TRANSIENT * noise
-        fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
-        least = M.floor_past[i]
-        varies = least > noise and M.peak_past[i] > (1.0 + JUMP_TOLERANCE) * least
-        allowed = MIN_ESTIMATED_SHARE * abs(w) <= M.w_bound[i] + abs(M.w[i]) + noise
-        if not (fits or varies) or (not shows and (brief or not allowed)):
-            M.gyro_verdict[i] = GYRO_REFUTED
-        elif shows and fits:
-            M.gyro_verdict[i] = GYRO_CONFIRMED
-
-
-@kernel
-def latch_exceeded(mon):
-    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
-    that exceed them by more than an error on another axis explains.
-    """
-    tests, exceeded = mon.redundancy.test, mon.memory.exceeded
-    for j in range(N_TESTS):
-        most, first = 0.0, TURN_TEST if j < ANGLE_TEST else ANGLE_TEST
-        for i in range(3):
-            most = max(most, abs(tests[first + i].r[0]))
-        coupled = j < SPEED_TEST and abs(tests[j].r[0]) <= COUPLING_SHARE * most
-        if tests[j].ratio > 1.0 and not coupled:
-            exceeded[j] = 1
-    latch_refuted(mon.redundancy, mon.initial_errors, exceeded)
-
-
-@kernel
-def find_suspects(mon):
-    """Fill suspect (N_SENSORS,): the sensors whose error explains all tests."""
-    suspect, alarm = mon.output.suspect, mon.output.alarm_test
-    exceeded = mon.memory.exceeded
-    suspect[:] = 0
-    if alarm >= N_EQUATIONS:
-        suspect_duplicate(mon, alarm - N_EQUATIONS)
-        return
-    if alarm < SPEED_TEST:
-        suspect_attitude(mon)
-    if alarm == SPEED_TEST:
-        suspect_accelerometers(mon, False)
-        suspect[AIRSPEED] = not mon.memory.cleared[AIRSPEED]
-    elif alarm == DENSITY_TEST:
-        same = mon.memory.n_same[AIRSPEED] > 0  # its test need not show an error then
-        suspect[AIRSPEED] = exceeded[SPEED_TEST] == 1 or not speed_contradicts(mon) or same
-    suspect[QDYN] = alarm == DENSITY_TEST and alone_exceeded(mon, DENSITY_TEST)
-    suspect_flow(mon, ALPHA, ALPHA_TEST, 1)
-    suspect_flow(mon, BETA, BETA_TEST, 2)
-    suspect[ALTITUDE] = alarm == CLIMB_TEST and alone_exceeded(mon, CLIMB_TEST)
-    suspect[ENGINE_SPEED] = alarm == RPM_TEST
-    suspect[MANIFOLD] = alarm == PRESSURE_TEST
-    frozen = frozen_suspect(mon)
-    for i in range(N_INITIAL):
-        if not frozen and explains_exceeded(mon.initial_errors, i, alarm):
-            suspect[INITIAL_SENSOR[i]] = 1
-
-
-@kernel
-def latch_agreed(mon, fresh):
-    """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
-    for d in range(DUPLICATE.size):
-        agrees = mon.redundancy.test[N_EQUATIONS + d].ratio <= 1.0
-        if fresh[DUPLICATE[d] - N_IN_EQUATIONS] and agrees and not mon.output.alarmed:
-            mon.memory.agreed[d] = 1
-
-
-@kernel
-def suspect_duplicate(mon, d):
-    """Suspect a duplicate sensor, or the reading that it no longer equals.
-
-    The reading is suspected if its own test shows an error, the sensor if an error of the reading of this
-    size would have exceeded that test, both if neither is certain.
-
-    No test shows an error that a reading has had from the first sample on, nor a frozen reading.
-    """
-    red, M = mon.redundancy, mon.memory
-    i = COUNTERPART[d]
-    j = COUNTERPART_TEST[d]
-    own = red.test[j]
-    test = red.test[N_EQUATIONS + d]
-    # of the reading, if it is the broken one
-    least = abs(test.residual) - test.B[0]
-    hidden = least <= HIDDEN_FACTOR * max(own.B[0], red.memory.reading_bound[i])
-    frozen = is_frozen(mon, i)
-    mon.output.suspect[DUPLICATE[d]] = not M.exceeded[j]
-    mon.output.suspect[i] = M.exceeded[j] == 1 or hidden or frozen or not M.agreed[d]
-
-
-@kernel
-def alone_exceeded(mon, j):
-    """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
-    for k in range(RPM_TEST):
-        if k != j and mon.memory.exceeded[k]:
-            return False
-    return True
-
-
-@kernel
-def frozen_suspect(mon):
-    """Whether a suspect is frozen, which an error of another sensor from the start does not explain. A sound
-    sensor may read zero."""
-    for i in range(N_SENSORS):
-        if mon.output.suspect[i] and mon.redundancy.memory.y_past[i] != 0.0 and is_frozen(mon, i):
-            return True
-    return False
-
-
-@kernel
-def suspect_flow(mon, vane, j, full):
-    """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude;
-    all of the error of gyro `full` turns the flow. No flow sensor moves the attitude's tests.
-    """
-    if mon.output.alarm_test != j:
-        return
-    exceeded = mon.memory.exceeded
-    suspect = mon.output.suspect
-    n = exceeded[TURN_TEST] + exceeded[TURN_TEST + 1] + exceeded[TURN_TEST + 2]
-    suspect_accelerometers(mon, n > 0)
-    suspect[vane] = not (n > 0 or mon.memory.cleared[vane])
-    for i in range(3):
-        shown = n == 1 and exceeded[TURN_TEST + i] == 1
-        suspect[i] = (shown or (n == 0 and gyro_hidden(mon, j, i, i == full))) and not mon.memory.cleared[i]
-
-
-@kernel
-def gyro_hidden(mon, j, i, full):
-    """Whether an error of gyro i explains the test j of the flow, and stays within the bound of the test of
-    its axis; full: all of its error turns the flow. Of another gyro's error a share does, by kinematics.
-    """
-    red, y_past = mon.redundancy, mon.redundancy.memory.y_past
-    alpha = y_past[ALPHA]
-    roll = np.cos(alpha) if i == 0 else np.sin(alpha)
-    share = abs(np.tan(y_past[BETA]) * roll) if j == ALPHA_TEST else abs(np.sin(alpha))
-    flow = red.test[j]
-    turn = red.test[TURN_TEST + i]
-    for m in range(flow.r.size):
-        B = FULL_GYRO_FACTOR * flow.B[m] if full else flow.B[m]
-        hidden = HIDDEN_FACTOR * (1.0 if full else share) * turn.B[m]
-        if abs(flow.r[m]) > hidden + B:
-            return False
-    # q does not act on the sideslip
-    return full or i == 0 or j == ALPHA_TEST
-
-
-@kernel
-def speed_contradicts(mon):
-    """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
-    density, speed = mon.redundancy.test[DENSITY_TEST], mon.redundancy.test[SPEED_TEST]
-    ratio = 1.0 + mon.initial_errors.e_alarm[H_AIRSPEED]
-    for m in range(density.r.size):
-        r = abs(density.r[m]) - effect_at_alarm(mon.initial_errors, H_AIRSPEED, DENSITY_TEST, m)
-        # a relative change of the airspeed changes log(density) by twice as much
-        dV = 0.5 * mon.redundancy.memory.y_past[AIRSPEED] * r
-        if dV > HIDDEN_FACTOR * ratio * speed.B[m]:
-            return True
-    return False
-
-
-@kernel
-def suspect_attitude(mon):
-    """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
-    first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
-    M, suspect = mon.memory, mon.output.suspect
-    exceeded = M.exceeded
-    verdict = M.gyro_verdict
-    n, frozen = 0, False
-    for i in range(3):
-        n += exceeded[TURN_TEST + i]
-        frozen = frozen or is_frozen(mon, PHI + i)
-    for i in range(3):
-        alone = n == 0 or (exceeded[TURN_TEST + i] == 1 and n == 1)
-        suspect[i] = alone and verdict[i] != GYRO_REFUTED and not frozen
-        explains = explains_turns(mon, i)
-        only = explains_angles(mon, i) and (exceeded[ANGLE_TEST + i] == 1 or explains)
-        wrong = only and verdict[worst_turn_axis(mon, i)] != GYRO_CONFIRMED
-        n_same = M.n_same[PHI + i]
-        n_frozen = mon.config.n_frozen[PHI + i]
-        # too early to say
-        early = 0 < n_same < n_frozen < N_FROZEN_NEVER
-        suspect[PHI + i] = wrong or (explains and early)
-
-
-@kernel
-def explains_angles(mon, i):
-    """Whether no test of another angle shows an error that one of angle i (phi, theta, psi) from the start
-    does not explain.
-    """
-    for j in range(3):
-        over = (
-            mon.memory.exceeded[ANGLE_TEST + j]
-            if i == 2
-            else mon.initial_errors.refuted[H_PHI + i, ANGLE_TEST + j]
-        )
-        if j != i and over:
-            return False
-    return True
-
-
-@kernel
-def filter_beyond(mon, y):
-    """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi.
-
-    An error that changes by x within a sample moves the residual of its angle by x and that of body axis j by
-    c_j x (turn_share). If this angle alone is wrong, r_j - c_j r_i contains noise alone.
-    """
-    red, M = mon.redundancy, mon.memory
-    for i in range(3):
-        r = red.test[ANGLE_TEST + i].residual
-        leak(M.swing[i], red.config.decay, abs(r))
-        for j in range(3):
-            c = turn_share(y, j, i)
-            M.c_max[i, j] = max(M.c_max[i, j], abs(c))
-            leak(M.beyond[i, j], red.config.decay, red.test[TURN_TEST + j].residual - c * r)
-
-
-@kernel
-def explains_turns(mon, i):
-    """Whether an error x of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
-    residual of the angle's own test allows now, or as its residuals since the alarm have shown.
-    """
-    M = mon.memory
-    red, angle = mon.redundancy, mon.redundancy.test[ANGLE_TEST + i]
-    e = red.memory.reading_bound
-    e_tilt = e[PHI] + e[THETA]
-    for j in range(3):
-        turn = red.test[TURN_TEST + j]
-        c = turn_share(red.memory.y_past, j, i)
-        c_max = abs(c) + e_tilt
-        for m in range(red.config.decay.size):
-            x = abs(angle.r[m]) + angle.B[m]
-            initial = effect_at_alarm(mon.initial_errors, H_PHI + i, TURN_TEST + j, m) if i < 2 else 0.0
-            sound = turn.B[m] + initial
-            beyond = sound + M.c_max[i, j] * angle.B[m] + e_tilt * M.swing[i, m]
-            if (
-                M.exceeded[TURN_TEST + j]
-                and abs(turn.r[m]) > c_max * x + sound
-                and abs(M.beyond[i, j, m]) > beyond
-            ):
-                return False
-    return True
-
-
-@kernel
-def worst_turn_axis(mon, i):
-    """The body axis whose test of turning has the largest ratio; i if none is larger than its own."""
-    axis, tests = i, mon.redundancy.test
-    for j in range(3):
-        if tests[TURN_TEST + j].ratio > tests[TURN_TEST + axis].ratio:
-            axis = j
-    return axis
-
-
-@kernel
 def allows_isolation(mon, is_earlier):
-    """Whether a surface may be isolated; is_earlier: the alarm was a frame or more ago."""
+    """Whether a surface may be isolated; is_earlier: the alarm was a frame or more ago.
+
+    None is while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
+    flight a sideslip of zero stays zero.
+    """
     if not mon.config.enabled:
         return True
-    return (
-        is_earlier == 1 and (mon.memory.gyros_excluded == 1 or not mon.config.noisy) and not flow_frozen(mon)
-    )
+    for i in (ALPHA, BETA, AIRSPEED, QDYN):
+        if stands_still(mon, i):
+            return False
+    return is_earlier == 1 and (mon.memory.gyros_excluded == 1 or not mon.config.noisy)
 
 
 @kernel
@@ -847,16 +771,6 @@ def may_be_initial(mon, detected_at_s):
     """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
     may have caused it: the design model uses its reading from the first frame on."""
     return mon.config.enabled and detected_at_s < mon.memory.t_start + INITIAL_WINDOW_S
-
-
-@kernel
-def flow_frozen(mon):
-    """Whether a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
-    flight a sideslip of zero stays zero."""
-    for i in (ALPHA, BETA, AIRSPEED, QDYN):
-        if mon.redundancy.memory.y_past[i] != 0.0 and is_frozen(mon, i):
-            return True
-    return False
 
 
 @kernel
@@ -868,13 +782,15 @@ def has_alarm(mon):
 @kernel
 def replace_readings(mon, pred, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
-    not replaced: then none of them is used."""
-    y, any_replaced, slipstream = measured.signal, False, False
+    not replaced: none of them is used once one of them may be broken."""
+    o, any_replaced, slipstream = mon.output, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
-            mon.output.is_reading_unused[i] = 1
-        if mon.output.is_reading_unused[i] and i < AX:
-            y[i] = estimate_reading(mon, pred, y, i)
+            o.is_reading_unused[i] = 1
+        if AX <= i < N_IN_EQUATIONS and (o.is_reading_unused[i] or (o.alarmed and o.suspect[i])):
+            set_inertial(measured, 0)
+        if o.is_reading_unused[i] and i < AX:
+            measured.signal[i] = estimate_reading(mon, pred, measured.signal, i)
             any_replaced = True
             slipstream = slipstream or i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD)
     if any_replaced:
@@ -889,18 +805,15 @@ def estimate_reading(mon, pred, y, i):
     M = mon.redundancy.memory
     if i < 3:
         return estimate_rate(mon, pred, i)
-    if i in (ALPHA, BETA):
-        return M.predicted_reading[i] + mon.redundancy.config.sample_time_s / VANE_RETURN_S * (
-            mon.config.y_trim[i] - M.predicted_reading[i]
-        )
+    if i >= ENGINE_SPEED:
+        return M.engine_commands[i - ENGINE_SPEED]
     rho = 2.0 * M.y_past[QDYN] / M.y_past[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * y[QDYN] / rho, MIN_AIRSPEED_MPS**2))
     if i == QDYN:
         return 0.5 * rho * y[AIRSPEED] ** 2
-    if i >= ENGINE_SPEED:
-        return M.engine_commands[i - ENGINE_SPEED]
-    return M.predicted_reading[i]
+    back = mon.redundancy.config.sample_time_s / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
+    return M.predicted_reading[i] + back * (mon.config.y_trim[i] - M.predicted_reading[i])
 
 
 @kernel
@@ -910,18 +823,15 @@ def estimate_rate(mon, pred, i):
 
     The rate itself is used for the next sample: its own error shows there.
     """
-    c = mon.redundancy.config
-    M = mon.redundancy.memory
-    test = mon.redundancy.test[TURN_TEST + i]
+    h, test = mon.redundancy.config.sample_time_s, mon.redundancy.test[TURN_TEST + i]
     u = pred.u_old if mon.memory.substep == 0 else pred.u
     acc = pred.f[i]
     for s in range(u.size):
         acc += pred.G[i, s] * u[s]
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
-    angle = mon.config.rate_gain * test.residual
+    turn = mon.config.rate_gain * test.residual
     if not mon.memory.replaced[i] and mon.config.rate_gain < 1.0:
-        angle = c.sample_time_s * FILTER_POLES_PER_S[RATE_POLE] * test.r[RATE_POLE]
+        turn = h * FILTER_POLES_PER_S[RATE_POLE] * test.r[RATE_POLE]
     mon.memory.replaced[i] = 1
-    rate = M.y_past[i] + angle / c.sample_time_s
-    return rate + c.sample_time_s * acc
+    return mon.redundancy.memory.y_past[i] + turn / h + h * acc

@@ -1,24 +1,16 @@
 """What the margins are worked out from, and how they are shown; to the number, at one flight condition."""
 
 from dataclasses import asdict
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc.control.readout import Schedule
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import y_places
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.readout import FrameReadout
-from beaver_ftc.plant.conditions import trimmed
-from beaver_ftc.plant.linear import differences
-from beaver_ftc.studies import handling, linearise, margins
+from beaver_ftc.studies import margins
 from beaver_ftc.studies.margins import (
     LawGains,
     Margin,
     OpenLoop,
-    allocation,
     as_document,
     as_text,
     at,
@@ -27,10 +19,8 @@ from beaver_ftc.studies.margins import (
     interpolated,
     law_response,
     loops,
-    open_loop,
     outputs,
     sensors,
-    study,
 )
 from flying import scenario
 
@@ -38,32 +28,10 @@ REAL = {"control": {"law": "fault-tolerant"}, "sensors": "tactical-grade", "actu
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 
 
-@pytest.mark.parametrize("given", [{}, {"substeps": 2, **REAL}], ids=["ideal", "real"])
-def test_the_loop_of_a_scenario(given, changed):
-    flown = scenario(**{"control": {"law": "fault-tolerant"}, "uncertainty": {}, **given})
-    frame = Loop(flown).frames[0]
-    linear = differences(*trimmed(flown))
-    y = (frame["truth"]["value"] * frame["truth"]["factor"])[y_places(frame)]
-    for fault, effectiveness in ("none", np.ones(4)), ("lost", np.array([1.0, 0.1, 1.0, 1.0])):
-        loop, law = open_loop(flown, FrameReadout(frame), linear, y, effectiveness)
-        assert not changed({"loop": asdict(loop), "law": asdict(law)}, fault)
-        found = loops(loop, law, np.array([0.3, 3.0, 30.0]))
-        assert not changed([found.real, found.imag], f"{fault}-response")
-
-
 def test_the_margins_at_a_flight_condition(changed, monkeypatch):
     monkeypatch.setattr(margins, "N_FREQUENCIES", 60)
     found = list(at(scenario(**REAL, uncertainty={})))
     assert not changed([list(asdict(each).values()) for each in found])
-
-
-def test_over_the_envelope(monkeypatch):
-    seen = []
-    monkeypatch.setattr(margins, "at", lambda flown: seen.append(flown.initial.airspeed_mps) or [len(seen)])
-    assert study(scenario(control={"law": "fault-tolerant"})) == [1, 2, 3, 4, 5]
-    assert seen == pytest.approx(np.linspace(*scenario().airframe.envelope.airspeed_mps, 5))
-    with pytest.raises(BadInput, match=r"control\.law: nominal: margins are known of the default law's loop"):
-        study(scenario(control={"law": "nominal"}))
 
 
 def coupled(rng):
@@ -119,28 +87,6 @@ def test_a_loop_is_broken_at_one_surface_with_the_others_closed():
         assert 1.0 / inverse[s, s] == pytest.approx(1.0 - margins._others_closed(around, s))
     assert found.shape == (3, 4)
     assert np.abs(found).min() > 1e-4
-
-
-def test_commands_do_what_is_demanded():
-    rng = np.random.default_rng(2)
-    G = rng.normal(size=(3, 4))
-    G[1, [0, 2]] = 0.0
-    main = np.array([0, 1, 2])
-    sides = np.ix_([0, 2], [0, 2])
-    commands = allocation(G, main, -1, 0.7)
-    np.testing.assert_allclose((G[:, main] @ commands[main])[sides], np.eye(2), atol=1e-12)
-    assert commands[1, 1] == pytest.approx(1 / G[1, 1])
-    assert not commands[3].any()
-    shared = allocation(G, main, 3, 0.25)
-    assert (shared[1, 1], shared[3, 1]) == pytest.approx((0.75 / G[1, 1], 0.25 / G[1, 3]))
-    assert G[1] @ shared[:, 1] == pytest.approx(1.0)
-    np.testing.assert_allclose(shared[:, [0, 2]], commands[:, [0, 2]])
-    whole = allocation(G, main, 3, 1.0)
-    assert whole[1].tolist() == [0, 0, 0]
-    G[:, 2] = 0.0  # no rudder: each axis by itself
-    alone = allocation(G, main, 3, 0.0)
-    assert (alone[0, 0], alone[2].tolist()) == (pytest.approx(1 / G[0, 0]), [0, 0, 0])
-    assert (np.count_nonzero(alone), alone[3].any()) == (2, False)
 
 
 def test_the_schedule_between_its_points_and_handed_over():
@@ -212,66 +158,3 @@ def test_the_margins_as_they_are_shown(changed):
 )
 def test_a_margin_keeps_what_is_asked_up_to_the_bound(up_db, down_db, phase_deg, keeps):
     assert Margin(40.0, "none", "flap", up_db, down_db, phase_deg).keeps(6.0, 45.0) is keeps
-
-
-def test_linearise_asks_for_the_margins_that_the_scenario_declares(monkeypatch):
-    """A loop that keeps 6 dB and 45 deg, but not the 45 dB and 6 deg of a mistaken order."""
-    found = Margin(50.0, "healthy", "elevator", up_db=7.0, down_db=8.0, phase_deg=46.0)
-    monkeypatch.setattr(margins, "study", lambda scenario: [found])
-    monkeypatch.setattr(handling, "over_airspeeds", lambda scenario: [])
-    declared = scenario(control={"gain_margin_db": 6.0, "phase_margin_deg": 45.0})
-    monkeypatch.setattr(linearise, "load", lambda name: declared)
-    document = linearise.Linearise("any").run(None)
-    assert (document["gain_margin_db"], document["phase_margin_deg"]) == (6.0, 45.0)
-    assert [row["keeps"] for row in document["margins"]] == [True]
-
-
-def test_linearise_as_text_has_the_numbers_of_its_document(monkeypatch):
-    """What has no end is null in the document, and never in the text."""
-    rows = [
-        {"airspeed_mps": 30.0, "fault": "none", "surface": "flap", "up_db": None, "down_db": 5.5,
-         "phase_deg": 61.25, "keeps": False},
-        {"airspeed_mps": 42.0, "fault": "none", "surface": "flap", "up_db": 7.25, "down_db": None,
-         "phase_deg": 58.5, "keeps": True},
-    ]  # fmt: skip
-    modes = [{"where": "trimmed", "airspeed_mps": 30.0, "mode": "spiral", "quantity": "time to double",
-              "value": None, "level": 1}]  # fmt: skip
-    shown = []
-    monkeypatch.setattr(handling, "as_text", lambda found: shown.append(found) or "the modes")
-    document = {"margins": rows, "handling": modes, "gain_margin_db": 6.0, "phase_margin_deg": 45.0}
-    text = linearise.Linearise("any").as_text(document, colour=False)
-    *table, empty, modes_of = text.splitlines()
-    assert (empty, modes_of) == ("", "the modes")
-    assert table[1].split() == ["none", "flap", "7.2", "5.5", "58.5", "42"]
-    assert table[-1] == "2 loops, 1 with less than 6 dB or 45 deg"
-    assert shown == [[handling.Quality("trimmed", 30.0, "spiral", "time to double", np.inf, 1)]]
-
-
-def test_of_a_surface_that_hardly_moves_there_is_no_loop(monkeypatch):
-    """Of each fault and surface whose loop comes to more than a thousandth, with its own margins."""
-    asked = []
-    small = np.array([[0.2, -1e-3, 0.5, 1.1e-3], [-3.0, 5e-4, 0.1, 0.0]])
-    frame = SimpleNamespace(true_signals="signals", control=SimpleNamespace(main="main"))
-    monkeypatch.setattr(margins, "trimmed", lambda of: ("plant", "point"))
-    monkeypatch.setattr(margins, "differences", lambda plant, point: (plant, point))
-    monkeypatch.setattr(margins, "Loop", lambda of: SimpleNamespace(frames=["frame"]))
-    monkeypatch.setattr(margins, "FrameReadout", lambda of: frame)
-    monkeypatch.setattr(margins, "cases", lambda main, surfaces: [("none", "all"), ("given up", "few")])
-    monkeypatch.setattr(margins, "open_loop", lambda *given: asked.append(given[1:]) or ("loop", "law"))
-    monkeypatch.setattr(margins, "loops", lambda loop, law, omega: small * (1.0 if len(asked) == 1 else 0.01))
-    monkeypatch.setattr(margins, "margins", lambda L: (L[0], L[1], len(L)))
-    flown = scenario(initial={"airspeed_mps": 41.0}, rate_hz=50)
-    found = [tuple(asdict(each).values()) for each in at(flown)]
-    assert [row[:3] for row in found] == [
-        (41.0, "none", "aileron"), (41.0, "none", "rudder"), (41.0, "none", "flap"),
-        (41.0, "given up", "aileron"), (41.0, "given up", "rudder"),
-    ]  # fmt: skip
-    expected = [
-        (0.2, -3.0, 2.0),
-        (0.5, 0.1, 2.0),
-        (1.1e-3, 0.0, 2.0),
-        (0.002, -0.03, 2.0),
-        (0.005, 0.001, 2.0),
-    ]
-    assert [row[3:] for row in found] == [pytest.approx(of) for of in expected]
-    assert asked == [(frame, ("plant", "point"), "signals", left) for left in ("all", "few")]

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plugins import DETECTORS, LAWS
-from beaver_ftc.studies.compare import gain, tune
+from beaver_ftc.studies.compare import gain
 from beaver_ftc.studies.compare.criteria import flights
 from beaver_ftc.studies.compare.gain import JUDGED, gain_of, relative_gain
-from beaver_ftc.studies.compare.search import Found
 from beaver_ftc.studies.compare.trial import CALIBRATION, of_set, set_names
-from beaver_ftc.studies.compare.tune import Method, as_text
 
 
 @pytest.mark.parametrize(
@@ -72,19 +70,3 @@ def test_both_settings_fly_the_draws_after_the_one_that_tunes(monkeypatch, group
     assert found["gain_low"] <= found["gain"] <= found["gain_high"]
     given = [("exact", None, draw) for draw in range(4, 4 + JUDGED)]
     assert group == DETECTORS or made == given
-
-
-@pytest.mark.parametrize(("cost", "measured"), [(0.9, True), (tune.INADMISSIBLE, False)])
-def test_the_gain_is_measured_on_a_draw_of_its_own_alone(monkeypatch, cost, measured):
-    method = Method(DETECTORS, "observer-constant", "exact")
-    monkeypatch.setattr(tune, "search", lambda *_: Found({"pole_per_s": 3.0}, cost, 1e9, {}, 5))
-    found = dict.fromkeys(("built_in", "retuned", "gain", "gain_low", "gain_high", "flights"), 0.25)
-    monkeypatch.setattr(
-        tune, "gain_of", lambda group, name, grade, settings, draw: found | {"given": settings}
-    )
-    row = tune.tune_method(method, tune.Search(5, 1, 0, most=1, draw=2))
-    assert ("gain" in row) == measured
-    assert not measured or row["given"] == (method.start(), {"pole_per_s": 3.0})
-    assert "gain" not in tune.tune_method(method, tune.Search(5, 1, 0, most=1))
-    text = as_text({"trials": 5, "seed": 1, "restarts": 0, "draw": 2, "methods": [row]})
-    assert ("25.0" in text) == measured

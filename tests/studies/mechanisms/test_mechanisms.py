@@ -2,7 +2,6 @@
 
 import csv
 import json
-from math import inf
 
 import numpy as np
 import pytest
@@ -11,14 +10,11 @@ from typer.testing import CliRunner
 
 import needs
 from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.mechanisms import command, effects, shown, survey
 from beaver_ftc.studies.mechanisms.effects import CRITERIA, document_of, effect_of, net
 from beaver_ftc.studies.mechanisms.shown import finding, sentences
@@ -236,23 +232,6 @@ def test_a_false_alarm_of_a_worst_case_detector_wants_a_reason(few_cells, reason
     assert sum(row["unexplained"] for row in document["false_alarms"] if row["worst_case"]) == (not passed)
 
 
-@pytest.mark.parametrize("key", [DEFAULT, PAPER, "with default: statistical detector"])
-def test_false_alarms_are_counted_by_their_reasons(key):
-    """Of worst-case detectors: one within the declaration, or without the certificate that the scheme has. Of
-    the statistical one: only within the declaration. What raises no alarm has no reason that counts."""
-    reasons = [(3, True), (0, True), (2, False), (0, False), (4, None), (0, None)]
-    rows = [
-        {key: outcome(false_alarm=True, reason={"undeclared": beyond, "certified": proved})}
-        for beyond, proved in reasons
-    ]
-    rows += [{key: outcome(reason={"undeclared": 0, "certified": False})}] * 3
-    worst_case = "statistical" not in key
-    assert effects._alarms_of(key, rows) == {
-        "flown": key, "worst_case": worst_case, "count": 6, "undeclared": 3, "certified": 2,
-        "certifiable": 4, "unexplained": 4 if worst_case else 3,
-    }  # fmt: skip
-
-
 def test_findings_in_sentences(few_cells):
     document = document_of(1, 1, rows_of({"undeclared": 3, "certified": True}), [])
     first, *said, last = sentences(document)
@@ -339,51 +318,6 @@ MADE = {
 NAMES = ("network (published)", "memory (default)")
 
 
-def test_each_table_has_its_own_numbers():
-    systems, nets, same, medians, alarms = shown.tables(MADE)
-    assert systems == (("quantity", "published", "95 % interval", "default", "95 % interval"), [
-        ("flights", "12", "", "11", ""), ("false alarms, %", "25", "6 to 57", "0", "0 to 26"),
-        ("detected, %", "75", "43 to 95", "90", "56 to 99"),
-        ("named rightly, %", "50", "21 to 79", "80", "44 to 97"),
-        ("aircraft lost, %", "8", "0 to 38", "10", "1 to 44"),
-        ("error, deg/s", "0.314", "0.211 to never", "never", "0.251 to never"),
-    ])  # fmt: skip
-    assert nets[0] == (
-        "mechanism", "false alarms, points", "95 % interval", "late alarms, points", "95 % interval",
-        "lost names, points", "95 % interval", "worse tracking, points", "95 % interval",
-    )  # fmt: skip
-    assert nets[1][0] == (
-        NAMES[0], "+25.0", "+10.1 to +42.0", "-8.3", "-21.0 to -1.1", "0.0", "-20.0 to +30.0", "+50.0",
-        "-7.0 to +61.0",
-    )  # fmt: skip
-    assert [row[0] for row in nets[1]] == [*NAMES]
-    assert same[1] == [(NAMES[0], "12", "9", "5"), (NAMES[1], "11", "11", "11")]
-    assert medians[1] == [
-        (NAMES[0], "0.05", "0.11", "0.22", "never", "1.75", "1.25 to never"),
-        (NAMES[1], "0.03", "0.04", "0.6", "0.7", "1", "1 to 1"),
-    ]
-    assert alarms[1] == [
-        ("published", "all", "7", "6", "-", "1"),
-        ("default", "without memory", "5", "4", "3", "2"),
-        ("default", "with statistical detector", "9", "8", "2", "-"),
-        ("default", "all", "0", "0", "0", "0"),
-    ]
-    assert shown.margin_rows(MADE) == [
-        ("published", "low", "exact sensors", "none", "61.7"),
-        ("default", "high", "real sensors", "6.25", "none"),
-    ]
-
-
-def test_a_level_of_a_factor_has_two_columns():
-    head = ("mechanism", "error 0 %", "95 % interval", "error 0.5 %", "95 % interval")
-    assert shown.level_head(MADE, "error") == head
-    assert shown.level_head(MADE, "bandwidth")[1::2] == ("low", "high")
-    assert shown.level_rows(MADE, "error", "names", LAW) == [
-        (NAMES[0], "+10.0", "+5.0 to +20.0", "-30.0", "-40.0 to -25.0")
-    ]
-    assert [row[0] for row in shown.level_rows(MADE, "error", "names", "diagnosis")] == [NAMES[1]]
-
-
 def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, changed):
     """Of what is worst-case alone; what is beyond chance on either side."""
     said = [*sentences(MADE)]
@@ -422,44 +356,6 @@ def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, c
     assert order == sorted(order)
 
 
-def test_what_a_mechanism_does_is_told_by_level_and_in_all(monkeypatch):
-    """Each level of a factor has the pairs of its own cases."""
-    factors = {"fault": ("loss 40 %",), "bandwidth": ("low", "high"), "error": (0.0, 0.02),
-               "instruments": ("exact sensors",)}  # fmt: skip
-    for module in (survey, effects):
-        monkeypatch.setattr(module, "FACTORS", factors)
-    keys = {f(mechanism) for mechanism in MECHANISMS for f in (with_key, without_key)}
-    rows = [{key: outcome() for key in sorted(keys)} for _ in effects.cases_of(3)]
-    first = MECHANISMS[0]
-    for case, row in zip(effects.cases_of(3), rows, strict=True):
-        changed = {"named": not (case.bandwidth == "high" and case.run < 2), "failed": case.run == 2}
-        row[without_key(first)] = outcome(**changed)
-    for row, delay_s in zip(rows, (None, 0.1, 0.2, 0.3), strict=False):
-        row[PAPER] = outcome(delay_s=delay_s, named=False, tracking_deg_s=delay_s, false_alarm=delay_s == 0.1,
-                             reason={"undeclared": 1, "certified": None})  # fmt: skip
-    found = document_of(6, 3, rows, [{"m": 1}])
-    whole = found["mechanisms"][0]
-    assert (whole["system"], whole["mechanism"], whole["serves"]) == (PAPER, first.name, first.serves)
-    assert (whole["flights"], whole["failed"]) == (8, 4)
-    by = {level: whole["by"]["bandwidth"][level] for level in ("low", "high")}
-    assert [(by[level]["flights"], by[level]["names"]["worse"]) for level in by] == [(4, 0), (4, 4)]
-    assert [by[level]["names"]["better"] for level in by] == [3, 0]  # those that have no name with it
-    assert [whole["by"]["error"][level]["flights"] for level in ("0.0", "0.02")] == [4, 4]
-    paper, default = (found["systems"][name] for name in (PAPER, DEFAULT))
-    counted = ("false_alarms", "detected", "named", "lost")
-    assert [paper[name]["count"] for name in counted] == [1, 11, 8, 1]
-    assert [default[name]["count"] for name in counted] == [0, 12, 12, 0]
-    assert (paper["flights"], paper["tracking_deg_s"]["value"]) == (12, 0.2)
-    assert paper["detected"]["value"] == pytest.approx(11 / 12)
-    told = {
-        key: found[key] for key in ("seed", "draws", "confidence", "factors", "late_s", "worse", "margins")
-    }
-    assert told == {
-        "seed": 6, "draws": 12, "confidence": 0.95, "factors": {name: [*of] for name, of in factors.items()},
-        "late_s": 0.1, "worse": 1.1, "margins": [{"m": 1}],
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("with_it", "without", "ratio"), [(0.2, 0.3, 1.5), (None, 0.3, 0.0), (0.2, None, None), (None, None, 1.0)]
 )
@@ -475,97 +371,6 @@ def test_delays_are_compared_where_no_alarm_is_false():
     assert (found["flights"], found["with"]["value"], found["without"]["value"]) == (4, 0.05, 0.05)
     assert effect_of(pairs)["late"]["worse"] == 2
     assert effect_of(pairs)["tracking_deg_s"]["flights"] == 6
-
-
-def test_an_outcome_is_of_what_was_measured(monkeypatch):
-    """The error of all axes; of a false alarm its reason; of a flight that fails its own words."""
-    document = {
-        "false_alarm": True, "fault": {"at_s": 7.0}, "departure": None,
-        "detection": {"time_s": 7.25, "delay_s": 0.25},
-        "isolation": {"fault": "rudder", "time_s": 7.5, "correct": False},
-        "tracking": {"post_fault_rms_deg_s": {"p": 0.2, "q": 0.3, "r": 0.6}},
-    }  # fmt: skip
-    flown = []
-    monkeypatch.setattr(survey, "fly", lambda scenario, watch: flown.append((scenario, watch)))
-    monkeypatch.setattr(survey, "measure", lambda landing: Metrics.of(document))
-    monkeypatch.setattr(survey, "reason_of", lambda scenario: f"reason of {scenario}")
-    found = outcome_of("the flight")
-    assert found == {
-        "failed": False, "false_alarm": True, "delay_s": None, "named": False,
-        "tracking_deg_s": pytest.approx(0.7), "verdict": [7.25, "rudder", 7.5],
-        "reason": "reason of the flight",
-    }  # fmt: skip
-    document |= {"false_alarm": False, "departure": {"time_s": 9.0, "signal": "alpha_rad"}}
-    document["isolation"]["correct"] = True
-    found = outcome_of("the flight", "verdict")
-    assert (found["delay_s"], found["named"], found["tracking_deg_s"], found["reason"]) == (
-        0.25, True, None, None
-    )  # fmt: skip
-    assert [watch is None for _, watch in flown] == [True, False]
-
-    def broken(*_, **__):
-        raise SimulationFailed("it broke")
-
-    monkeypatch.setattr(survey, "fly", broken)
-    assert outcome_of("the flight") == {
-        "failed": True, "false_alarm": False, "delay_s": None, "named": False, "tracking_deg_s": None,
-        "verdict": None, "reason": None, "error": "it broke",
-    }  # fmt: skip
-
-
-def test_a_row_of_margins_has_the_least_of_a_healthy_loop(monkeypatch):
-    asked = []
-
-    def margins_of(flown):
-        asked.append(flown)
-        return [Margin(38.0, "none", "rudder", 9.0, 7.5, 61.0), Margin(52.0, "none", "flap", 8.0, inf, 57.0)]
-
-    monkeypatch.setattr(survey, "margins_of", margins_of)
-    assert survey.margins_row((PAPER, "high", "real sensors")) == {
-        "system": PAPER, "bandwidth": "high", "instruments": "real sensors", "gain_margin_db": 7.5,
-        "phase_margin_deg": 57.0,
-    }  # fmt: skip
-    (flown,) = asked
-    assert (flown.control.law, flown.control.proportional_per_s) == ("zhang2005", 14.0)
-    assert flown.control.integral_per_s2 == pytest.approx(49.0)
-    assert not flown.sensors.is_ideal
-    assert list(survey.margin_cells()) == [
-        (system, bandwidth, instruments) for system in (PAPER, DEFAULT)
-        for bandwidth in ("low", "medium", "high") for instruments in ("exact sensors", "real sensors")
-    ]  # fmt: skip
-
-
-def test_a_draw_has_the_fault_the_instruments_and_the_bandwidth_of_its_cell():
-    """Losses take turns over the surfaces; the default law's bandwidth follows from a gain margin."""
-    cell = Flight("loss 20 %", "medium", 0.0, "real sensors, light turbulence", 0)
-    flown = [scenario_of(cell._replace(run=run), 7, DEFAULT) for run in range(6)]
-    assert [of.faults[0].actuator for of in flown] == ["aileron", "elevator", "rudder"] * 2
-    assert {of.faults[0].magnitude for of in flown} == {0.2}
-    assert {of.control.gain_margin_db for of in flown} == {12.0}
-    for of in flown:
-        assert 6.0 <= of.faults[0].at_s <= 9.0
-        assert of.duration_s == pytest.approx(of.faults[0].at_s + 8.0)
-        assert 38.0 <= of.initial.airspeed_mps <= 52.0
-        assert (of.environment.severity, of.fdi.bounds.turbulence) == ("light", "light")
-        assert (of.fdi.bounds.constant_rad_s2.q, of.fdi.bounds.inertia_coupling.r) == (0.002, 0.0)
-        for axis, hz in (("p", 0.25), ("q", 0.2), ("r", 0.15)):
-            (signal,) = getattr(of.reference, axis)
-            assert (signal.sine.amplitude_deg_s, signal.sine.frequency_hz) == (3.0, hz)
-            assert 0.0 < getattr(of.uncertainty.sinusoid, axis).amplitude_rad_s2 <= 0.002
-            assert 1.0 <= getattr(of.uncertainty.sinusoid, axis).frequency_rad_s <= 15.0
-    phases = {getattr(of.reference, axis)[0].sine.phase_deg for of in flown for axis in "pqr"}
-    assert len(phases) == 18
-    assert min(phases) < -60.0
-    assert max(phases) > 60.0
-    lost = scenario_of(Flight("unanticipated", "low", 0.005, "exact sensors", 1), 7, PAPER)
-    assert (lost.fdi.bounds.constant_rad_s2.r, lost.fdi.bounds.inertia_coupling.p) == (0.02, 0.25)
-    thetas = [getattr(lost.uncertainty.inertia_coupling, axis) for axis in "pqr"]
-    assert 0.01 < max(map(abs, thetas)) <= 0.25
-    assert (lost.faults[0].type, lost.faults[0].Cm_alpha3) == ("unanticipated", 10.0)
-    assert {round(abs(ratio - 1.0), 9) for ratio in lost.uncertainty.coefficients.values()} == {0.005}
-    assert {ratio > 1.0 for ratio in lost.uncertainty.coefficients.values()} == {True, False}
-    assert survey.surface_of(Flight("unanticipated", "low", 0.0, "exact sensors", 1)) == "-"
-    assert len(survey.cases_of(3)) == 4 * 3 * 4 * 3 * 3
 
 
 @needs.service("proof")

@@ -218,18 +218,6 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
         assert len(list(csv.DictReader(file))) == 12
 
 
-def test_a_flight_is_told_how_far_it_has_come(monkeypatch, tmp_path):
-    def fly(of, log, progress):
-        progress(0.25)
-        raise BadInput("enough")
-
-    told = []
-    monkeypatch.setattr(study, "fly", fly)
-    with pytest.raises(BadInput, match="enough"):
-        study.run_mismatch(scenario(), tmp_path, progress=told.append)
-    assert told == [0.25]
-
-
 def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
     def refuses(case):
         raise BadInput("no trim")
@@ -240,25 +228,3 @@ def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
     entries = study.run_map(tmp_path, scenario(), report=False)
     assert [entry["worst_ratio"] for entry in entries] == [None] * 3
     assert charts.map_figure(entries, "x") is not None
-
-
-def test_a_cell_of_the_map_is_flown_there_without_the_faults(monkeypatch):
-    """A row of each axis, which has what was found of it."""
-    flown, case = [], scenario(faults=[loss()])
-    bound = {"p": (0.5, 0.01), "q": (1.25, 0.03), "r": (0.75, 0.07)}
-    found = {
-        "bound": {a: {"worst_ratio": w, "smallest_constant_rad_s2": c} for a, (w, c) in bound.items()},
-        "false_alarm": True,
-    }
-    monkeypatch.setattr(study, "tally_of_flight", lambda of: flown.append(of) or ("kept", "flight"))
-    monkeypatch.setattr(study, "document", lambda of, *kept: found | {"of": (of, *kept)})
-    monkeypatch.setattr(charts, "largest_sources", lambda of, axis: [f"first of {axis}", "second"])
-    rows = study._cell(case, (41.5, 1750.0))
-    (there,) = flown
-    assert (there.initial.airspeed_mps, there.initial.altitude_m, there.faults) == (41.5, 1750.0, ())
-    assert there.reference == case.reference
-    for row, axis in zip(rows, "pqr", strict=True):
-        assert row == {
-            "airspeed_mps": 41.5, "altitude_m": 1750.0, "axis": axis, "worst_ratio": bound[axis][0],
-            "smallest_constant_rad_s2": bound[axis][1], "dominant": f"first of {axis}", "false_alarm": True,
-        }  # fmt: skip

@@ -1,10 +1,8 @@
 """Subset simulation: known normal tails, their intervals, what it says when it cannot, and flights."""
 
-import contextlib
 import json
 import math
 from statistics import NormalDist
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ import yaml
 from tools.drawn.rare import ANALYTIC, EXPECTATION, FAR, NEAR, repeated
 from tools.drawn.rare import SWEEP as BIASED
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
@@ -192,21 +190,6 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     assert len(flown) == whole["flights"] - 12
 
 
-def test_flights_that_fail_are_counted_over_all_rounds(drift, tmp_path, monkeypatch):
-    """Every tenth flight of the first round, every seventh of the others."""
-    monkeypatch.setattr(Chains.__init__, "__defaults__", (2, 10))
-    failed, first = [], 2 * 10
-
-    def flown(sweep, name, case):
-        failed.append(case[0] % (10 if case[0] < first else 7) == 0)
-        return {"score": -math.inf if failed[-1] else case[1][0] - 3.0, "failed": failed[-1]}
-
-    monkeypatch.setattr(rare, "_fly", flown)
-    document = run_rare(drift, "no_departure", tmp_path)
-    assert document["flights"] == len(failed) > first
-    assert document["failed"] == sum(failed) > sum(failed[:first]) > 0
-
-
 def test_the_likeliest_values_are_said_with_four_digits():
     part = {"low": 0.0123, "high": 0.0456, "events": 2, "of": 90}
     document = part | {
@@ -302,106 +285,3 @@ def test_rounds_are_flown_once(tmp_path):
         assert fly_round(1, [3]) == [{"x": 3}]
     assert flown == [1, 2, 3]
     assert list(tmp_path.iterdir()) == []
-
-
-NEVER_CAME = {"expected": 0.5, "actual": None}
-
-
-@pytest.mark.parametrize(
-    ("expectation", "of", "score"),
-    [
-        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 9.0}, -0.25),
-        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 15.0}, 0.25),
-        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 12.0}, -1e-12),
-        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 11.9}, 0.0),
-        ("heading_within_deg", {"passed": False, "expected": 2.0, "actual": -5.0}, 1.5),
-        ("detected_within_s", {"passed": False, "expected": 0.0, "actual": 0.75}, 0.75),
-        ("detected_within_s", {"passed": False, **NEVER_CAME}, 3.0),  # 5 s of flight, the fault at 2 s
-        ("no_false_alarm", {"passed": True, "expected": True, "actual": True}, -0.375),
-        ("no_false_alarm", {"passed": False, "expected": True, "actual": False}, 0.0),
-        ("no_departure", {"passed": True, "expected": True, "actual": True}, -0.4),
-        ("no_departure", {"passed": False, "expected": True, "actual": False}, 0.0),
-    ],
-)
-def test_a_score_is_how_near_a_number_came_to_its_limit(monkeypatch, expectation, of, score):
-    """As a share of the limit; of the largest of rates and angles beside what ends a flight."""
-    asked = []
-    limits = {"p_rad_s": 2.0, "alpha_rad": 0.5}
-
-    def fly(scenario, log):
-        asked.append(log)
-        if log is not None:
-            log |= {"p_rad_s": np.array([0.4, -1.0, 0.9]), "alpha_rad": np.array([-0.3, 0.1, 0.2])}
-        return SimpleNamespace(frames=250, worst_residual_ratio=0.625)
-
-    found = [SimpleNamespace(name="other", passed=not of["passed"], expected=1.0, actual=77.0)]
-    found.append(SimpleNamespace(name=expectation, **of))
-    amounts = SimpleNamespace(expectations=found, fault=SimpleNamespace(at_s=2.0))
-    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fly)
-    monkeypatch.setattr("beaver_ftc.plant.sensing.DEPARTURE_LIMITS", limits)
-    monkeypatch.setattr(rare, "measure", lambda flight: amounts)
-    scenario = SimpleNamespace(rate_hz=50.0)
-    assert rare.score_of(scenario, expectation) == pytest.approx(score, abs=1e-15)
-    assert [log is not None for log in asked] == [expectation == "no_departure"]
-    if of.get("actual") is None:
-        amounts.fault = None
-        assert rare.score_of(scenario, expectation) == 5.0
-
-
-def test_a_flight_that_cannot_be_flown_is_no_event(biased, monkeypatch):
-    def broken(scenario, expectation):
-        raise SimulationFailed("it broke")
-
-    flown = []
-    monkeypatch.setattr(rare, "score_of", lambda *given: flown.append(given) or 0.25)
-    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, -1.0])) == {"score": 0.25, "failed": False}
-    assert flown == [(rare.scenario_at(biased, 7, [0.5, 0.0, -1.0]), EXPECTATION)]
-    monkeypatch.setattr(rare, "score_of", broken)
-    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, 0.0])) == {"score": -math.inf, "failed": True}
-
-
-@pytest.mark.parametrize("flown_first", [True, False])
-def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
-    biased, tmp_path, monkeypatch, flown_first, capsys
-):
-    """Two flights of which one fails, then one that is flown: as many failures as flights of this round."""
-
-    def flies(number, cases):
-        assert cases == [[(0, [1.0]), (1, [2.0])], [(0, [3.0])]][number]
-        failed = [number == 0, number == 0 and not flown_first]
-        return [{"failed": of, "score": -1.0 - i} for i, of in zip(range(len(cases)), failed, strict=False)]
-
-    def go(chains, fly):
-        scores = [fly(0, np.array([[1.0], [2.0]])), fly(1, np.array([[3.0]]))]
-        assert [of.tolist() for of in scores] == [[-1.0, -2.0], [-1.0]]
-
-    monkeypatch.setattr(Chains, "go", go)
-    asked = []
-    monkeypatch.setattr(rare, "in_rounds", lambda *of: asked.append(of) or contextlib.nullcontext(flies))
-    monkeypatch.setattr(rare, "_document", lambda sweep, expectation, chains, failed: {"failed": failed})
-    told = []
-    if not flown_first:
-        with pytest.raises(SimulationFailed, match="no flight could be flown"):
-            run_rare(biased, EXPECTATION, tmp_path, tell=told.append)
-        assert told == []
-        return
-    assert run_rare(biased, EXPECTATION, tmp_path, tell=told.append)["failed"] == 1
-    assert [line.partition(": ")[2] for line in told] == ["2 flights, level 0", "1 flights, level 0"]
-    ((of, out, workers),) = asked
-    assert (out, workers, of.follows_from[1:]) == (tmp_path, 1, [rare.RUNS, rare.MEMBERS])
-    assert of.lost(None, "was killed") == {"score": -math.inf, "failed": True}
-    assert "of a flight was killed; such flights count as no event" in capsys.readouterr().err
-
-
-def test_the_design_point_is_the_nearest_event_by_the_number_of_its_flight():
-    """Of three rounds of three flights: the nearest to the middle of those whose score is not below zero."""
-    chains = Chains(2, 1)
-    rounds = [
-        ([[0.1, 0.0], [3.0, 4.0], [5.0, 6.0]], [-0.1, 0.0, 2.0], (5.0, 1, [3.0, 4.0])),
-        ([[3.0, 4.1], [0.0, 0.2], [4.0, -0.5]], [1.0, -0.2, 0.0], (16.25**0.5, 5, [4.0, -0.5])),
-        ([[5.0, 5.0], [4.0, 0.5], [0.0, 0.0]], [1.0, 1.0, -3.0], (16.25**0.5, 5, [4.0, -0.5])),
-    ]
-    for points, scores, (distance, flight, point) in rounds:
-        chains._flown(lambda number, flat, scores=scores: np.array(scores), np.array(points))
-        assert chains.design[:2] == pytest.approx((distance, flight))
-        assert chains.design[2].tolist() == point

@@ -3,7 +3,7 @@
 import json
 import re
 from dataclasses import replace
-from math import comb, isclose
+from math import isclose
 
 import numpy as np
 import pytest
@@ -23,7 +23,6 @@ from beaver_ftc.studies.decay.survey import (
     Flight,
     cases_of,
     document_of,
-    median,
     row_of,
     run_decay,
     scenario_of,
@@ -120,18 +119,6 @@ def test_what_a_flight_counts_for():
     )
     assert wrong["delay_s"] is None
     assert row_of(None)["failed"]
-
-
-@pytest.mark.parametrize("n", [5, 6, 20])
-def test_the_interval_of_a_median_is_that_of_the_sign_test(n):
-    """The r-th smallest is below the median with at least 97.5 %: counted by binomial coefficients."""
-    rows = [{"x": float(value)} for value in np.random.default_rng(n).permutation(n)]
-    found = median(rows, "x")
-    tail = [sum(comb(n, k) for k in range(r + 1)) / 2**n for r in range(n)]
-    low = max((r for r in range(n) if tail[r] <= 0.025), default=None)
-    assert found["low"] == (None if low is None else float(low))
-    assert found["high"] == (None if low is None else float(n - 1 - low))
-    assert median([*rows, *[{"x": None}] * (n + 1)], "x")["value"] is None
 
 
 def test_a_document_and_its_files(tmp_path):

@@ -351,7 +351,7 @@ def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, c
             assert ends[:, 0] == pytest.approx([100 * found["low"], 100 * found["high"]])
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == [*NAMES]
     (tmp_path / "mechanisms.png").write_bytes(b"a picture")
-    page = shown.page_of(MADE, tmp_path)
+    page = shown.FILES["mechanisms.html"](MADE)(tmp_path)
     order = [page.index(part) for part in (said[1], said[3], "<img", *shown.CAPTIONS[2:], "61.7", "ours 1")]
     assert order == sorted(order)
 

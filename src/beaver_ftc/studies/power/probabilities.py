@@ -47,7 +47,7 @@ def level_at(healthy: Sequence[Trace], level: float) -> Level:
     return Level(level, *alarms_at(healthy, level))
 
 
-Row = dict[str, Any]
+Row = Document
 Key = tuple[str, str, str]  # sensors, turbulence, scheme
 
 

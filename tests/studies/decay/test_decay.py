@@ -1,16 +1,13 @@
 """`decay`: which truths are flown, what a flight counts for, and what the document says of them."""
 
-import json
 import re
 from dataclasses import replace
 from math import isclose
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import beaver_ftc as bf
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
@@ -119,25 +116,6 @@ def test_what_a_flight_counts_for():
     )
     assert wrong["delay_s"] is None
     assert row_of(None)["failed"]
-
-
-def test_a_document_and_its_files(tmp_path):
-    (tmp_path / "short.yaml").write_text(json.dumps(SHORT))
-    line = ["decay", str(tmp_path / "short.yaml"), "--flights", "2", "--workers", "1", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, [*line, "--format", "json"])
-    assert done.exit_code == 0, done.output
-    document = json.loads(done.stdout)
-    assert [(row["error"], row["factor"]) for row in document["rows"]] == [
-        (name, factor) for name in (*KEYS, TOGETHER) for factor in FACTORS
-    ]
-    alarms = {
-        row["factor"]: row["false_alarm"]["count"] for row in document["rows"] if row["error"] == TOGETHER
-    }
-    assert (alarms[1.0], alarms[4.0]) == (0, 2)
-    folder = tmp_path / "short-decay"
-    assert {path.name for path in folder.iterdir()} == {
-        f"decay.{kind}" for kind in ("json", "csv", "png", "html")
-    }
 
 
 def test_what_the_rows_say():

@@ -14,26 +14,8 @@ import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import ray_workers, store, workers
-from beaver_ftc.studies.engine.store import Parts, RowsAsJson
+from beaver_ftc.studies.engine.store import RowsAsJson
 from beaver_ftc.studies.engine.workers import Batch, Case, LocalWorkers, Outcome, ThisProcess, Work
-
-
-def test_parts_are_files_of_their_batch(tmp_path):
-    parts = Parts(tmp_path / "parts", RowsAsJson(dict))
-    assert not parts
-    parts.folder.mkdir()
-    assert not parts
-    parts.land(7, [{"a": np.float64(1.5), "b": np.int64(2)}])
-    parts.land("healthy-3", [{"a": 1}, {"a": float("inf")}])
-    assert bool(parts)
-    assert sorted(path.name for path in parts.folder.iterdir()) == ["000007.json", "healthy-3.json"]
-    assert parts.landed(7, [0]) == [{"a": 1.5, "b": 2}]
-    assert parts.landed("healthy-3", [0, 1])[1] == {"a": float("inf")}
-    assert parts.landed(7, [0, 1]) is None  # not so many: set aside
-    assert parts.landed(7, [0]) is None
-    (parts.folder / "mine.txt").touch()
-    parts.remove()
-    assert {path.name for path in parts.folder.iterdir()} == {"mine.txt", "000007.json.damaged"}
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
@@ -55,17 +37,6 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
     store.remove_leftovers(tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["deep", "file", "z.partial"]
     assert os.listdir(tmp_path / "deep") == []
-
-
-def test_only_what_makes_rows_is_hashed():
-    rooms = {
-        path.relative_to(store.PACKAGE).parts[0]
-        for path in store.hashed_files()
-        if path.is_relative_to(store.PACKAGE)
-    }
-    assert {"diagnosis", "studies", "loop"} <= rooms
-    assert not rooms & {"cli", "live", "integrations"}
-    assert {path.suffix for path in store.hashed_files()} >= {".py", ".json", ".yaml", ".xml"}
 
 
 def double(case):
@@ -117,24 +88,6 @@ def hired(monkeypatch):
     monkeypatch.setattr(Hired, "errors", [])
     monkeypatch.setattr(workers, "_Worker", Hired)
     return Hired
-
-
-def test_local_workers_hand_back_rows_and_what_was_lost(hired):
-    local = LocalWorkers(Work(double), 2)
-    assert (local.slots, len(hired.all)) == (2, 2)
-    hired.errors[:] = [None, BrokenProcessPool()]
-    for number in (1, 2):
-        local.submit(Batch(number, CASES[:number]))
-    found = {outcome.task.number: outcome.rows for outcome in local.outcomes(1.0)}
-    assert found == {1: [{"run": 0, "is": 20}], 2: None}
-    assert len(hired.all) == 3  # the one that died is replaced
-    hired.errors[:] = [KeyError()]  # it had died while idle
-    local.submit(Batch(3, CASES))
-    assert local.outcomes(1.0) == [Outcome(Batch(3, CASES), None)]
-    local.submit(Batch(4, CASES))
-    local.close()
-    assert sum(worker.ended for worker in hired.all) == 2
-    assert local.outcomes(0.0)[0].rows == [double(case) for case in CASES]
 
 
 def test_a_failure_that_is_no_flights_ends_the_study(hired):

@@ -1,6 +1,5 @@
 """`mechanisms`: what is removed, what pairs amount to, and which false alarms have a reason."""
 
-import csv
 import json
 
 import numpy as np
@@ -13,9 +12,8 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.style import SERIES
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.mechanisms import command, effects, shown, survey
+from beaver_ftc.studies.mechanisms import command, effects, survey
 from beaver_ftc.studies.mechanisms.effects import CRITERIA, document_of, effect_of, net
 from beaver_ftc.studies.mechanisms.shown import finding, sentences
 from beaver_ftc.studies.mechanisms.survey import (
@@ -33,7 +31,6 @@ from beaver_ftc.studies.mechanisms.survey import (
     without_mechanism,
 )
 from beaver_ftc.studies.mechanisms.systems import DEFAULT, LAW, MECHANISMS, PAPER
-from kept import picture
 
 ELEVATOR = Flight("loss 80 %", "high", 0.0, "exact sensors", 1)
 EVERY = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.key)
@@ -252,108 +249,6 @@ def test_findings_in_sentences(few_cells):
     ends = "(published): without it {}, and no criterion changes beyond chance."
     assert finding(plain).endswith(ends.format("no verdict differs"))
     assert finding(plain | {"same_verdict": 1}).endswith(ends.format("1 of 2 verdicts differ"))
-
-
-def rate(value, low, high, **more):
-    return {"value": value, "low": low, "high": high} | more
-
-
-MADE = {
-    "seed": 3, "draws": 12, "factors": {"error": [0.0, 0.005], "bandwidth": ["low", "high"]},
-    "systems": {
-        PAPER: {
-            "flights": 12, "false_alarms": rate(0.25, 0.055, 0.572), "detected": rate(0.75, 0.43, 0.95),
-            "named": rate(0.5, 0.21, 0.79), "lost": rate(0.083, 0.002, 0.385),
-            "tracking_deg_s": rate(0.314, 0.211, None),
-        },
-        DEFAULT: {
-            "flights": 11, "false_alarms": rate(0.0, 0.0, 0.265), "detected": rate(0.9, 0.56, 0.99),
-            "named": rate(0.8, 0.44, 0.97), "lost": rate(0.1, 0.01, 0.44),
-            "tracking_deg_s": rate(None, 0.251, None),
-        },
-    },
-    "mechanisms": [
-        {
-            "system": PAPER, "mechanism": "network", "serves": LAW, "flights": 12, "failed": 1,
-            "same_verdict": 9, "same_tracking": 5, "false_alarms": rate(0.25, 0.101, 0.42, worse=3, better=0),
-            "late": rate(-0.0833, -0.21, -0.011, worse=0, better=1),
-            "names": rate(0.0004, -0.2, 0.3, worse=1, better=1),
-            "tracking": rate(0.5, -0.07, 0.61, worse=6, better=0),
-            "delay_s": {"flights": 8, "with": rate(0.05, 0.01, 0.09), "without": rate(0.11, 0.1, None)},
-            "tracking_deg_s": {"flights": 12, "with": rate(0.22, 0.2, 0.3), "without": rate(None, 0.4, None)},
-            "tracking_ratio": rate(1.75, 1.25, None), "by": {"error": {"0.0": {
-                "names": rate(0.1, 0.05, 0.2), "late": rate(0.9, 0.8, 1.0)}, "0.005": {
-                "names": rate(-0.3, -0.4, -0.25), "late": rate(0.7, 0.6, 0.8)}}},
-        },
-        {
-            "system": DEFAULT, "mechanism": "memory", "serves": "diagnosis", "flights": 11, "failed": 0,
-            "same_verdict": 11, "same_tracking": 11, "false_alarms": rate(0.0, -0.3, 0.3, worse=0, better=0),
-            "late": rate(0.0, -0.31, 0.31, worse=0, better=0),
-            "names": rate(0.0, -0.32, 0.32, worse=0, better=0),
-            "tracking": rate(0.0, -0.33, 0.33, worse=0, better=0),
-            "delay_s": {"flights": 10, "with": rate(0.03, 0.01, 0.09), "without": rate(0.04, 0.1, None)},
-            "tracking_deg_s": {"flights": 11, "with": rate(0.6, 0.2, 0.3), "without": rate(0.7, 0.4, 0.9)},
-            "tracking_ratio": rate(1.0, 1.0, 1.0), "by": {"error": {"0.0": {"names": rate(0.2, 0.15, 0.3)},
-                                                                   "0.005": {"names": rate(0.4, 0.3, 0.5)}}},
-        },
-    ],
-    "false_alarms": [
-        {"flown": PAPER, "worst_case": True, "count": 7, "undeclared": 6, "certified": 0, "certifiable": 0,
-         "unexplained": 1},
-        {"flown": "without default: memory", "worst_case": True, "count": 5, "undeclared": 4, "certified": 3,
-         "certifiable": 5, "unexplained": 2},
-        {"flown": "with default: statistical detector", "worst_case": False, "count": 9, "undeclared": 8,
-         "certified": 2, "certifiable": 4, "unexplained": 6},
-        {"flown": DEFAULT, "worst_case": True, "count": 0, "undeclared": 0, "certified": 0, "certifiable": 0,
-         "unexplained": 0},
-    ],
-    "margins": [
-        {"system": PAPER, "bandwidth": "low", "instruments": "exact sensors", "gain_margin_db": None,
-         "phase_margin_deg": 61.7},
-        {"system": DEFAULT, "bandwidth": "high", "instruments": "real sensors", "gain_margin_db": 6.25,
-         "phase_margin_deg": None},
-    ],
-    "versions": {"ours": "1"},
-}  # fmt: skip
-NAMES = ("network (published)", "memory (default)")
-
-
-def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, changed):
-    """Of what is worst-case alone; what is beyond chance on either side."""
-    said = [*sentences(MADE)]
-    assert said == [
-        "12 draws over 2 undeclared errors x 2 bandwidths, each flown with and without every mechanism.",
-        "network (published): without it, false alarms +25.0 points, late alarms -8.3 points.",
-        "memory (default): without it all 11 flights are the same.",
-        "In all of these flights, worst-case detectors raise 12 false alarms. The reason of 9 of them is an "
-        "undeclared error. Of 5 false alarms of the default scheme, 3 have a certificate.",
-    ]
-    text = shown.as_text(MADE)
-    assert text.startswith("\n".join(said) + "\n\nBoth systems with all of their mechanisms.\nquantity")
-    places = [text.index(caption) for caption in shown.CAPTIONS]
-    assert places == sorted(places)
-    (first, second) = csv.DictReader(shown.FILES["mechanisms.csv"](MADE).splitlines())
-    assert second["mechanism"] == "memory"
-    assert (first["false_alarms_low"], first["late_better"], first["tracking_ratio_value"]) == (
-        "0.101", "1", "1.75"
-    )  # fmt: skip
-    assert "delay_s_with" not in first
-    assert json.loads(shown.FILES["mechanisms.json"](MADE)) == MADE
-    figure = shown.figure_of(MADE)
-    assert not changed(picture(figure))
-    assert [axes.get_title() for axes in figure.axes] == [*shown.CRITERIA.values()]
-    for axes, name in zip(figure.axes, shown.CRITERIA, strict=True):
-        for place, (bar, row) in enumerate(zip(axes.containers, MADE["mechanisms"], strict=True)):
-            (dot, _, (span,)), found = bar.lines, row[name]
-            assert dot.get_color() == SERIES[place]  # of one system and of the other
-            assert dot.get_xydata().tolist() == [[pytest.approx(100 * found["value"]), place]]
-            (ends,) = span.get_segments()
-            assert ends[:, 0] == pytest.approx([100 * found["low"], 100 * found["high"]])
-    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == [*NAMES]
-    (tmp_path / "mechanisms.png").write_bytes(b"a picture")
-    page = shown.FILES["mechanisms.html"](MADE)(tmp_path)
-    order = [page.index(part) for part in (said[1], said[3], "<img", *shown.CAPTIONS[2:], "61.7", "ours 1")]
-    assert order == sorted(order)
 
 
 @pytest.mark.parametrize(

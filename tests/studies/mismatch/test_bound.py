@@ -181,13 +181,3 @@ def test_what_alarms_without_being_exceeded_is_given_a_wider_bound():
     assert found == {"p": 1e-4, "q": 1e-4, "r": 1e-4}
     one = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=c) for c in (0.02, 0.3, 0.05)))
     assert widened(recommend([one])) == {"p": 0.024, "q": 0.36, "r": 0.06}
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "up"),
-    [(0.0121, 2, 0.013), (0.012, 2, 0.012), (1.21, 2, 1.3), (12.1, 2, 13.0), (121.0, 2, 130.0),
-     (1200.0, 2, 1200.0),
-     (9910.0, 2, 10000.0), (1211.0, 3, 1220.0), (-1.0, 2, 0.0), (0.0, 2, 0.0)],
-)  # fmt: skip
-def test_two_digits_that_are_not_below(value, digits, up):
-    assert rounded_up(value, digits) == pytest.approx(up, rel=1e-12)

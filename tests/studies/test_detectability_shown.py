@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -195,6 +196,43 @@ def test_elsewhere_only_the_place_and_the_references_change():
     assert (found.faults, found.expect.model_dump(exclude_none=True)) == ((), {})
     same = before.keys() - {"initial", "reference", "faults", "expect"}
     assert {key: after[key] for key in same} == {key: before[key] for key in same}
+
+
+def alone(flown, **airframe):
+    """A scenario of an aircraft made up of this; flown: what is flown of it instead."""
+    made = SimpleNamespace(name="made", airframe=SimpleNamespace(**airframe))
+    made.model_copy = lambda update: flown.append(update) or made
+    return made
+
+
+def test_pairs_are_alike_from_the_deflection_that_tells_the_one_that_is_harder_to_tell(monkeypatch):
+    """Over twice the bound the columns are (20, 0, 1), (0, -25, 0), (10, 0, 2) and (0, -7.5, 0). The aileron
+    is told from the rudder by 2.5 per rad at 1.75 of the rudder, the rudder by 10/7 at 4/7 of the aileron."""
+    G = np.array([[4.0, 0.0, 2.0, 0.0], [0.0, -10.0, 0.0, -3.0], [0.5, 0.0, 1.0, 0.0]])
+    bound = np.array([[0.1, 0.2, 0.25], [7.0, 7.0, 7.0]])
+    monkeypatch.setattr(detectability, "excitation", lambda of: Excitation({}, bound, 0.01, G))
+    surfaces, flown = ("aileron", "elevator", "rudder", "flap"), []
+    by_force = {"CY": (0, 2, 3), "CZ": (1, 3)}.__getitem__
+    found = detectability.alike(alone(flown, n=4, surfaces=surfaces, separated_by_force=by_force))
+    aileron, elevator, rudder, flap = (np.degrees(1.0 / size) for size in (20.0, 25.0, 10.0, 7.5))
+    assert flown == [{"duration_s": 3.0}]
+    assert [(pair["surfaces"], pair["by_forces"]) for pair in found] == [
+        (("aileron", "rudder"), True), (("aileron", "flap"), True), (("elevator", "rudder"), False),
+        (("elevator", "flap"), True), (("rudder", "flap"), True),
+    ]  # fmt: skip
+    told = [pair["told_apart_from_deg"] for pair in found]
+    assert told[0] == pytest.approx({"aileron": np.degrees(0.4), "rudder": np.degrees(0.7)})
+    assert told[1] == pytest.approx({"aileron": aileron, "flap": flap})
+    assert told[2] == pytest.approx({"elevator": elevator, "rudder": rudder})
+    assert told[3] == {"elevator": None, "flap": None}
+    lines = detectability.geometry([*found[:1], *found[3:4], {**found[3], "by_forces": False}])
+    both = "have similar effects on the rates: the rates"
+    assert lines == [
+        f"aileron and rudder {both} distinguish them if aileron is at least 23 deg off its command or rudder "
+        "is at least 40 deg off its command",
+        f"elevator and flap {both} never distinguish them, accelerometers do",
+        f"elevator and flap {both} never distinguish them",
+    ]
 
 
 def test_columns_that_are_nearly_parallel_are_told_by_what_little_is_left():

@@ -1,5 +1,6 @@
 """Which losses are told from which other surface: by hand, against flights, and by doublets."""
 
+from itertools import combinations
 from math import inf
 
 import numpy as np
@@ -9,8 +10,9 @@ from hypothesis import strategies as st
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.studies.detectability import Excitation, excitation, judge, pairs_of
-from beaver_ftc.studies.isolability import loss_limits
+from beaver_ftc.studies import isolability
+from beaver_ftc.studies.detectability import SETTLED_S, Excitation, excitation, judge, pairs_of
+from beaver_ftc.studies.isolability import loss_limits, smallest_doublets
 from flying import loss, scenario
 from samples import samples
 
@@ -88,3 +90,11 @@ def test_a_loss_of_all_is_the_largest_that_can_tell():
         "magnitude": 1.0, "magnitude_median": 1.0, "longest_s": pytest.approx(0.2),
         "median_s": pytest.approx(0.2),
     }  # fmt: skip
+
+
+def test_without_a_package_that_finds_doublets_the_map_says_so(monkeypatch):
+    monkeypatch.setattr(isolability, "offered", lambda service: None)
+    found = smallest_doublets(scenario(), SETTLED_S)
+    assert set(found) == {(a, b) for pair in combinations(FAULTS, 2) for a, b in (pair, pair[::-1])}
+    assert {(told["doublet_deg"], told["doublet_s"]) for told in found.values()} == {(None, None)}
+    assert {told["why"] for told in found.values()} == {"no installed package offers 'doublets'"}

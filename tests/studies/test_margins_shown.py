@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.readout import Schedule
-from beaver_ftc.studies import margins
+from beaver_ftc.studies import handling, linearise, margins
 from beaver_ftc.studies.margins import (
     LawGains,
     Margin,
@@ -158,3 +158,36 @@ def test_the_margins_as_they_are_shown(changed):
 )
 def test_a_margin_keeps_what_is_asked_up_to_the_bound(up_db, down_db, phase_deg, keeps):
     assert Margin(40.0, "none", "flap", up_db, down_db, phase_deg).keeps(6.0, 45.0) is keeps
+
+
+def test_linearise_asks_for_the_margins_that_the_scenario_declares(monkeypatch):
+    """A loop that keeps 6 dB and 45 deg, but not the 45 dB and 6 deg of a mistaken order."""
+    found = Margin(50.0, "healthy", "elevator", up_db=7.0, down_db=8.0, phase_deg=46.0)
+    monkeypatch.setattr(margins, "study", lambda scenario: [found])
+    monkeypatch.setattr(handling, "over_airspeeds", lambda scenario: [])
+    declared = scenario(control={"gain_margin_db": 6.0, "phase_margin_deg": 45.0})
+    monkeypatch.setattr(linearise, "load", lambda name: declared)
+    document = linearise.Linearise("any").run(None)
+    assert (document["gain_margin_db"], document["phase_margin_deg"]) == (6.0, 45.0)
+    assert [row["keeps"] for row in document["margins"]] == [True]
+
+
+def test_linearise_as_text_has_the_numbers_of_its_document(monkeypatch):
+    """What has no end is null in the document, and never in the text."""
+    rows = [
+        {"airspeed_mps": 30.0, "fault": "none", "surface": "flap", "up_db": None, "down_db": 5.5,
+         "phase_deg": 61.25, "keeps": False},
+        {"airspeed_mps": 42.0, "fault": "none", "surface": "flap", "up_db": 7.25, "down_db": None,
+         "phase_deg": 58.5, "keeps": True},
+    ]  # fmt: skip
+    modes = [{"where": "trimmed", "airspeed_mps": 30.0, "mode": "spiral", "quantity": "time to double",
+              "value": None, "level": 1}]  # fmt: skip
+    shown = []
+    monkeypatch.setattr(handling, "as_text", lambda found: shown.append(found) or "the modes")
+    document = {"margins": rows, "handling": modes, "gain_margin_db": 6.0, "phase_margin_deg": 45.0}
+    text = linearise.Linearise("any").as_text(document, colour=False)
+    *table, empty, modes_of = text.splitlines()
+    assert (empty, modes_of) == ("", "the modes")
+    assert table[1].split() == ["none", "flap", "7.2", "5.5", "58.5", "42"]
+    assert table[-1] == "2 loops, 1 with less than 6 dB or 45 deg"
+    assert shown == [[handling.Quality("trimmed", 30.0, "spiral", "time to double", np.inf, 1)]]

@@ -152,3 +152,27 @@ def test_at_the_limit_so_few_events_have_just_the_stated_chance(events, more, co
         limit = binomial_upper(events, events + more, confidence)
         assert binom.cdf(events, events + more, limit) == pytest.approx(1 - confidence, rel=1e-6)
     assert exp(-limit) < 1
+
+
+def _campaign(published_s, sharpened_s):
+    well = _faulty_row()["published"]
+    rows = [{**_faulty_row(delay_s=sharpened_s), "published": {**well, "delay_s": published_s}}]
+    return summarise({"healthy": [], "faulty": [*rows, {"skipped": "no trim"}]})
+
+
+def test_how_much_shorter_the_delay_is_needs_both_delays():
+    document = _campaign(0.4, 0.1)
+    assert document["delay_shorter_by"] == pytest.approx(0.75)
+    assert "delay shorter by 75%" in summary_text(document)
+    assert "1 flights drawn could not be trimmed" in summary_text(document)
+    assert _campaign(None, 0.1)["delay_shorter_by"] is None
+    assert _campaign(0.4, None)["delay_shorter_by"] is None
+    assert _campaign(0.0, 0.1)["delay_shorter_by"] is None  # there is nothing to be shorter than
+    assert _campaign(0.4, 0.0)["delay_shorter_by"] == 1.0
+
+
+def test_a_delay_over_what_is_guaranteed_is_of_those_that_are_certain():
+    rows = [_faulty_row(delay_s=0.1, guaranteed_s=0.4), _faulty_row(guaranteed_s=None, isolation_s=None)]
+    scheme = summarise({"healthy": [], "faulty": rows})["schemes"]["sharpened"]
+    assert scheme["delay_over_guaranteed"]["median"] == pytest.approx(0.25)
+    assert (scheme["detected"], scheme["isolated"], scheme["detection_certain"]) == (2, 1, 1)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import verify
 from beaver_ftc.studies.verify import (
@@ -14,6 +14,7 @@ from beaver_ftc.studies.verify import (
     Campaign,
     Draw,
     conduct,
+    fly_draw,
     judge,
     summarise,
     summary_text,
@@ -130,6 +131,31 @@ def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
         conduct(unflown, tmp_path, 1)
     with pytest.raises(SimulationFailed, match="faulty flight 7 of seed 3: killed"):
         verify._crashed(Draw(3, "faulty", 7), "killed")
+
+
+def test_a_growing_fault_is_not_flown_as_a_constant_one(monkeypatch):
+    flown = []
+    monkeypatch.setattr(verify, "fly", lambda scenario: flown.append(scenario) or landing())
+    growing, abrupt = (
+        next(
+            d for d in (Draw(1, "faulty", i) for i in range(50)) if d.scenario().faults[0].profile == profile
+        )
+        for profile in ("incipient", "abrupt")
+    )
+    row = fly_draw(growing, STEPS)
+    assert len(flown) == len(STEPS) - 1
+    assert row["constant"] is row["sharpened"]
+    assert (row["index"], row["profile"], row["rate_hz"]) == (growing.index, "incipient", flown[0].rate_hz)
+    fly_draw(abrupt, STEPS)
+    assert len(flown) == 2 * len(STEPS) - 1
+
+
+def test_a_draw_without_a_trim_is_said(monkeypatch):
+    def untrimmed(scenario):
+        raise BadInput("no trim")
+
+    monkeypatch.setattr(verify, "fly", untrimmed)
+    assert fly_draw(Draw(1, "healthy", 3), {}) == {"index": 3, "skipped": "no trim"}
 
 
 def test_of_nothing_flown_nothing_is_said():

@@ -60,6 +60,16 @@ def test_every_kind_of_flight_is_taken_apart(document):
         assert 0 < of["frames_ratio"] < of["flight_ratio"]
 
 
+def test_medians_are_over_rounds_and_ratios_within_one():
+    """Three rounds, the second on a machine half as fast: ratios are those of every round."""
+    parts = np.array([1.0, 2.0, 12.0, 1.0]) * 1e-3
+    rows = [(parts, 1000, 0.01), (2 * parts, 1000, 0.02), (parts, 1000, 0.01)]
+    found = measure._medians(rows)
+    assert found["parts_ms"]["frames"] == 12.0
+    assert (found["bare_ms"], found["frames_ratio"], found["flight_ratio"]) == (10.0, 1.2, 1.6)
+    assert found["own_part_us"] == 2.0
+
+
 @pytest.fixture(scope="module")
 def published():
     return load_scenario(measure.SCENARIO)

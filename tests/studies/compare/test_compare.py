@@ -22,7 +22,7 @@ from beaver_ftc.studies.compare.leaderboard import (
     write_leaderboard,
 )
 from beaver_ftc.studies.compare.runs import figure_of, read_runs
-from beaver_ftc.studies.compare.scores import document_of
+from beaver_ftc.studies.compare.scores import better_than_ours, document_of
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
     LAW,
@@ -166,6 +166,12 @@ def test_a_case_that_cannot_be_flown_is_said():
     assert document["sets"]["s"]["errors"]
 
 
+def _line(scheme, law, **changes):
+    ours = {"false_alarms_per_h": 0.0, "detection_rate": 0.9, "delay_median_s": 0.1, "delay_90_s": None,
+            "isolation_rate": 0.8, "ratio_median": 1.5, "ratio_90": 2.0, "departures": 0}  # fmt: skip
+    return {"scheme": scheme, "law": law, **ours, **changes}
+
+
 def test_a_set_without_faults_can_be_drawn(tmp_path):
     scenario = Scenario(name="still", duration_s=2)
     entries = entries_of([SCHEME, "none"], ["lqr"])
@@ -175,6 +181,25 @@ def test_a_set_without_faults_can_be_drawn(tmp_path):
     write_files(tmp_path, contents(makers_of("still"), document))
     assert as_text(document)
     assert "Comparison: still" in (tmp_path / "comparison.html").read_text()
+
+
+def test_what_is_better_than_ours_is_said_and_nothing_else():
+    lines = [
+        _line(SCHEME, LAW),
+        _line("none", LAW, false_alarms_per_h=0.0, delay_median_s=None),
+        _line("rival", LAW, delay_90_s=5.0, detection_rate=0.8, delay_median_s=None),
+        _line(SCHEME, "lqr", ratio_median=0.7, ratio_90=None),
+        _line(SCHEME, ORACLE, ratio_median=1.0, ratio_90=1.0),
+    ]
+    free = {
+        SCHEME: {"detection_rate": 0.9, "delay_median_s": 0.1},
+        "rival": {"detection_rate": 1.0, "delay_median_s": 0.2},
+    }
+    assert better_than_ours(lines, free) == [
+        "rival has the better 90 % detection delay, s: 5 against never",
+        "with no false alarm, rival has the better detection rate: 1 against 0.9",
+        "lqr has the better median tracking ratio to the oracle: 0.7 against 1.5",
+    ]
 
 
 def test_the_leaderboard_keeps_what_was_written_by_hand(tmp_path, compared):

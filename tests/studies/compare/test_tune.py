@@ -19,7 +19,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, registered, tunable
 from beaver_ftc.studies.compare import tune as tuning
 from beaver_ftc.studies.compare.criteria import INADMISSIBLE
-from beaver_ftc.studies.compare.search import EDGE, on_scale
+from beaver_ftc.studies.compare.search import EDGE, Found, on_scale
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
 from beaver_ftc.studies.compare.tune import (
     LEAST_GAIN,
@@ -98,6 +98,18 @@ def test_rivals_fly_with_what_was_chosen_for_their_grade():
         assert (
             tuned_values(load_tuned_values(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
         )
+
+
+@pytest.mark.parametrize(("cost", "kept"), [(0.96, True), (0.94, False)])
+def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
+    """The rule is the same for ours and for rivals."""
+    found = Found({"pole_per_s": 3.0}, cost, 1.0, {"pole_per_s": Range(1.0, 9.0)}, 24)
+    monkeypatch.setattr(tuning, "search", lambda *_: found)
+    for name in (SCHEME, "observer-constant"):
+        method = Method(DETECTORS, name, "exact")
+        row = tuning.tune_method(method, Search(24, 1, 3, most=1))
+        assert row["values"] == (method.start() if kept else found.values)
+        assert (row["found"], row["cost"], row["start_cost"], row["trials"]) == (found.values, cost, 1.0, 24)
 
 
 def test_a_method_starts_with_what_ships_or_its_defaults():

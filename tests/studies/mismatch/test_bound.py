@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.mismatch.bound import (
     guarantee_with,
     recommend,
@@ -181,3 +182,19 @@ def test_what_alarms_without_being_exceeded_is_given_a_wider_bound():
     assert found == {"p": 1e-4, "q": 1e-4, "r": 1e-4}
     one = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=c) for c in (0.02, 0.3, 0.05)))
     assert widened(recommend([one])) == {"p": 0.024, "q": 0.36, "r": 0.06}
+
+
+@pytest.mark.parametrize("alarms", [1, 3])
+def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeypatch, alarms):
+    flown = []
+
+    def fly(case):
+        flown.append(case.fdi.bounds.constant_rad_s2.q)
+        return Tally(CONSTANT, 0.1), Metrics.of({"false_alarm": len(flown) <= alarms})
+
+    monkeypatch.setattr("beaver_ftc.studies.mismatch.bound.tally_of_flight", fly)
+    needs = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=0.1) for _ in range(3)))
+    constant, settled = settle([scenario()], [needs])
+    assert settled
+    assert flown == pytest.approx([0.1, 0.12, 0.15, 0.18][: alarms + 1])  # a fifth more, two digits, upwards
+    assert constant["q"] == flown[-1]

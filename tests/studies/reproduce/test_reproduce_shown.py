@@ -107,6 +107,13 @@ def without_alarm():
     return replace(found, metrics=Metrics.of(metrics), log=found.log | silent)
 
 
+@pytest.mark.parametrize(("at_least", "holds"), [(False, [True, True, False]), (True, [False, True, True])])
+def test_a_claim_holds_up_to_its_limit(at_least, holds):
+    claim = MEASURED[0]
+    claim = claim._replace(limit=2.0, measure=claim.measure._replace(at_least=at_least))
+    assert [claim.holds(number) for number in (1.9, 2.0, 2.1)] == holds
+
+
 TESTED = [i for i, c in enumerate(MEASURED) if c.testable and not c.because and not c.measure.at_least]
 AS_WELL, NOT_THERE, AT_GAIN, AS_WELL_THERE = TESTED[:4]
 

@@ -1,13 +1,14 @@
 """`smallest` on flights: which are flown, what each row says, and that a second start flies nothing again."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.smallest import survey
@@ -75,6 +76,55 @@ def test_a_row_is_what_its_flight_says():
     loss = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6, "at_s": 1.5}
     said = metrics(fly(scenario.with_({"faults": [loss]})))["detection"]
     assert said["delay_s"] <= said["guaranteed_delay_s"]
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Rows of flights that are not flown, and the scenarios that would be: told(detection, false alarm)."""
+    flown = []
+
+    def told(false_alarm=False, closest=(), fails=False, **detection):
+        nothing = {"delay_s": None, "guaranteed_delay_s": None, "inconclusive": None}
+        found = SimpleNamespace(detection=SimpleNamespace(**nothing | detection), false_alarm=false_alarm)
+        monkeypatch.setattr(survey, "measure", lambda landing: found)
+
+        def fly(scenario):
+            flown.append(scenario)
+            if fails:
+                raise SimulationFailed("it broke")
+            return SimpleNamespace(closest_approach=closest)
+
+        monkeypatch.setattr(survey, "fly", fly)
+        return flown
+
+    return told
+
+
+NOTHING = {
+    "found": False, "certain": False, "false_alarm": False, "inconclusive": None, "failed": False,
+    "bound_used": 0.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("flight", "row"),
+    [
+        ({}, {}),
+        ({"delay_s": 0.5, "guaranteed_delay_s": 0.51}, {"found": True}),
+        ({"delay_s": 0.51, "guaranteed_delay_s": 0.5}, {"certain": True}),
+        ({"delay_s": 0.0, "guaranteed_delay_s": 0.0}, {"found": True, "certain": True}),
+        ({"false_alarm": True, "closest": (0.4, 0.9, 0.6)}, {"false_alarm": True, "bound_used": 0.9}),
+        (
+            {"inconclusive": SimpleNamespace(reasons=[{"says": "the first"}, {"says": "the second"}])},
+            {"inconclusive": "the first"},
+        ),
+        ({"fails": True, "delay_s": 0.1}, {"failed": True}),
+    ],
+)
+def test_a_row_says_what_was_measured_up_to_the_time_asked_for(told, flight, row):
+    told(**flight)
+    variants = dict(variants_of(bf.load(SCENARIO), "elevator"))
+    assert fly_one(variants, ASKED, Flight("as it is", 1, 60)) == NOTHING | row
 
 
 def test_a_document_and_its_files(few, tmp_path):

@@ -35,3 +35,8 @@ def test_a_log_is_not_flooded(clock, capsys):
             clock.now += 0.1
             progress(Counter(total=600, done=done))
     assert len(capsys.readouterr().err.splitlines()) <= 2
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(5, "5 s"), (150, "2 min"), (20_000, "5 h 33 min")])
+def test_time_left_is_said_as_people_say_it(seconds, said):
+    assert shown._span(seconds) == said

@@ -3,6 +3,7 @@
 import json
 import math
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import yaml
 from tools.drawn.rare import ANALYTIC, EXPECTATION, FAR, NEAR, repeated
 from tools.drawn.rare import SWEEP as BIASED
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
@@ -217,6 +218,20 @@ def test_nothing_varies(tmp_path):
         run_rare(load_sweep(tmp_path / "still.yaml"), "no_departure", tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "bias", "event"),
+    [
+        ("no_departure", 0.5, False), ("no_departure", 25.0, True),
+        ("detected_within_s", 3.0, False), ("detected_within_s", 0.0, True),
+        ("post_fault_rms_deg_s.q", 0.2, False), ("post_fault_rms_deg_s.q", 9.0, True),
+    ],
+)  # fmt: skip
+def test_a_score_is_below_zero_until_the_event_has_come(name, bias, event, drift):
+    base = {"duration_s": 4.0} if name == "no_departure" else {}
+    flown = drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1, **base)
+    assert (rare.score_of(flown, name) >= 0.0) is event
+
+
 def test_a_score_rises_towards_the_event(drift):
     scores = [
         rare.score_of(drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1), name)
@@ -247,3 +262,59 @@ def test_rounds_are_flown_once(tmp_path):
         assert fly_round(1, [3]) == [{"x": 3}]
     assert flown == [1, 2, 3]
     assert list(tmp_path.iterdir()) == []
+
+
+NEVER_CAME = {"expected": 0.5, "actual": None}
+
+
+@pytest.mark.parametrize(
+    ("expectation", "of", "score"),
+    [
+        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 9.0}, -0.25),
+        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 15.0}, 0.25),
+        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 12.0}, -1e-12),
+        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 11.9}, 0.0),
+        ("heading_within_deg", {"passed": False, "expected": 2.0, "actual": -5.0}, 1.5),
+        ("detected_within_s", {"passed": False, "expected": 0.0, "actual": 0.75}, 0.75),
+        ("detected_within_s", {"passed": False, **NEVER_CAME}, 3.0),  # 5 s of flight, the fault at 2 s
+        ("no_false_alarm", {"passed": True, "expected": True, "actual": True}, -0.375),
+        ("no_false_alarm", {"passed": False, "expected": True, "actual": False}, 0.0),
+        ("no_departure", {"passed": True, "expected": True, "actual": True}, -0.4),
+        ("no_departure", {"passed": False, "expected": True, "actual": False}, 0.0),
+    ],
+)
+def test_a_score_is_how_near_a_number_came_to_its_limit(monkeypatch, expectation, of, score):
+    """As a share of the limit; of the largest of rates and angles beside what ends a flight."""
+    asked = []
+    limits = {"p_rad_s": 2.0, "alpha_rad": 0.5}
+
+    def fly(scenario, log):
+        asked.append(log)
+        if log is not None:
+            log |= {"p_rad_s": np.array([0.4, -1.0, 0.9]), "alpha_rad": np.array([-0.3, 0.1, 0.2])}
+        return SimpleNamespace(frames=250, worst_residual_ratio=0.625)
+
+    found = [SimpleNamespace(name="other", passed=not of["passed"], expected=1.0, actual=77.0)]
+    found.append(SimpleNamespace(name=expectation, **of))
+    amounts = SimpleNamespace(expectations=found, fault=SimpleNamespace(at_s=2.0))
+    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fly)
+    monkeypatch.setattr("beaver_ftc.plant.sensing.DEPARTURE_LIMITS", limits)
+    monkeypatch.setattr(rare, "measure", lambda flight: amounts)
+    scenario = SimpleNamespace(rate_hz=50.0)
+    assert rare.score_of(scenario, expectation) == pytest.approx(score, abs=1e-15)
+    assert [log is not None for log in asked] == [expectation == "no_departure"]
+    if of.get("actual") is None:
+        amounts.fault = None
+        assert rare.score_of(scenario, expectation) == 5.0
+
+
+def test_a_flight_that_cannot_be_flown_is_no_event(biased, monkeypatch):
+    def broken(scenario, expectation):
+        raise SimulationFailed("it broke")
+
+    flown = []
+    monkeypatch.setattr(rare, "score_of", lambda *given: flown.append(given) or 0.25)
+    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, -1.0])) == {"score": 0.25, "failed": False}
+    assert flown == [(rare.scenario_at(biased, 7, [0.5, 0.0, -1.0]), EXPECTATION)]
+    monkeypatch.setattr(rare, "score_of", broken)
+    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, 0.0])) == {"score": -math.inf, "failed": True}

@@ -9,7 +9,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, curve_look, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Part, Pictures, Table, study_files, versions_line
-from beaver_ftc.studies.present.tables import aligned, estimate, or_never, percent
+from beaver_ftc.studies.present.tables import aligned, estimate, grouped, or_never, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,20 +38,13 @@ def as_text(document: Document) -> str:
 
 def sentences(document: Document) -> Iterator[str]:
     """What holds as declared, and the least factor at which an error changes the verdict."""
-    *_, together = _by_error(document)
-    alarms, misnamed = (_count(together[0], name) for name in ("false_alarm", "misnamed"))
+    errors = list(grouped(document["rows"], "error").values())
+    alarms, misnamed = (_count(errors[-1][0], name) for name in ("false_alarm", "misnamed"))
     yield (
         f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
         f"false alarm and {misnamed} a wrong name."
     )
-    yield from map(_onset, _by_error(document))
-
-
-def _by_error(document: Document) -> list[list[Document]]:
-    """The rows of each error, all together last."""
-    rows = document["rows"]
-    names = dict.fromkeys(row["error"] for row in rows)
-    return [[row for row in rows if row["error"] == name] for name in names]
+    yield from map(_onset, errors)
 
 
 def _count(row: Document, name: str) -> str:
@@ -101,8 +94,8 @@ def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
 def figure_of(document: Document) -> "Figure":
     """A panel a quantity, a curve an error, over the factor; bars are intervals."""
     figure, grid = panels(1, len(SHOWN), 12.0, 4.2, f"{document['scenario']}: beyond what is declared")
+    *alone, together = grouped(document["rows"], "error").values()
     for panel, (quantity, label) in zip(grid[0], SHOWN, strict=True):
-        *alone, together = _by_error(document)
         for i, rows in enumerate(alone):
             _curve(panel, rows, quantity, i, curve_look(i))
         _curve(panel, together, quantity, len(alone), {"color": BLACK})

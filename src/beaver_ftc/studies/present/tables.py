@@ -2,10 +2,12 @@
 
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.documents.files import Document
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -53,6 +55,14 @@ def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = or_never) ->
 def seconds(value: float | None, none: str = "never") -> str:
     """Return a time, s, as text; `none` if there is no time."""
     return none if value is None else f"{value:.2f} s"
+
+
+def grouped(rows: Iterable[Document], *names: str) -> dict[tuple[Any, ...], list[Document]]:
+    """Rows by the values of some columns, in order of appearance."""
+    groups: dict[tuple[Any, ...], list[Document]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return groups
 
 
 def aligned(rows: Rows) -> str:

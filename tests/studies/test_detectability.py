@@ -22,7 +22,6 @@ from beaver_ftc.studies.detectability import (
     SETTLED_S,
     alike,
     answers,
-    as_csv,
     at,
     best_in_window,
     detection_magnitude,
@@ -36,6 +35,7 @@ from beaver_ftc.studies.detectability import (
     run_survey,
     with_aircraft,
 )
+from beaver_ftc.studies.present.tables import as_csv
 from flying import loss, scenario
 from samples import samples
 

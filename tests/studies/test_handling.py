@@ -1,17 +1,13 @@
 """Handling qualities: closed forms of made-up modes, the levels' edges, and the Beaver's own."""
 
 import math
-import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.linear import LinearModel
 from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.studies import handling
 from beaver_ftc.studies.handling import (
     LIMITS,
     WORSE,
@@ -24,7 +20,6 @@ from beaver_ftc.studies.handling import (
 )
 from beaver_ftc.studies.linear_systems import CLASSICAL
 from flying import scenario
-from telling import apart, numbers
 
 G = 9.80665
 
@@ -117,28 +112,6 @@ def test_a_jam_leaves_other_modes_than_the_trim():
     assert [each.value for each in at_trim] == pytest.approx([each.value for each in before], rel=1e-6)
 
 
-def test_where_a_flight_ended_every_number_is_of_its_last_row(monkeypatch):
-    """The engine's setting too, where the log has it; what cannot be linearised is said."""
-    flown, seen = scenario(duration_s=2.0), []
-    names = ["alpha_rad", "beta_rad", *(f"{axis}_rad_s" for axis in "pqr"), "phi_rad", "theta_rad", "psi_rad"]
-    names += [f"{surface}_effective_rad" for surface in flown.airframe.surfaces]
-    end = dict(zip(names, numbers(len(names), seed=3, size=0.02).tolist(), strict=True))
-    end |= {"airspeed_mps": 43.0, "altitude_m": 1700.0, "manifold_pressure_inhg": 24.5}
-    apart(end=list(end.values()))
-    unknown = LinearModel(np.full((10, 10), np.nan), np.zeros((10, 4)), ("x",) * 10, ("u",) * 4)
-    monkeypatch.setattr(handling, "differences", lambda plant, there: seen.append(there) or unknown)
-    with pytest.raises(SimulationFailed, match="nothing can be linearised where it ended"):
-        where_ended(flown, end)
-    (there,) = seen
-    assert {name: getattr(there, name) for name in names if hasattr(there, name)} == {
-        name: end[name] for name in names if not name.endswith("_effective_rad")
-    }
-    assert (there.airspeed_mps, there.altitude_m) == (43.0, 1700.0)
-    assert there.settings["manifold_pressure_inhg"] == 24.5
-    surfaces = flown.airframe.surfaces
-    assert dict(there.surfaces_rad) == {name: end[f"{name}_effective_rad"] for name in surfaces}
-
-
 def _as_row(flown):
     from beaver_ftc.plant.conditions import trim
 
@@ -153,59 +126,3 @@ def test_the_beaver_over_its_envelope_as_it_is_shown(changed):
     )
     assert not changed(as_text(found).splitlines(), "text")
     assert not changed(as_rows(found[: len(LIMITS)]))
-
-
-@pytest.mark.parametrize("departure", [None, (1.5, "alpha_rad")])
-def test_of_a_scenario_with_a_fault_the_end_of_its_flight_is_judged_too(monkeypatch, departure):
-    """By the last row of its log; not of an aircraft that was lost. A healthy flight is not flown."""
-    flown, ended = [], []
-
-    def fly(given, log):
-        flown.append(given)
-        log.open(["a", "b"])
-        log.write(np.array([[1.0, 2.0], [3.0, 4.0]]))
-        log.close()
-        return SimpleNamespace(departure=departure)
-
-    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fly)
-    monkeypatch.setattr(handling, "where_trimmed", lambda of: [of.initial.airspeed_mps])
-    monkeypatch.setattr(handling, "where_ended", lambda *given: ended.append(given) or ["at the end"])
-    speeds_mps = pytest.approx([30.0, 36.25, 42.5, 48.75, 55.0])
-    assert over_airspeeds(scenario()) == speeds_mps
-    assert flown == []
-    faulty = scenario(faults=[{"actuator": "rudder", "type": "float", "at_s": 1.0}])
-    found = over_airspeeds(faulty)
-    assert found[:5] == speeds_mps
-    assert found[5:] == ([] if departure else ["at the end"])
-    assert flown == [faulty]
-    assert ended == ([] if departure else [(faulty, {"a": 3.0, "b": 4.0})])
-
-
-def test_each_flight_condition_is_a_line_with_its_worst_level():
-    """A level in words beside each number; of the last one that the flight ended there."""
-    first = of_model(made_up(), 40.04, "trimmed")
-    last = of_model(made_up(dutch=(1.2, -0.01), T_roll=1.5), 33.96, "at the end")
-    quantities, units, one, two, empty, *clauses = as_text([*first, *last]).splitlines()
-    assert [cell.strip() for cell in re.split("   *", quantities)][:3] == [
-        "aircraft alone,", "short period", "short period"
-    ]  # fmt: skip
-    assert re.split("  +", units)[0] == "airspeed, m/s"
-    assert re.split("  +", units)[-2:] == ["damping x frequency rad/s", "level"]
-    assert re.split("  +", one) == [
-        "40.0", "0.6 (1)", "1.47 (1)", "0.2 (1)", "0.24 (1)", "1.2 (1)", "0.5 (1)", "never (1)", "0.1 (1)",
-        "never (1)", "never (1)", "1",
-    ]  # fmt: skip
-    cells = re.split("  +", two)
-    assert (cells[0], cells[3], cells[6], cells[-1]) == ("34.0 at the end", "-0.01 (none)", "1.5 (2)", "none")
-    assert empty == ""
-    assert clauses == [
-        "in brackets: level of MIL-F-8785C, class I, category B:",
-        "3.2.2.1.2 table IV, 3.2.2.1.1 figure 2, 3.3.1.1 table VI, 3.3.1.2 table VII, 3.3.1.3 table VIII, "
-        "3.2.1.2, 3.3.1.4",
-    ]
-    rows = as_rows([*first, *last])
-    assert rows[16] == {
-        "where": "at the end", "airspeed_mps": 33.96, "mode": "spiral", "quantity": "time to double",
-        "value": None, "level": 1,
-    }  # fmt: skip
-    assert [row["level"] for row in rows[10:]] == [each.level for each in last]

@@ -83,18 +83,6 @@ def test_another_surface_is_excluded_no_later_than_the_map_says():
         assert told_s - struck_s <= row["longest_s"] + 0.01 + 1e-9
 
 
-def test_doublets_are_asked_for_of_the_package_that_finds_them(monkeypatch):
-    asked = []
-
-    def offered(service):
-        return lambda *given: asked.append((service, *given)) or "found"
-
-    monkeypatch.setattr(isolability, "offered", offered)
-    given = scenario()
-    assert smallest_doublets(given, 2.5) == "found"
-    assert asked == [("doublets", given, 2.5, 0.5)]  # losses of half of the effectiveness
-
-
 def test_a_loss_of_all_is_the_largest_that_can_tell():
     """A frame that tells a total loss alone tells; one that would take more than that does not."""
     found = loss_limits(np.array([1.0001, 1.0, 1.0001, 1.0]), 2, 0.1)

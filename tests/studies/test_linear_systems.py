@@ -1,12 +1,8 @@
 """Modes, zeros and responses against systems whose answers are written down."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from beaver_ftc.aircraft import M_PER_FT
-from beaver_ftc.plant import linear
 from beaver_ftc.studies.linear_systems import (
     MODES,
     Mode,
@@ -17,7 +13,6 @@ from beaver_ftc.studies.linear_systems import (
     response,
     zeros,
 )
-from telling import numbers
 
 
 def test_python_control_gives_the_same():
@@ -93,59 +88,3 @@ def test_zeros_of_a_transfer_function_slowest_first():
     pair = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
     np.testing.assert_allclose(pair, [-1.0 + 2.0j, -1.0 - 2.0j], atol=1e-9)
     np.testing.assert_allclose(zeros(A, B, 1), [0.0], atol=1e-9)
-
-
-def test_inputs_held_over_a_frame():
-    """Of an integrator of an integrator with a decay beside it."""
-    F = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -2.0]])
-    G = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 3.0]])
-    Fd, Gd = held_over_frame(F, G, 0.5)
-    gone = np.exp(-1.0)
-    np.testing.assert_allclose(Fd, [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, gone]], atol=1e-12)
-    np.testing.assert_allclose(Gd, [[0.125, 0.0], [0.5, 0.0], [0.0, 1.5 * (1 - gone)]], atol=1e-12)
-
-
-def test_after_a_pulse_a_decay_has_risen_and_falls():
-    t = np.arange(0.0, 3.0, 0.1)
-    found = pulse_response(np.array([[-2.0]]), np.array([3.0]), 0, t, 1.0)
-    rising, falling = 1.5 * (1 - np.exp(-2 * t)), 1.5 * (1 - np.exp(-2.0)) * np.exp(-2 * (t - 1.0))
-    np.testing.assert_allclose(found, np.where(t <= 1.0 + 1e-9, rising, falling), atol=1e-12)
-
-
-def test_the_flow_turns_as_its_components_do(monkeypatch):
-    """V, alpha and beta of a velocity, and their rates by differences; all other rates are read."""
-    rates = numbers(3, seed=1)
-    (u, v, w), named = np.abs(numbers(3, seed=2)) * [30, 5, 7], iter(numbers(7, seed=3))
-    ft = {f"velocities/{axis}-fps": of / M_PER_FT for axis, of in zip("uvw", (u, v, w), strict=True)}
-    ft |= {f"accelerations/{axis}dot-ft_sec2": of / M_PER_FT for axis, of in zip("uvw", rates, strict=True)}
-    of = {f"accelerations/{axis}dot-rad_sec2": next(named) for axis in "pqr"}
-    of |= {f"velocities/{angle}dot-rad_sec": next(named) for angle in ("phi", "theta", "psi")}
-    of |= {"velocities/h-dot-fps": next(named) / M_PER_FT}
-    plant = SimpleNamespace(start=lambda state: None, read=(ft | of).__getitem__)
-
-    def flow(at):
-        x, y, z = np.array([u, v, w]) + at * rates
-        speed = np.sqrt(x * x + y * y + z * z)
-        return np.array([speed, np.arctan2(z, x), np.arcsin(y / speed)])
-
-    found = linear._derivative(plant, None)
-    assert found[:3] == pytest.approx((flow(1e-5) - flow(-1e-5)) / 2e-5, rel=1e-6)
-    assert found[3:9] == pytest.approx([*of.values()][:6])
-    assert found[9] == pytest.approx(of["velocities/h-dot-fps"] * M_PER_FT)
-
-
-def test_zeros_stand_by_size_and_of_a_pair_the_upper_one_first():
-    """Zeros at -3, -1 +- 2j and 0.5, over (s + 1)^5."""
-    wanted = np.array([0.5, -1.0 + 2.0j, -1.0 - 2.0j, -3.0])
-    numerator, denominator = np.real(np.poly(wanted)), np.poly([-1.0] * 5)
-    A = np.zeros((5, 5))  # the observer's form, whose first state is the output
-    A[:, 0], A[range(4), range(1, 5)] = -denominator[1:], 1.0
-    np.testing.assert_allclose(zeros(A, numerator, 0), wanted, atol=1e-6)
-
-
-def test_a_fast_zero_is_one():
-    """(s + 2000)(s - 0.5) over (s + 1)^5."""
-    numerator, denominator = np.poly([-2000.0, 0.5]), np.poly([-1.0] * 5)
-    A = np.zeros((5, 5))
-    A[:, 0], A[range(4), range(1, 5)] = -denominator[1:], 1.0
-    np.testing.assert_allclose(zeros(A, np.array([0.0, 0.0, *numerator]), 0), [0.5, -2000.0], rtol=1e-5)

@@ -1,24 +1,16 @@
 """What the margins are worked out from, and how they are shown; to the number, at one flight condition."""
 
 from dataclasses import asdict
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc.control.readout import Schedule
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import y_places
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.readout import FrameReadout
-from beaver_ftc.plant.conditions import trimmed
-from beaver_ftc.plant.linear import differences
 from beaver_ftc.studies import handling, linearise, margins
 from beaver_ftc.studies.margins import (
     LawGains,
     Margin,
     OpenLoop,
-    allocation,
     as_document,
     as_text,
     at,
@@ -27,10 +19,8 @@ from beaver_ftc.studies.margins import (
     interpolated,
     law_response,
     loops,
-    open_loop,
     outputs,
     sensors,
-    study,
 )
 from flying import scenario
 
@@ -38,32 +28,10 @@ REAL = {"control": {"law": "fault-tolerant"}, "sensors": "tactical-grade", "actu
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 
 
-@pytest.mark.parametrize("given", [{}, {"substeps": 2, **REAL}], ids=["ideal", "real"])
-def test_the_loop_of_a_scenario(given, changed):
-    flown = scenario(**{"control": {"law": "fault-tolerant"}, "uncertainty": {}, **given})
-    frame = Loop(flown).frames[0]
-    linear = differences(*trimmed(flown))
-    y = (frame["truth"]["value"] * frame["truth"]["factor"])[y_places(frame)]
-    for fault, effectiveness in ("none", np.ones(4)), ("lost", np.array([1.0, 0.1, 1.0, 1.0])):
-        loop, law = open_loop(flown, FrameReadout(frame), linear, y, effectiveness)
-        assert not changed({"loop": asdict(loop), "law": asdict(law)}, fault)
-        found = loops(loop, law, np.array([0.3, 3.0, 30.0]))
-        assert not changed([found.real, found.imag], f"{fault}-response")
-
-
 def test_the_margins_at_a_flight_condition(changed, monkeypatch):
     monkeypatch.setattr(margins, "N_FREQUENCIES", 60)
     found = list(at(scenario(**REAL, uncertainty={})))
     assert not changed([list(asdict(each).values()) for each in found])
-
-
-def test_over_the_envelope(monkeypatch):
-    seen = []
-    monkeypatch.setattr(margins, "at", lambda flown: seen.append(flown.initial.airspeed_mps) or [len(seen)])
-    assert study(scenario(control={"law": "fault-tolerant"})) == [1, 2, 3, 4, 5]
-    assert seen == pytest.approx(np.linspace(*scenario().airframe.envelope.airspeed_mps, 5))
-    with pytest.raises(BadInput, match=r"control\.law: nominal: margins are known of the default law's loop"):
-        study(scenario(control={"law": "nominal"}))
 
 
 def coupled(rng):
@@ -119,28 +87,6 @@ def test_a_loop_is_broken_at_one_surface_with_the_others_closed():
         assert 1.0 / inverse[s, s] == pytest.approx(1.0 - margins._others_closed(around, s))
     assert found.shape == (3, 4)
     assert np.abs(found).min() > 1e-4
-
-
-def test_commands_do_what_is_demanded():
-    rng = np.random.default_rng(2)
-    G = rng.normal(size=(3, 4))
-    G[1, [0, 2]] = 0.0
-    main = np.array([0, 1, 2])
-    sides = np.ix_([0, 2], [0, 2])
-    commands = allocation(G, main, -1, 0.7)
-    np.testing.assert_allclose((G[:, main] @ commands[main])[sides], np.eye(2), atol=1e-12)
-    assert commands[1, 1] == pytest.approx(1 / G[1, 1])
-    assert not commands[3].any()
-    shared = allocation(G, main, 3, 0.25)
-    assert (shared[1, 1], shared[3, 1]) == pytest.approx((0.75 / G[1, 1], 0.25 / G[1, 3]))
-    assert G[1] @ shared[:, 1] == pytest.approx(1.0)
-    np.testing.assert_allclose(shared[:, [0, 2]], commands[:, [0, 2]])
-    whole = allocation(G, main, 3, 1.0)
-    assert whole[1].tolist() == [0, 0, 0]
-    G[:, 2] = 0.0  # no rudder: each axis by itself
-    alone = allocation(G, main, 3, 0.0)
-    assert (alone[0, 0], alone[2].tolist()) == (pytest.approx(1 / G[0, 0]), [0, 0, 0])
-    assert (np.count_nonzero(alone), alone[3].any()) == (2, False)
 
 
 def test_the_schedule_between_its_points_and_handed_over():
@@ -245,33 +191,3 @@ def test_linearise_as_text_has_the_numbers_of_its_document(monkeypatch):
     assert table[1].split() == ["none", "flap", "7.2", "5.5", "58.5", "42"]
     assert table[-1] == "2 loops, 1 with less than 6 dB or 45 deg"
     assert shown == [[handling.Quality("trimmed", 30.0, "spiral", "time to double", np.inf, 1)]]
-
-
-def test_of_a_surface_that_hardly_moves_there_is_no_loop(monkeypatch):
-    """Of each fault and surface whose loop comes to more than a thousandth, with its own margins."""
-    asked = []
-    small = np.array([[0.2, -1e-3, 0.5, 1.1e-3], [-3.0, 5e-4, 0.1, 0.0]])
-    frame = SimpleNamespace(true_signals="signals", control=SimpleNamespace(main="main"))
-    monkeypatch.setattr(margins, "trimmed", lambda of: ("plant", "point"))
-    monkeypatch.setattr(margins, "differences", lambda plant, point: (plant, point))
-    monkeypatch.setattr(margins, "Loop", lambda of: SimpleNamespace(frames=["frame"]))
-    monkeypatch.setattr(margins, "FrameReadout", lambda of: frame)
-    monkeypatch.setattr(margins, "cases", lambda main, surfaces: [("none", "all"), ("given up", "few")])
-    monkeypatch.setattr(margins, "open_loop", lambda *given: asked.append(given[1:]) or ("loop", "law"))
-    monkeypatch.setattr(margins, "loops", lambda loop, law, omega: small * (1.0 if len(asked) == 1 else 0.01))
-    monkeypatch.setattr(margins, "margins", lambda L: (L[0], L[1], len(L)))
-    flown = scenario(initial={"airspeed_mps": 41.0}, rate_hz=50)
-    found = [tuple(asdict(each).values()) for each in at(flown)]
-    assert [row[:3] for row in found] == [
-        (41.0, "none", "aileron"), (41.0, "none", "rudder"), (41.0, "none", "flap"),
-        (41.0, "given up", "aileron"), (41.0, "given up", "rudder"),
-    ]  # fmt: skip
-    expected = [
-        (0.2, -3.0, 2.0),
-        (0.5, 0.1, 2.0),
-        (1.1e-3, 0.0, 2.0),
-        (0.002, -0.03, 2.0),
-        (0.005, 0.001, 2.0),
-    ]
-    assert [row[3:] for row in found] == [pytest.approx(of) for of in expected]
-    assert asked == [(frame, ("plant", "point"), "signals", left) for left in ("all", "few")]

@@ -1,15 +1,12 @@
 """Verification campaigns: what is drawn, that it does not depend on who flies it, and how it is counted."""
 
-import json
 from math import exp, log
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, poisson
-from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies import verify
 from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
@@ -155,27 +152,6 @@ def test_at_the_limit_so_few_events_have_just_the_stated_chance(events, more, co
         limit = binomial_upper(events, events + more, confidence)
         assert binom.cdf(events, events + more, limit) == pytest.approx(1 - confidence, rel=1e-6)
     assert exp(-limit) < 1
-
-
-def test_the_command_prints_one_document_and_its_verdict(tmp_path):
-    asked = [
-        "verify",
-        "--hours",
-        "0",
-        "--faults",
-        "2",
-        "--workers",
-        "1",
-        "--out",
-        str(tmp_path),
-        "--format",
-        "json",
-    ]
-    result = CliRunner().invoke(app, asked)
-    document = json.loads(result.stdout)
-    assert result.exit_code == 0
-    assert document["faults"] == 2
-    assert document["schemes"]["sharpened"]["false_alarms"] == 0
 
 
 def _campaign(published_s, sharpened_s):

@@ -1,6 +1,5 @@
 """What a campaign draws and keeps to the number, and what becomes of a flight's promises at their bounds."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -126,58 +125,12 @@ def row_of(draw, schemes):
     return {"index": draw.index, "flown": draw.seed, "schemes": list(schemes)}
 
 
-def test_what_is_missing_is_flown_in_chunks_and_told(unflown, tmp_path):
-    shares = []
-    rows = conduct(unflown, tmp_path, 1, shares.append)
-    assert [row["index"] for row in rows["faulty"]] == list(range(CHUNK + 3))
-    assert shares == [CHUNK / (CHUNK + 3), 1.0]
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "campaign.json", "faulty-0000000-0000049.json", "faulty-0000050-0000052.json"
-    ]  # fmt: skip
-    assert list(json.loads((tmp_path / "campaign.json").read_text())) == [
-        "seed",
-        "schemes",
-        "version",
-        "code",
-    ]
-    (tmp_path / "faulty-0000000-0000049.json").write_text("[3]")
-    shares.clear()
-    conduct(unflown, tmp_path, 1, shares.append)
-    assert shares == [1.0]
-    assert conduct(Campaign(0.0, 2, 2), tmp_path, 1)["faulty"] == rows["faulty"][:2]
-
-
-@pytest.mark.parametrize(
-    ("key", "other", "says"),
-    [
-        ("seed", 3, "another seed, allowed"),
-        ("version", "0", "another version, a"),
-        ("code", "0", "another code, allowed"),
-        ("schemes", [], "another schemes"),
-    ],
-)
-def test_rows_that_follow_from_something_else_are_refused(unflown, tmp_path, key, other, says):
-    conduct(unflown, tmp_path, 1)
-    manifest = json.loads((tmp_path / "campaign.json").read_text())
-    (tmp_path / "campaign.json").write_text(json.dumps(manifest | {key: other}))
-    with pytest.raises(BadInput, match=says):
-        conduct(unflown, tmp_path, 1)
-
-
 def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
     (tmp_path / "campaign.json").write_text("{")
     with pytest.raises(SimulationFailed, match="cannot be used for a campaign"):
         conduct(unflown, tmp_path, 1)
     with pytest.raises(SimulationFailed, match="faulty flight 7 of seed 3: killed"):
         verify._crashed(Draw(3, "faulty", 7), "killed")
-
-
-def test_a_flight_of_each_kind(changed, monkeypatch):
-    """Its row to the number; the same fault under each step."""
-    monkeypatch.setattr(verify, "HEALTHY_S", 20.0)
-    monkeypatch.setattr(verify, "AFTER_FAULT_S", 4.0)
-    steps = {name: STEPS[name] for name in ("published", "sharpened", "constant")}
-    assert not changed({kind: fly_draw(Draw(4, kind, 1), steps) for kind in ("healthy", "faulty")})
 
 
 def test_a_growing_fault_is_not_flown_as_a_constant_one(monkeypatch):

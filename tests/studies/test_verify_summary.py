@@ -1,8 +1,5 @@
 """What a campaign counts and prints, of rows that differ in everything."""
 
-import pytest
-
-from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
 from beaver_ftc.studies.verify import PROMISES, SCHEMES, summarise, summary_text
 
 
@@ -35,36 +32,6 @@ ROWS = {
         faulty({"delay_s": None}, delay_s=None, guaranteed_s=None, isolation_s=None),
     ],
 }
-
-
-def test_healthy_flights_are_counted_by_the_hour():
-    found = summarise(ROWS)
-    assert found["healthy"] == {
-        "flights": 2, "hours": 1.0, "false_alarms": 0, "false_alarms_per_hour": 0.0,
-        "false_alarms_per_hour_upper_95": poisson_bound(0, 1.0, 0.95, upper=True), "departures": 1,
-        "hours_outside_envelope": 0.25, "closest_approach": dict(zip(SCHEMES, (0.875, 0.75), strict=True)),
-    }  # fmt: skip
-    assert (found["faults"], found["skipped"], found["kept"]) == (3, 1, True)
-    alarmed = summarise({**ROWS, "healthy": [healthy(alarm=True), healthy(), healthy()]})
-    assert alarmed["healthy"]["false_alarms_per_hour"] == pytest.approx(1 / 1.5)
-    assert not alarmed["kept"]
-    empty = summarise({"healthy": [], "faulty": []})["healthy"]
-    assert empty["false_alarms_per_hour"] is None
-    assert empty["false_alarms_per_hour_upper_95"] is None
-    assert empty["closest_approach"] == {}
-
-
-def test_each_scheme_is_counted_by_itself():
-    published, sharpened = (summarise(ROWS)["schemes"][name] for name in SCHEMES)
-    assert [published[promise] for promise in PROMISES] == [0, 0, 1, 1]
-    assert [sharpened[promise] for promise in PROMISES] == [0, 0, 0, 0]
-    assert published["late_detections_probability_upper_95"] == binomial_upper(1, 3)
-    assert (published["detected"], published["isolated"], published["detection_certain"]) == (2, 2, 3)
-    assert (sharpened["detected"], sharpened["isolated"], sharpened["detection_certain"]) == (2, 2, 2)
-    assert sharpened["delay_s"] == {"median": 0.2, "p90": None}
-    assert sharpened["delay_over_guaranteed"] == {"median": 0.5, "p90": 1.0}
-    assert sharpened["estimate_error"] == {"median": 0.01, "p90": 0.01}
-    assert summarise(ROWS)["delay_shorter_by"] == pytest.approx(0.6)
 
 
 def test_a_campaign_as_text():

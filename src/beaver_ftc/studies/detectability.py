@@ -14,12 +14,12 @@ frame-by-frame test of the innovation, whatever the fault's course; z is taken a
 the loop's answer to the fault within the window is neglected.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import combinations, product
 from math import ceil, degrees, inf
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +41,8 @@ from beaver_ftc.studies import isolability
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, as_html
-from beaver_ftc.studies.present.tables import aligned, as_csv
+from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files
+from beaver_ftc.studies.present.tables import aligned
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
@@ -438,19 +438,8 @@ def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -
     }
 
 
-# A cell is empty where nothing is certain.
-FILES: Makers = {
-    "detectability.json": lambda document: json.dumps(document, indent=1) + "\n",
-    "detectability.csv": lambda document: as_csv(document["points"]),
-    "isolability.csv": lambda document: as_csv(document["pairs"]),
-    "detectability.png": lambda document: draw(document["scenario"], document["points"]),
-    "isolability.png": lambda document: isolability.draw(document["scenario"], document["pairs"]),
-    "detectability.html": lambda document: partial(_page, document),
-}
-
-
-def _page(document: Document, folder: Path) -> str:
-    parts: list[Part] = [
+def _page(document: Document) -> tuple[str, Sequence[Part]]:
+    return f"Detectability: {document['scenario']}", [
         " ".join(_conclusions(document["points"])),
         f"The smallest loss of effectiveness that is certain to be detected within {DETECT_WITHIN_S:g} s and "
         f"isolated within {ISOLATE_WITHIN_S:g} s, whatever the declared uncertainty does.",
@@ -462,8 +451,16 @@ def _page(document: Document, folder: Path) -> str:
         Pictures([("smallest loss that is distinguished from each other surface", "isolability")]),
         Table(isolability.TABLE_HEAD, isolability.table(document["pairs"])),
     ]
-    figures = {stem: folder / f"{stem}.png" for stem in ("detectability", "isolability")}
-    return as_html(f"Detectability: {document['scenario']}", parts, figures)
+
+
+FILES = study_files(
+    "detectability", _page,
+    {"detectability": itemgetter("points"), "isolability": itemgetter("pairs")},
+    {
+        "detectability": lambda document: draw(document["scenario"], document["points"]),
+        "isolability": lambda document: isolability.draw(document["scenario"], document["pairs"]),
+    },
+)  # fmt: skip
 
 
 def draw(name: str, rows: Sequence[Document]) -> Any:

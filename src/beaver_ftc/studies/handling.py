@@ -10,12 +10,12 @@ the addition for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import inf, log
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
@@ -134,7 +134,7 @@ def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
     Raises SimulationFailed where nothing can be linearised there.
     """
     plant, point = trimmed(scenario)
-    states: dict[str, Any] = {name: float(end[name]) for name in _STATES}
+    states: Document = {name: float(end[name]) for name in _STATES}
     surfaces = {surface: float(end[f"{surface}_effective_rad"]) for surface in scenario.airframe.surfaces}
     settings = {name: float(end.get(name, value)) for name, value in point.settings.items()}
     there = FlightState(
@@ -163,7 +163,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
     return found
 
 
-def as_rows(found: list[Quality]) -> list[dict[str, Any]]:
+def as_rows(found: list[Quality]) -> list[Document]:
     """For `--format json`; what never happens is null."""
     return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
 

@@ -25,6 +25,7 @@ from beaver_ftc.control.readout import Schedule
 from beaver_ftc.design.model import QDYN, jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.conditions import trimmed
@@ -263,7 +264,7 @@ def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
     return found
 
 
-def as_document(found: list[Margin], required: tuple[float, float]) -> dict[str, Any]:
+def as_document(found: list[Margin], required: tuple[float, float]) -> Document:
     """For `--format json`; a margin without end is null."""
     rows = [
         {key: finite(value) for key, value in asdict(margin).items()} | {"keeps": margin.keeps(*required)}

@@ -12,7 +12,7 @@ from functools import partial
 from itertools import product
 from math import ceil
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -21,7 +21,7 @@ from beaver_ftc import __version__
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.documents.files import read_json
+from beaver_ftc.documents.files import Document, read_json
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import Truth, fault_free_s, is_late
@@ -60,7 +60,7 @@ class Draw:
         """What it is known by in its campaign."""
         return self.kind, self.index
 
-    def scenario(self, fdi: dict[str, Any] | None = None) -> Scenario:
+    def scenario(self, fdi: Document | None = None) -> Scenario:
         """The flight, diagnosed as `fdi` says."""
         key = KINDS.index(self.kind), self.index
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
@@ -82,7 +82,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _fault(rng: np.random.Generator) -> dict[str, Any]:
+def _fault(rng: np.random.Generator) -> Document:
     fault = {
         "actuator": str(rng.choice(load().primary)),
         "type": "loss_of_effectiveness",
@@ -94,7 +94,7 @@ def _fault(rng: np.random.Generator) -> dict[str, Any]:
     return fault
 
 
-def _signal(rng: np.random.Generator) -> dict[str, Any]:
+def _signal(rng: np.random.Generator) -> Document:
     """Zero on average, or the attitude would run away under open outer loops."""
     amplitude = {"amplitude_deg_s": rng.uniform(0.5, 5.0)}
     wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.1, 0.7), "phase_deg": rng.uniform(0, 360)}
@@ -112,7 +112,7 @@ def _within(rng: np.random.Generator, bound: float) -> float:
     return bound if rng.random() < _AT_THE_BOUND else rng.uniform(0.0, bound)
 
 
-def _uncertainty(rng: np.random.Generator) -> dict[str, Any]:
+def _uncertainty(rng: np.random.Generator) -> Document:
     """All that the published bounds admit [Zhang2005, sec. VII]."""
     sign = {axis: rng.choice([-1.0, 1.0]) for axis in AXES}
     coupling = {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES}
@@ -128,9 +128,9 @@ def _uncertainty(rng: np.random.Generator) -> dict[str, Any]:
 
 PUBLISHED, SHARPENED = "published", "sharpened"
 _OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
-SCHEMES: dict[str, dict[str, Any]] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
+SCHEMES: dict[str, Document] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
 # From the published scheme to the default, and on to what takes a declaration, one step after the other.
-STEPS: dict[str, dict[str, Any]] = {
+STEPS: dict[str, Document] = {
     PUBLISHED: SCHEMES[PUBLISHED],
     "interval": {"sharpen": _OFF},
     "pole bank": {"sharpen": {**_OFF, "pole_bank": True}},
@@ -140,8 +140,8 @@ STEPS: dict[str, dict[str, Any]] = {
 }
 _CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 
-Row = dict[str, Any]
-Schemes = dict[str, dict[str, Any]]
+Row = Document
+Schemes = dict[str, Document]
 
 
 def fly_draw(draw: Draw, schemes: Schemes) -> Row:
@@ -312,14 +312,14 @@ _SPREADS = {
 }  # fmt: skip
 
 
-def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
+def summarise(rows: dict[str, list[Row]]) -> Document:
     """The document of a campaign; `kept`: whether every promise of the sharpened scheme, the default, held.
 
     The published one is there for comparison: its isolation threshold presumes a constant parameter.
     """
     healthy, faulty = ([row for row in rows[kind] if "skipped" not in row] for kind in KINDS)
     schemes = [scheme for scheme in STEPS if faulty and scheme in faulty[0]]
-    document: dict[str, Any] = {
+    document: Document = {
         "healthy": _healthy_document(healthy),
         "faults": len(faulty),
         "skipped": sum("skipped" in row for kind in KINDS for row in rows[kind]),
@@ -333,7 +333,7 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
     return document
 
 
-def _healthy_document(rows: Sequence[Row]) -> dict[str, Any]:
+def _healthy_document(rows: Sequence[Row]) -> Document:
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
     closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
@@ -350,7 +350,7 @@ def _healthy_document(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
+def _scheme(rows: Sequence[Row]) -> Document:
     n = len(rows)
     counts = {promise: sum(row[broken] for row in rows) for promise, broken in _BROKEN.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
@@ -375,13 +375,13 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
     return {name: finite(share_within(found, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
 
 
-def _shorter(schemes: dict[str, Any]) -> float | None:
+def _shorter(schemes: Document) -> float | None:
     """By what share the sharpened scheme's median delay is shorter than the published one's."""
     published, sharpened = (schemes[name]["delay_s"]["median"] for name in SCHEMES)
     return 1.0 - sharpened / published if published and sharpened is not None else None
 
 
-def summary_text(document: dict[str, Any]) -> str:
+def summary_text(document: Document) -> str:
     """The document for people."""
     lines = [*_healthy_lines(document["healthy"]), *_fault_lines(document)]
     if document["skipped"]:
@@ -390,7 +390,7 @@ def summary_text(document: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _healthy_lines(healthy: dict[str, Any]) -> list[str]:
+def _healthy_lines(healthy: Document) -> list[str]:
     if not healthy["flights"]:
         return []
     closest = ", ".join(f"{name} {share:.6f}" for name, share in healthy["closest_approach"].items())
@@ -405,7 +405,7 @@ def _healthy_lines(healthy: dict[str, Any]) -> list[str]:
     ]
 
 
-def _fault_lines(document: dict[str, Any]) -> list[str]:
+def _fault_lines(document: Document) -> list[str]:
     schemes = document["schemes"]
     if not schemes:
         return []
@@ -458,15 +458,15 @@ class Verify(StudyCommand):
 
     PLUGINS = False
 
-    def run(self, reporter: Reporter) -> dict[str, Any]:
+    def run(self, reporter: Reporter) -> Document:
         """Fly what the folder does not hold yet."""
         asked = Campaign(self.hours, self.faults, self.seed, self.steps)
         return {"seed": self.seed, **summarise(conduct(asked, self.out, self.processes, reporter.progress))}
 
-    def as_text(self, document: dict[str, Any], colour: bool) -> str:
+    def as_text(self, document: Document, colour: bool) -> str:
         """The counts, and whether every promise was kept."""
         return summary_text(document)
 
-    def passed(self, document: dict[str, Any]) -> bool:
+    def passed(self, document: Document) -> bool:
         """Whether every promise of the default scheme was kept."""
         return bool(document["kept"])

@@ -10,13 +10,11 @@ from beaver_ftc.design.model import both_responses, design_record, inertia_coeff
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.studies.bench.straightforward import (
-    Estimators,
     FeedbackLinearisation,
     PublishedModel,
     Straightforward,
 )
 from flying import Memory, scenario
-from kept import in_short
 
 FAULT_FRAME, FRAMES = 200, 500
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 2}
@@ -67,70 +65,6 @@ def test_it_flies_as_well_as_the_loop(flown, wanted):
     fly(wanted, log)
     errors = [row["q_rad_s"] - row["q_model_rad_s"] for row in flown.log[FAULT_FRAME:]]
     assert np.rad2deg(np.sqrt(np.mean(np.square(errors)))) < 2 * log.rms_deg_s("q", 2.0) + 0.05
-
-
-def test_every_column_and_all_it_remembers_are_as_before(flown, changed):
-    estimators, law = in_full(flown.estimators), in_full(flown.law)
-    assert not changed({"log": by_column(flown.log), "estimators": estimators, "law": law})
-
-
-def by_column(log):
-    return {name: in_short([row[name] for row in log]) for name in log[0]}
-
-
-def in_full(of):
-    """All that an object remembers; arrays of many numbers in short."""
-    arrays = {name: np.asarray(value) for name, value in vars(of).items()}
-    return {name: of.tolist() if of.size <= 9 else in_short(of) for name, of in arrays.items()}
-
-
-def test_it_takes_over_in_flight_and_starts_again_where_it_did(changed):
-    user = Straightforward(scenario(duration_s=3, rate_hz=50), at_s=1.0, frames=20)
-    for _ in range(2):
-        user.fly(20)
-        assert not changed({"log": by_column(user.log), "law": in_full(user.law)})
-        user.prepare()
-        assert user.log == []
-
-
-RATES = np.array([0.3, -0.2, 0.25])
-SURFACE_GIVES = 0.05 * np.array([[-6.0, 0.0, -0.5], [0.0, -9.0, 0.0], [0.5, 0.0, -3.0]])  # (surface, axis)
-BOUND = np.array([0.02, 0.03, 0.04])
-
-
-def estimated(missing, frames=60):
-    """Estimators that have watched a body whose acceleration is known but for `missing` (3,) rad/s2, which
-    begins at frame 10; what all of them knew at some frames."""
-    wanted = scenario(fdi={"forgetting_time_s": 2.0}, control={"network_leak_per_s": 0.5})
-    found, known, x = Estimators(wanted, 0.02), [], RATES
-    found.x_hat = x
-    for k in range(frames):
-        shaking = np.array([1.0, -0.5, 0.8]) * np.sin(0.3 * k)
-        Z = SURFACE_GIVES * (1.0 + 0.5 * np.cos(0.2 * k))
-        found.predict(x, shaking, Z, BOUND)
-        x = x + 0.02 * (shaking + (k >= 10) * missing @ Z)
-        found.judge(x, 0.1 + 0.002 * k, 0.05 - 0.003 * k)
-        if k in (5, 15, frames - 1):
-            believed = {"isolated": found.isolated, "unknown": found.unknown.tolist()}
-            known.append(in_full(found) | believed | {"effectiveness": found.effectiveness.tolist()})
-    return known
-
-
-@pytest.mark.parametrize(
-    ("missing", "isolated"),
-    [((0, 0, 0), None), ((-0.6, 0, 0), 0), ((0, -0.4, 0), 1), ((0, 0, -0.97), 2), ((0.9, 1.5, 0.8), None)],
-    ids=["healthy", "aileron", "elevator", "rudder gone", "none of these"],
-)  # fmt: skip
-def test_what_the_estimators_remember_frame_by_frame(missing, isolated, changed):
-    known = estimated(np.array(missing, float))
-    last = known[-1]
-    assert last["detected"] == any(missing)
-    assert last["isolated"] == isolated
-    if isolated is not None:
-        left = 1.0 + missing[isolated]
-        assert last["effectiveness"][isolated] == pytest.approx(max(left, 0.1), abs=0.05)
-        assert [last["effectiveness"][s] for s in range(4) if s != isolated] == [1.0] * 3
-    assert not changed(known)
 
 
 def test_its_bound_is_the_published_one_and_the_turning_earths(changed):

@@ -4,13 +4,11 @@ import json
 from math import inf, nan
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.metrics import Onset
-from beaver_ftc.studies.compare import leaderboard, runs
+from beaver_ftc.studies.compare import runs
 from beaver_ftc.studies.compare.leaderboard import (
     MARK,
     as_text,
@@ -20,9 +18,9 @@ from beaver_ftc.studies.compare.leaderboard import (
     page_of,
     write_leaderboard,
 )
-from beaver_ftc.studies.compare.replay import Recording, Trace, _statistic, alarms_at, trace
+from beaver_ftc.studies.compare.replay import Trace, _statistic, alarms_at
 from beaver_ftc.studies.compare.scores import document_of
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight, Trial, entries_of
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, SetFlight, Trial, entries_of
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.figures import panels
 from flying import scenario
@@ -92,15 +90,6 @@ def test_all_that_is_shown(compared, changed, tmp_path):
     assert list(makers_of("made")) == ["comparison.json", "comparison.png", "comparison.html"]
 
 
-def test_one_set_without_a_curve_that_came_to_anything(compared, changed):
-    part = compared["sets"]["healthy"]
-    part["better_than_ours"], part["errors"] = [], []
-    for row in part["lines"]:
-        row |= {"ratio_median": None, "ratio_90": None}
-    assert not changed(picture(figure_of({"sets": {"healthy": part}})))
-    assert "could not fly" not in as_text({"sets": {"healthy": part}})
-
-
 @pytest.mark.parametrize("below", ["", f"{MARK}\n\nold\n", f"{MARK}\n\nold\n\n{MARK}\n\nolder\n"])
 def test_what_was_written_above_the_mark_stays(below, compared, tmp_path):
     board = tmp_path / "board.md"
@@ -118,29 +107,6 @@ def test_a_detector_without_a_statistic_is_far_from_the_level():
 def test_a_case_that_ends_its_process_has_no_results_and_says_why():
     found = lost(Case(3, SetFlight("faulty", scenario())), "killed")
     assert found == Trial("faulty", failures=["test: killed"])
-
-
-def test_a_trace_is_of_the_parts_of_the_flight():
-    from types import SimpleNamespace
-
-    def of(fault_at_s):
-        seen = [(SimpleNamespace(t_s=0.1 * i), None) for i in range(6)]
-        recording = Recording(SimpleNamespace(dt_s=0.1), seen, np.zeros(6), Onset(fault_at_s, 10.0))
-        return trace(recording, np.array([0.2, 0.1, 0.5, 0.9, 0.3, 1.2]), us=4.0)
-
-    struck = of(0.3)
-    assert (struck.before, struck.faulted, struck.healthy_s, struck.us) == (
-        0.5,
-        True,
-        pytest.approx(0.3),
-        4.0,
-    )
-    np.testing.assert_allclose(struck.rises, [(0.0, 0.2), (0.2, 0.5)])
-    np.testing.assert_allclose(struck.records, [(0.0, 0.9), (0.2, 1.2)], atol=1e-9)
-    whole = of(None)
-    assert (whole.before, whole.faulted, whole.records) == (1.2, False, ())
-    assert of(0.6).faulted is False
-    assert (of(0.0).before, of(0.0).rises) == (0.0, ())
 
 
 def test_an_alarm_ends_the_time_in_which_one_would_be_false():
@@ -180,27 +146,6 @@ def test_runs_side_by_side(changed, tmp_path):
     healthy = run_of(tmp_path / "b", [], fault=None, isolation=nothing, tracking=tracked, **lost)
     assert not changed(runs.as_text([run_of(tmp_path / "a"), healthy]).splitlines())
     assert runs.labels([run_of("x/a"), run_of("y/a")]) == ["x/a", "y/a"]
-
-
-def test_tracking_errors_of_runs_in_one_figure(changed, monkeypatch, tmp_path):
-    t = np.linspace(0.0, 20.0, 41_000)
-    log = {"t_s": t}
-    for i, axis in enumerate("pqr"):
-        log |= {f"{axis}_model_rad_s": 0.1 * np.sin(t) + i, f"{axis}_measured_rad_s": 0.05 * np.sin(t) + i}
-    asked = []
-
-    def read(path, names):
-        asked.append((path.parent.name, names))
-        return log
-
-    monkeypatch.setattr("beaver_ftc.results.log.read", read)
-    other = run_of(tmp_path / "b", fault={"at_s": 5.5})
-    figure = runs.figure_of([run_of(tmp_path / "a"), other, run_of(tmp_path / "c", fault=None)])
-    assert not changed(picture(figure))
-    assert {axes.texts[0].xy for axes in figure.axes[:1]} == {(5.5, 1.0)}
-    assert [len(line.get_xdata()) for line in figure.axes[0].lines[:1]] == [20_500]
-    assert [folder for folder, _ in asked] == ["a", "b", "c"]
-    assert asked[0][1] == list(log)
 
 
 def test_runs_leave_a_figure_a_document_and_a_report(monkeypatch, tmp_path):
@@ -243,13 +188,3 @@ def test_folders_that_are_no_runs_are_all_named(tmp_path):
         f"{tmp_path / 'c'}: {unreadable}", f"{tmp_path / 'd'}: holds no log.parquet, {allowed}",
         *(f"{tmp_path / name}: {unreadable}" for name in "efg"),
     ]  # fmt: skip
-
-
-def test_flights_of_other_entries_are_others(monkeypatch, tmp_path):
-    """What has landed of a comparison is taken up again for the same entries alone."""
-    asked = []
-    monkeypatch.setattr(leaderboard, "run_study", lambda study, *_: asked.append(study.follows_from))
-    entries = [Entry("adaptive-estimators", "nominal"), Entry("adaptive-estimators", "fault-tolerant")]
-    for chosen in (entries, entries[:1], entries):
-        leaderboard.run_comparison(tmp_path, "any", [], chosen, 1, None)
-    assert asked[0] == asked[2] != asked[1]

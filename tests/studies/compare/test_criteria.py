@@ -16,10 +16,9 @@ from beaver_ftc.studies.compare.criteria import (
     DetectorCost,
     LawCost,
     effort,
-    flights,
     least_margins,
 )
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, SetFlight, result_of
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight, result_of
 from beaver_ftc.studies.margins import Margin
 from flying import loss, scenario
 
@@ -56,28 +55,6 @@ def test_a_detector_costs_delay_names_and_false_alarms(monkeypatch):
     assert len(asked) == 5
 
 
-def test_a_detector_that_cannot_win_is_not_flown_to_the_end(monkeypatch):
-    best = [SOUND, replace(SOUND, faulted=False), *[SOUND] * 3]
-    asked = given(monkeypatch, [*best, *FOUND])
-    cost = DetectorCost("x", CASES)
-    lowest = cost({})
-    assert lowest == pytest.approx(0.25)
-    assert cost({}) == pytest.approx((1 / 16 + 1 / 5) * 5 / 2)  # as if all went on as its first two flights
-    assert len(asked) == 5 + 2  # 1/16 + 1/5 is more than 1/4
-    better = replace(SOUND, delay_s=0.25)  # 0.2 / 2
-    given(monkeypatch, [better, replace(SOUND, faulted=False), *[better] * 3, *best])
-    assert cost({}) == pytest.approx(0.1)
-    assert cost({}) > 0.1  # of what was best before, now that another is
-
-
-def test_what_each_flight_adds_to_a_detectors_cost(monkeypatch):
-    """Whatever the lowest cost is: all of them are flown."""
-    given(monkeypatch, [SOUND, replace(SOUND, faulted=False), *[SOUND] * 3, *FOUND])
-    cost = DetectorCost("x", CASES)
-    cost({})
-    assert cost.parts({"a": 2.0}) == pytest.approx([0.25 / 4, 0.2, 0.6 / 4, 0.25, 0.25 + 0.2])
-
-
 def test_what_cannot_be_flown_costs_more_than_all_else(law, monkeypatch):
     def refused(*of):
         raise BadInput("no trim")
@@ -89,22 +66,6 @@ def test_what_cannot_be_flown_costs_more_than_all_else(law, monkeypatch):
     monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
     given(monkeypatch, [SOUND, SOUND, SOUND, lost])
     assert law({}) == FAILED
-
-
-def test_a_flight_of_an_entry_is_flown_with_its_values(monkeypatch):
-    """On top of what the entry itself flies with."""
-    flown_with = []
-    monkeypatch.setattr(criteria, "fly", lambda scenario, watch: flown_with.append(scenario))
-    monkeypatch.setattr(criteria, "result_of", lambda landing, entry, us: (entry, us))
-    case = SetFlight("c", scenario(fdi={"scheme": "augmented-ekf", "options": {"noise": 2.0}}))
-    ekf, lqr = Entry("augmented-ekf", LAW), Entry(SCHEME, "lqr")
-    assert criteria.flown(case, ekf, criteria.DETECTORS, {"alarm": 3.0}) == (ekf, 0.0)
-    assert criteria.flown(case, lqr, criteria.LAWS, {"deflection_deg": 4.0}) == (lqr, 0.0)
-    first, second = flown_with
-    assert (first.fdi.scheme, first.fdi.options) == ("augmented-ekf", {"noise": 2.0, "alarm": 3.0})
-    assert (first.control.law, first.control.options) == (LAW, {})
-    assert (second.fdi.scheme, second.control.law) == (SCHEME, "lqr")
-    assert second.control.options == {"deflection_deg": 4.0}
 
 
 @pytest.mark.parametrize("alarm", [0.3, 200.0])
@@ -140,21 +101,6 @@ def test_a_law_costs_its_error_over_the_oracles(law, monkeypatch):
     assert asked[0][0] == Entry(SCHEME, "lqr")
 
 
-def test_what_each_flight_adds_to_a_laws_cost(law, monkeypatch):
-    """The logarithm of its error over the oracle's, an aircraft that is lost or nearly so as `LOST`."""
-    found = [replace(SOUND, rms_deg_s=rms) for rms in (3.0, inf, 1.0, 500.0)]
-    asked = given(monkeypatch, found)
-    assert law.parts({"a": 2.0}) == pytest.approx([log(3.0), log(100.0), log(0.25), log(100.0)])
-    assert asked == [(Entry(SCHEME, "lqr"), criteria.LAWS, {"a": 2.0})] * 4
-
-
-def test_margins_are_those_of_the_law_with_its_values(law, monkeypatch):
-    asked = []
-    monkeypatch.setattr(criteria, "margins_of", lambda flown: asked.append(flown) or MARGINS)
-    assert law.margins({"deflection_deg": 4.0}) is MARGINS
-    assert (asked[0].control.law, asked[0].control.options) == ("lqr", {"deflection_deg": 4.0})
-
-
 def test_a_law_may_spend_no_more_than_the_default_and_a_tenth(law, monkeypatch):
     allowed = (EFFORT * 2.0) ** 2
     for energy, admissible in ((allowed * 0.99, True), (allowed * 1.01, False)):
@@ -187,42 +133,6 @@ def test_a_law_with_too_little_margin_is_not_flown(law, monkeypatch, changes, sh
         assert asked == []
 
 
-def test_a_law_that_is_far_behind_is_not_flown_to_the_end(monkeypatch, law):
-    monkeypatch.setattr(criteria, "LEAST_FLIGHTS", 2)
-    asked = given(monkeypatch, [SOUND] * 4 + [replace(SOUND, rms_deg_s=20.0)] * 4)
-    assert law({}) < law({})
-    assert len(asked) == 4 + 2
-
-
 def test_effort_is_the_rms_rate_and_the_least_margins_are_of_all_loops():
     assert effort([SOUND, replace(SOUND, energy_deg2_s2=10.0)]) == pytest.approx(sqrt(7.0))
     assert least_margins(MARGINS) == (7.0, 50.0)
-
-
-def test_kinds_of_flights_take_turns():
-    names = [case.scenario.name.rpartition("-")[0] for case in flights("errors", 2)]
-    assert len(names) == 12
-    assert len(set(names[:6])) == len(set(names[6:])) == 6
-
-
-def test_kinds_of_which_there_are_more_come_more_often(monkeypatch):
-    """Four of one kind at 1/8, 3/8, ... of the way, two of another at 1/4 and 3/4, one in the middle."""
-    names = ["a-1", "a-2", "b-x-1", "a-3", "a-4", "b-x-2", "c-1"]
-    asked = []
-
-    def of_set(*given):
-        asked.append(given)
-        return [SetFlight("s", scenario().model_copy(update={"name": name})) for name in names]
-
-    monkeypatch.setattr(criteria, "of_set", of_set)
-    placed = flights.__wrapped__("errors", 5, 3)
-    assert [case.scenario.name for case in placed] == ["a-1", "b-x-1", "a-2", "c-1", "a-3", "b-x-2", "a-4"]
-    assert asked == [("calibration-errors", 5, 3)]
-
-
-def test_the_yardsticks_are_the_oracle_and_the_default_law(monkeypatch):
-    """On the faulted flights alone."""
-    monkeypatch.setattr(criteria, "flights", lambda *_: CASES[:3])
-    asked = given(monkeypatch, [replace(SOUND, rms_deg_s=3.0), SOUND, SOUND, SOUND])
-    assert criteria.yardsticks.__wrapped__("exact", None, 0) == ((3.0, 2.0), 2.0)
-    assert [entry.law for entry, _, _ in asked] == [ORACLE, ORACLE, LAW, LAW]

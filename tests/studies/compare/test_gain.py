@@ -6,13 +6,10 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from beaver_ftc.plugins import DETECTORS, LAWS
-from beaver_ftc.studies.compare import gain, tune
+from beaver_ftc.studies.compare import gain
 from beaver_ftc.studies.compare.criteria import flights
-from beaver_ftc.studies.compare.gain import JUDGED, gain_of, relative_gain
-from beaver_ftc.studies.compare.search import Found
+from beaver_ftc.studies.compare.gain import JUDGED, relative_gain
 from beaver_ftc.studies.compare.trial import CALIBRATION, of_set, set_names
-from beaver_ftc.studies.compare.tune import Method, as_text
 
 
 @pytest.mark.parametrize(
@@ -42,49 +39,3 @@ def test_every_draw_has_flights_that_no_other_draw_and_no_table_has():
     seeds += [{case.scenario.seed for case in of_set(name)} for name in set_names()]
     assert len(set().union(*seeds)) == sum(map(len, seeds))
     assert of_set(CALIBRATION + "exact", 1) == of_set(CALIBRATION + "exact", 1, 0)
-
-
-@pytest.mark.parametrize(("group", "costs"), [(DETECTORS, 1), (LAWS, JUDGED)])
-def test_both_settings_fly_the_draws_after_the_one_that_tunes(monkeypatch, group, costs):
-    made = []
-
-    class Cost:
-        def __init__(self, name, *given):
-            assert name == "mine"
-            made.append(given)
-
-        def parts(self, values):
-            return [values["a"], 2.0 * values["a"]]
-
-    monkeypatch.setattr(gain, "DetectorCost", Cost)
-    monkeypatch.setattr(gain, "LawCost", Cost)
-    monkeypatch.setattr(gain, "flights", lambda grade, most, draw: (draw,))
-    found = gain_of(group, "mine", "exact", ({"a": 0.0}, {"a": 0.0}), 3)
-    draws = made[0][0] if group == DETECTORS else [given[-1] for given in made]
-    assert (len(made), draws) == (costs, [*range(4, 4 + JUDGED)])
-    assert (found["gain"], found["flights"], found["judged"]) == (0.0, 2 * costs, JUDGED)
-    made.clear()
-    found = gain_of(group, "mine", "exact", ({"a": 0.4}, {"a": 0.3}), 3)
-    # parts of a and 2 a: their sum is 3 a, as logarithms their geometric mean is exp(1.5 a)
-    sizes = (1.2, 0.9) if group == DETECTORS else (exp(0.6), exp(0.45))
-    assert (found["built_in"], found["retuned"]) == pytest.approx(sizes)
-    assert found["gain"] == pytest.approx(1.0 - sizes[1] / sizes[0])
-    assert found["gain_low"] <= found["gain"] <= found["gain_high"]
-    given = [("exact", None, draw) for draw in range(4, 4 + JUDGED)]
-    assert group == DETECTORS or made == given
-
-
-@pytest.mark.parametrize(("cost", "measured"), [(0.9, True), (tune.INADMISSIBLE, False)])
-def test_the_gain_is_measured_on_a_draw_of_its_own_alone(monkeypatch, cost, measured):
-    method = Method(DETECTORS, "observer-constant", "exact")
-    monkeypatch.setattr(tune, "search", lambda *_: Found({"pole_per_s": 3.0}, cost, 1e9, {}, 5))
-    found = dict.fromkeys(("built_in", "retuned", "gain", "gain_low", "gain_high", "flights"), 0.25)
-    monkeypatch.setattr(
-        tune, "gain_of", lambda group, name, grade, settings, draw: found | {"given": settings}
-    )
-    row = tune.tune_method(method, tune.Search(5, 1, 0, most=1, draw=2))
-    assert ("gain" in row) == measured
-    assert not measured or row["given"] == (method.start(), {"pole_per_s": 3.0})
-    assert "gain" not in tune.tune_method(method, tune.Search(5, 1, 0, most=1))
-    text = as_text({"trials": 5, "seed": 1, "restarts": 0, "draw": 2, "methods": [row]})
-    assert ("25.0" in text) == measured

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control.laws.rejecting import margins
 from beaver_ftc.studies.compare import margins_in_flight
-from beaver_ftc.studies.compare.margins_in_flight import _measured, in_trim, margins_of
+from beaver_ftc.studies.compare.margins_in_flight import _measured, in_trim
 from beaver_ftc.studies.margins import at
 from flying import loss, scenario
 
@@ -33,15 +33,6 @@ def test_a_law_that_is_plugged_in_is_measured_as_well():
     gains_db = [least(deflection_deg) for deflection_deg in (0.3, 1.0, 3.0)]
     assert gains_db[0] > gains_db[1] > gains_db[2] > 3.0
     assert least(1e4) == 0.0
-
-
-def test_the_airspeeds_are_those_of_the_envelope_and_the_surfaces_those_that_lead(monkeypatch):
-    flown = scenario(control={"law": "lqr"})
-    asked = []
-    monkeypatch.setattr(margins_in_flight, "_measured", lambda each: asked.append(each) or [])
-    margins_of(flown)
-    assert [each.initial.airspeed_mps for each in asked] == list(flown.airframe.envelope.airspeed_mps)
-    assert {margin.fault for margin in margins_of(flown.with_({"control.law": "fault-tolerant"}))} == {"none"}
 
 
 def test_what_is_flown_for_margins_has_only_the_sensors_lags():

@@ -1,7 +1,5 @@
 """Counting: rates with their bounds, quantiles with what never came, levels at matched false alarms."""
 
-import threading
-import time
 from math import inf
 
 import pytest
@@ -82,39 +80,6 @@ def test_the_matched_level_is_the_most_sensitive_one_allowed():
     assert matched(trade_off(_traces()))["level"] == 0.7
     assert matched(trade_off(_traces()), 0.51)["level"] == 0.6
     assert point_at(_traces(), 0.1)["detection_rate"] == 1.0  # of the one flight without an earlier alarm
-
-
-def test_what_other_threads_do_meanwhile_is_no_cost_of_a_law(monkeypatch):
-    """A linear algebra library's threads wait busily for a while after a call: lqr, which solves a Riccati
-    equation before it flies, was said to cost twice what it does."""
-
-    class Slow:
-        n_frames = 1000
-
-        def __init__(self, scenario):
-            pass
-
-        def chunks(self):
-            def wait_busily():
-                end = time.thread_time() + 0.05
-                while time.thread_time() < end:
-                    pass
-
-            other = threading.Thread(target=wait_busily)
-            other.start()
-            other.join()
-            return ()
-
-        def land(self):
-            return None
-
-        def release(self):
-            pass
-
-    monkeypatch.setattr(trial, "Loop", Slow)
-    monkeypatch.setattr(trial, "with_entry", lambda scenario, entry, chosen: None)
-    monkeypatch.setattr(trial, "result_of", lambda flight, entry, us: us)
-    assert trial._fly(None, None, {}) < 25.0  # us a frame; the thread takes 50
 
 
 def test_shares_of_the_faulted_flights_and_of_all():

@@ -1,6 +1,6 @@
 """The search that tunes every method: its scales, its budget, its seed, and the edges of its ranges."""
 
-from math import log, sqrt
+from math import log
 
 import numpy as np
 import pytest
@@ -12,10 +12,7 @@ from beaver_ftc.studies.compare.search import (
     WIDENINGS,
     _Trials,
     on_edge,
-    on_scale,
     search,
-    value_at,
-    widen,
 )
 
 WIDE = Range(1e-3, 1e3)
@@ -28,17 +25,6 @@ def bowl(**best):
         return 1.0 + sum((log(values[name]) - log(at)) ** 2 for name, at in best.items())
 
     return cost
-
-
-def test_scales_go_from_limit_to_limit():
-    assert value_at(WIDE, 0.5) == pytest.approx(1.0)
-    odds = Range(0.5, 0.999, "odds")
-    middle = value_at(odds, 0.5)
-    assert middle / (1.0 - middle) == pytest.approx(sqrt(1.0 * 999.0))
-    for of in (WIDE, odds):
-        assert [on_scale(of, value_at(of, place)) for place in (0.0, 0.3, 1.0)] == pytest.approx(
-            [0.0, 0.3, 1.0]
-        )
 
 
 @pytest.mark.parametrize("best", [{"a": 20.0}, {"a": 0.05, "b": 3.0}, {"a": 9.0, "b": 0.2, "c": 1.0}])
@@ -138,41 +124,3 @@ def test_of_trials_that_cost_much_the_same_the_one_nearest_the_middle_is_taken()
         values, lowest = tried.best()
         assert lowest == costs[nearest]
         assert list(values.values()) == pytest.approx(1e-3 * 1e6 ** points[nearest], rel=1e-5)
-
-
-def test_a_search_begins_where_it_is_told_fills_the_ranges_and_then_goes_downhill():
-    """Of 41 trials the first is the start, the next 20 are one in each slice of each range, the rest near the
-    best of these; the first steps are a tenth of a range, to the middle."""
-    tried = []
-
-    def cost(values):
-        places = [on_scale(WIDE, values[name]) for name in "ab"]
-        tried.append(places)
-        return 1.0 + (places[0] - 0.7) ** 2 + (places[1] - 0.2) ** 2
-
-    search(cost, {"a": WIDE, "b": WIDE}, {"a": 10.0, "b": 1e9}, 41, 5, 0)
-    assert tried[0] == pytest.approx([2 / 3, 1.0])  # a start beyond a range is at its limit
-    spread = np.array(tried[1:21])
-    for column in spread.T:
-        assert sorted((column * 20).astype(int)) == list(range(20))
-    begin = min(tried[:21], key=lambda at: (at[0] - 0.7) ** 2 + (at[1] - 0.2) ** 2)
-    steps = [0.1 if at < 0.5 else -0.1 for at in begin]
-    assert np.array(tried[21:24]) == pytest.approx(
-        np.array([begin, [begin[0] + steps[0], begin[1]], [begin[0], begin[1] + steps[1]]]), abs=1e-5
-    )
-    assert len(tried) == 41
-
-
-def test_a_range_is_widened_by_half_of_its_scale_at_one_end():
-    assert widen(Range(1.0, 100.0), upper=True) == Range(1.0, 1000.0)
-    assert widen(Range(1.0, 100.0), upper=False) == Range(0.1, 100.0)
-    odds = widen(Range(0.5, 0.8, "odds"), upper=True)  # odds of 1 to 4, and half of that scale on: 8
-    assert (odds.low, odds.high, odds.scale) == (0.5, pytest.approx(8.0 / 9.0), "odds")
-
-
-@pytest.mark.parametrize(
-    ("place", "edge"), [(0.02, False), (0.021, None), (0.979, None), (0.98, True), (1.3, True), (-0.2, False)]
-)
-def test_what_is_within_a_fiftieth_of_a_limit_is_on_the_edge(place, edge):
-    values = {"a": 1e-3 * 1e6**place, "b": 1.0}
-    assert on_edge(values, {"a": WIDE, "b": WIDE}) == ({} if edge is None else {"a": edge})

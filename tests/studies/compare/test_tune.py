@@ -1,7 +1,6 @@
 """`compare --tune`: what ships was found inside its ranges; a plug-in is tuned as everybody is."""
 
 import json
-import re
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -31,7 +30,6 @@ from beaver_ftc.studies.compare.tune import (
     read_tuned,
     tune,
 )
-from beaver_ftc.studies.margins import Margin
 from commands import beaver
 from flying import scenario
 
@@ -164,11 +162,6 @@ def test_ranges_that_are_none_are_refused(monkeypatch, given):
         tunable(DETECTORS, "mine")
 
 
-def test_a_class_that_says_nothing_has_nothing_to_tune(monkeypatch):
-    monkeypatch.setattr("beaver_ftc.plugins.plugin_class", lambda group, name: type("Mine", (), {}))
-    assert tunable(DETECTORS, "mine") == {}
-
-
 def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     with pytest.raises(BadInput, match="nothing to tune"):
         tune([], Search(5, 1, 0), 1, None)
@@ -178,116 +171,8 @@ def test_nothing_to_tune_and_no_file_are_said(tmp_path):
             read_tuned(tmp_path / name)
 
 
-def row_of(grade, name, start_cost, cost, values, widened=(), **more):
-    return {
-        "grade": grade, "name": name, "start_cost": start_cost, "cost": cost, "values": values,
-        "widened": list(widened), "trials": 70, "settled": True, **more,
-    }  # fmt: skip
-
-
-ROWS_MADE = [
-    row_of("exact", "observer", 0.81236, 0.52349, {"pole_per_s": 3.14159, "alarm": 20000.0}, ("alarm", "b"),
-           settled=False, built_in=0.7, retuned=0.6, gain=0.1429, gain_low=-0.0321, gain_high=0.2768),
-    row_of("errors", "lqr", 1e6, 1e6 - 1.0, {"deflection_deg": 0.25}, gain_margin_db=7.25,
-           phase_margin_deg=51.6),
-    row_of("errors", "slow", 999.9, 1000.0, {}, ("c",)),
-]  # fmt: skip
-
-
-def test_what_was_tuned_as_text():
-    """A line a method; with the gain where another draw has measured it."""
-    document = {"trials": 24, "seed": 7, "restarts": 8, "draw": 0, "methods": ROWS_MADE}
-    head, empty, *table, first, budget, second, none = as_text(document).splitlines()
-    assert head == "up to 24 trials a search, seed 7, up to 8 restarts for each method and grade"
-    assert empty == ""
-    assert [re.split("  +", line.strip()) for line in table] == [
-        ["grade", "method", "cost at the start", "cost found", "margins dB, deg", "values"],
-        ["exact", "observer", "0.812", "0.523", "-", "pole_per_s 3.142, alarm 2e+04"],
-        ["errors", "lqr", "cannot fly", "inadmissible", "7.2, 52", "deflection_deg 0.25"],
-        ["errors", "slow", "999.900", "inadmissible", "-"],
-    ]
-    assert first == "observer, exact: on the edge of its range, widened: alarm, b"
-    assert budget == "observer, exact: the budget ended the search; more --restarts may find a lower cost"
-    assert second == "slow, errors: on the edge of its range, widened: c"
-    assert none == "slow, errors: no better values were found in 70 trials"
-    table = as_text(document | {"draw": 2}).splitlines()[2:6]
-    assert [re.split("  +", line.strip())[5:] for line in table] == [
-        ["cost, built in", "cost, retuned", "gain, %", "from, %", "to, %", "values"],
-        ["0.700", "0.600", "14.3", "-3.2", "27.7", "pole_per_s 3.142, alarm 2e+04"],
-        ["-", "-", "-", "-", "-", "deflection_deg 0.25"], ["-"] * 5,
-    ]  # fmt: skip
-
-
-def test_a_tuning_is_of_every_method_on_its_grade(monkeypatch):
-    """The document has the values of each where a comparison looks for them, and how they were found."""
-    asked = []
-
-    def fly_all(fly, methods, workers, progress):
-        asked.append((fly.func, fly.keywords, workers, progress))
-        return [{"values": {"a": float(n)}, "name": method.name} for n, method in enumerate(methods, 1)]
-
-    monkeypatch.setattr(tuning, "fly_all", fly_all)
-    monkeypatch.setattr(
-        tuning, "flights", lambda grade, most, draw: {"exact": "four", "errors": "seventh"}[grade] * most
-    )
-    methods = [
-        Method(DETECTORS, "x", "exact"), Method(LAWS, "y", "exact"), Method(DETECTORS, "x", "errors"),
-        Method(DETECTORS, "z", "errors"),
-    ]  # fmt: skip
-    how = Search(24, 7, 8, most=3, draw=5)
-    assert tune(methods, how, 2, print) == {
-        "procedure": "beaver-ftc compare --tune; docs/results/benchmark.md", "trials": 24, "seed": 7,
-        "restarts": 8, "draw": 5, "flights": {"exact": 12, "errors": 21},
-        "grades": {
-            "exact": {"detectors": {"x": {"a": 1.0}}, "laws": {"y": {"a": 2.0}}},
-            "errors": {"detectors": {"x": {"a": 3.0}, "z": {"a": 4.0}}},
-        },
-        "methods": [{"values": {"a": float(n)}, "name": name} for n, name in enumerate("xyxz", 1)],
-    }  # fmt: skip
-    assert asked == [(tuning.tune_method, {"how": how}, 2, print)]
-
-
-def test_a_law_is_tuned_by_its_own_cost_and_told_with_its_margins(monkeypatch):
-    """The row of a search that found better values; the cost is made of what was asked for."""
-    made, searched = [], []
-
-    class Cost:
-        def __init__(self, *given):
-            made.append(given)
-
-        def margins(self, values):
-            healthy = Margin(40.0, "none", "rudder", 9.0, 8.0, 60.0)
-            return [healthy, Margin(50.0, "none", "flap", 7.5 + values["a"], 11.0, 50.0)]
-
-    ranges = {"a": Range(0.1, 9.0), "b": Range(0.5, 0.9, "odds")}
-    found = Found({"a": -1.0, "b": 0.7}, 0.5, 0.8, ranges, 31, ("b",), 2, True)
-    monkeypatch.setattr(tuning, "LawCost", Cost)
-    monkeypatch.setattr(tuning, "search", lambda *given: searched.append(given) or found)
-    monkeypatch.setattr(Method, "ranges", lambda self: ranges)
-    monkeypatch.setattr(Method, "start", lambda self: {"a": 2.0, "b": 0.6})
-    assert tuning.tune_method(Method(LAWS, "lqr", "errors"), Search(24, 7, 6, most=3)) == {
-        "grade": "errors", "kind": "laws", "name": "lqr", "start_cost": 0.8, "cost": 0.5,
-        "found": {"a": -1.0, "b": 0.7}, "values": {"a": -1.0, "b": 0.7},
-        "ranges": {
-            "a": {"low": 0.1, "high": 9.0, "scale": "log"}, "b": {"low": 0.5, "high": 0.9, "scale": "odds"},
-        },
-        "widened": ["b"], "trials": 31, "restarts": 2, "settled": True,
-        "gain_margin_db": 6.5, "phase_margin_deg": 50.0,
-    }  # fmt: skip
-    assert made == [("lqr", "errors", 3, 0)]
-    ((cost, *given),) = searched
-    assert isinstance(cost, Cost)
-    assert given == [ranges, {"a": 2.0, "b": 0.6}, 24, 7, 6]
-
-
 @pytest.mark.parametrize(
     ("again", "adopted"), [({"gain": 0.05}, False), ({"gain": 0.051}, True), ({}, False)]
 )
 def test_a_second_tuning_is_adopted_for_its_gain(again, adopted):
     assert tuning.is_adopted(again | {"gain_low": 0.5, "gain_high": 0.6}) is adopted
-
-
-def test_a_plug_in_without_defaults_starts_in_the_middle_of_its_ranges(monkeypatch):
-    monkeypatch.setattr(tuning, "plugin_class", lambda group, name: type("Mine", (), {"defaults": {"a": 3}}))
-    monkeypatch.setattr(Method, "ranges", lambda self: {"a": Range(1.0, 9.0), "b": Range(2.0, 32.0)})
-    assert Method(DETECTORS, "mine", "exact").start() == {"a": 3.0, "b": pytest.approx(8.0)}

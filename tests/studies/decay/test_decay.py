@@ -1,38 +1,29 @@
 """`decay`: which truths are flown, what a flight counts for, and what the document says of them."""
 
-import csv
-import json
 import re
 from dataclasses import replace
-from itertools import product
-from math import comb, isclose
-from types import SimpleNamespace
+from math import isclose
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import beaver_ftc as bf
-from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.decay import survey
-from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
-from beaver_ftc.studies.decay.shown import FILES, _interval, as_text, cells, sentences
+from beaver_ftc.studies.decay.errors import errors_of
+from beaver_ftc.studies.decay.shown import as_text, sentences
 from beaver_ftc.studies.decay.survey import (
     FACTORS,
     TOGETHER,
     Flight,
     cases_of,
     document_of,
-    fly_one,
-    median,
     row_of,
     run_decay,
     scenario_of,
 )
-from kept import picture
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 1.5}
 SHORT = {
@@ -127,37 +118,6 @@ def test_what_a_flight_counts_for():
     assert row_of(None)["failed"]
 
 
-@pytest.mark.parametrize("n", [5, 6, 20])
-def test_the_interval_of_a_median_is_that_of_the_sign_test(n):
-    """The r-th smallest is below the median with at least 97.5 %: counted by binomial coefficients."""
-    rows = [{"x": float(value)} for value in np.random.default_rng(n).permutation(n)]
-    found = median(rows, "x")
-    tail = [sum(comb(n, k) for k in range(r + 1)) / 2**n for r in range(n)]
-    low = max((r for r in range(n) if tail[r] <= 0.025), default=None)
-    assert found["low"] == (None if low is None else float(low))
-    assert found["high"] == (None if low is None else float(n - 1 - low))
-    assert median([*rows, *[{"x": None}] * (n + 1)], "x")["value"] is None
-
-
-def test_a_document_and_its_files(tmp_path):
-    (tmp_path / "short.yaml").write_text(json.dumps(SHORT))
-    line = ["decay", str(tmp_path / "short.yaml"), "--flights", "2", "--workers", "1", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, [*line, "--format", "json"])
-    assert done.exit_code == 0, done.output
-    document = json.loads(done.stdout)
-    assert [(row["error"], row["factor"]) for row in document["rows"]] == [
-        (name, factor) for name in (*KEYS, TOGETHER) for factor in FACTORS
-    ]
-    alarms = {
-        row["factor"]: row["false_alarm"]["count"] for row in document["rows"] if row["error"] == TOGETHER
-    }
-    assert (alarms[1.0], alarms[4.0]) == (0, 2)
-    folder = tmp_path / "short-decay"
-    assert {path.name for path in folder.iterdir()} == {
-        f"decay.{kind}" for kind in ("json", "csv", "png", "html")
-    }
-
-
 def test_what_the_rows_say():
     scenario, flown = bf.load(SHORT), row_of(None) | {"failed": False, "detected": True, "named": True}
     flown |= {"delay_s": 0.05, "tracking_deg_s": 0.25, "bound_used": 0.5}
@@ -197,21 +157,6 @@ def test_what_the_rows_say():
     assert "1 of 4 flights have a false alarm and 2 of 4 a wrong name" in next(sentences(document))
 
 
-def test_only_what_is_asked_is_followed_from(monkeypatch, tmp_path):
-    """A study of another scenario or seed begins anew; a lost flight is a failed row."""
-    seen = []
-    monkeypatch.setattr(survey, "run_study", lambda study, *given: seen.append((study, given)) or {"d": 1})
-    scenario = bf.load(SHORT | {"name": "n" * 90})
-    found = run_decay(tmp_path, scenario, flights=2, seed=7, workers=3, progress=print)
-    ((study, given),) = seen
-    assert (study.name, given) == ("n" * 80 + "-decay", (tmp_path, 3, print))
-    assert found == {"d": 1, "folder": str(tmp_path / study.name)}
-    assert study.follows_from == [scenario, 7]
-    assert study.fly.args == (scenario, 7)
-    assert study.document.args[:1] + study.document.args[3:] == (scenario, 7)
-    assert (study.cases, study.lost(None, "killed")) == (cases_of(errors_of(scenario), 2), row_of(None))
-
-
 METRICS = {
     "fault": {"at_s": 2.0}, "false_alarm": False, "departure": None,
     "detection": {"time_s": 2.5, "delay_s": 0.5},
@@ -248,28 +193,6 @@ def test_a_row_is_of_what_was_measured(changes, differs):
     assert row_of(Metrics.of(METRICS | changes), 0.25) == GOOD | differs
 
 
-def test_a_flight_is_flown_with_its_truth_and_counts_with_the_bound_that_it_used(monkeypatch):
-    flown = []
-
-    def fly(scenario):
-        flown.append(scenario)
-        if scenario.uncertainty.inertia_coupling.p > 0.0:
-            raise SimulationFailed("it broke")
-        return SimpleNamespace(closest_approach=(0.2, 0.75, 0.5))
-
-    monkeypatch.setattr(survey, "fly", fly)
-    monkeypatch.setattr(survey, "measure", lambda landing: Metrics.of(METRICS))
-    errors, rows = errors_of(DECLARED), []
-    for run in range(8):
-        flight = Flight("turbulence", 2.0, run)
-        rows.append(fly_one(DECLARED, 5, flight))
-        assert flown[-1] == scenario_of(DECLARED, errors, 5, flight)
-    assert {row["failed"] for row in rows} == {True, False}
-    for row, scenario in zip(rows, flown, strict=True):
-        fails = scenario.uncertainty.inertia_coupling.p > 0.0
-        assert row == (row_of(None) if fails else GOOD | {"bound_used": 0.75})
-
-
 def test_faults_come_later_together_and_end_so_much_later():
     """At most four seconds, and five before the end at the latest; where there is no room, as declared."""
     second = {"actuator": "rudder", "type": "bias", "bias_deg": 2.0, "at_s": 3.0, "end_s": 6.5}
@@ -300,41 +223,6 @@ def test_the_air_is_as_rough_as_the_size_of_its_error_allows(declared, severitie
     assert absent.severity == (None if declared == "none" else declared)
 
 
-def test_each_error_is_so_many_times_what_is_declared_of_it():
-    """Within what a scenario admits; an acceleration keeps the frequency that the scenario flies."""
-    flown = {"uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.001, "frequency_rad_s": 7.5}}}}
-    own = {"coefficients": 0.3, "inertia": 0.2, "sensors": {"q": {"bias_deg_s": 0.1, "noise_std_deg_s": 0.2}}}
-    scenario = bf.load(SHORT | flown | {"fdi": {"bounds": BOUNDS | own}})
-    says = {error.name: (error.says, error.declared) for error in errors_of(scenario)}
-    assert says == {
-        "moment coefficients": ("30 %", True), "moments of inertia": ("20 %", True),
-        "inertia coupling": ("0.2", True), "unstructured acceleration": ("0.03 rad/s2", True),
-        "sensor errors": ("as declared", True), "turbulence": ("light", True),
-    }  # fmt: skip
-    assert [error.says for error in errors_of(DECLARED)][-2:] == ["tactical-grade", "light"]
-    seen = set()
-    for run in range(9):
-        twice, four = (truth_of(scenario, TOGETHER, factor, run) for factor in (2.0, 4.0))
-        assert {round(abs(ratio - 1.0), 9) for ratio in twice.uncertainty.coefficients.values()} == {0.6}
-        assert set(four.uncertainty.coefficients.values()) == {0.1, 2.2}
-        assert {twice.uncertainty.inertia.Ix, twice.uncertainty.inertia.Iz} <= {0.6, 1.4}
-        assert {four.uncertainty.inertia.Iy, four.uncertainty.inertia.Iz} <= {0.5, 1.8}
-        for axis, size in (("p", 0.2), ("q", 0.1), ("r", 0.15)):
-            theta = getattr(twice.uncertainty.inertia_coupling, axis)
-            assert abs(theta) == pytest.approx(2.0 * size)
-            seen.add((axis, theta > 0.0))
-        waves = twice.uncertainty.sinusoid
-        sizes = [wave.amplitude_rad_s2 for wave in (waves.p, waves.q, waves.r)]
-        assert sizes == pytest.approx([0.04, 0.06, 0.02])
-        assert waves.q.frequency_rad_s == 7.5
-        assert 5.0 <= waves.p.frequency_rad_s != waves.r.frequency_rad_s <= 15.0
-        gyro = twice.sensors.q
-        assert (abs(gyro.bias_deg_s), gyro.noise_std_deg_s) == pytest.approx((0.2, 0.4))
-        seen.add(("bias", gyro.bias_deg_s > 0.0))
-        assert twice.sensors.p.is_ideal
-    assert len(seen) == 8  # of either sign
-
-
 def of_rows(**changes):
     """Six flights of a row that can be told apart; the last could not be flown."""
     rows = [
@@ -361,104 +249,6 @@ def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest
     assert found["bound_used"] == {"value": 0.03, "low": None, "high": None}
 
 
-@pytest.fixture(scope="module")
-def made():
-    """A document of which no two rows are alike: the failed flights aside, all of each number has it."""
-    errors = [Error("stiff", "4 %", None), Error("windy", "none; unit light", None, declared=False)]
-    cases = cases_of(errors, 6)
-    rows = []
-    for place in range(len(cases) // 6):
-        of = of_rows()
-        rows += [
-            row | ({} if row["failed"] else {"bound_used": 0.03 * place, "misnamed": place > 5}) for row in of
-        ]
-    return cases, document_of(DECLARED, errors, cases, 9, rows)
-
-
-def test_a_document_has_a_row_an_error_and_factor(made):
-    """What is declared is at its limit in the first row of all of them, which is flown once."""
-    cases, document = made
-    order = [("all together", 1.0), *(("stiff", f) for f in (1.5, 2.0, 4.0)),
-             *(("windy", f) for f in (1.0, 1.5, 2.0, 4.0)),
-             *(("all together", f) for f in (1.5, 2.0, 4.0))]  # fmt: skip
-    assert cases == [Flight(*row, run) for row in order for run in range(6)]
-    used = {row: 0.03 * place for place, row in enumerate(order)} | {("stiff", 1.0): 0.0}
-    assert [
-        (row["error"], row["declared"], row["factor"], row["bound_used"]["value"]) for row in document["rows"]
-    ] == [
-        (name, said, factor, pytest.approx(used[name, factor]))
-        for name, said in (("stiff", "4 %"), ("windy", "none; unit light"),
-                           ("all together", "all that are declared"))
-        for factor in (1.0, 1.5, 2.0, 4.0)
-    ]  # fmt: skip
-    rest = {key: value for key, value in document.items() if key not in ("rows", "versions")}
-    assert rest == {
-        "scenario": "short", "faults": 1, "seed": 9, "flights": 6, "confidence": 0.95,
-        "factors": [1.0, 1.5, 2.0, 4.0],
-        "errors": [
-            {"error": "stiff", "declared": "4 %", "is_declared": True},
-            {"error": "windy", "declared": "none; unit light", "is_declared": False},
-        ],
-    }  # fmt: skip
-
-
-def test_the_table_the_files_and_the_figure_have_every_row(made, tmp_path, changed):
-    _, document = made
-    row = document["rows"][6]
-    assert cells(row) == (
-        "windy", "none; unit light", "2", "5", "20 (1 to 72)", "80 (28 to 99)", "60 (15 to 95)",
-        "100 (48 to 100)", "0.4", "1.2", "18",
-    )  # fmt: skip
-    read = list(csv.DictReader(FILES["decay.csv"](document).splitlines()))
-    assert len(read) == 12
-    assert (read[6]["error"], read[6]["factor"], read[6]["misnamed_count"], read[6]["failed"]) == (
-        "windy", "2.0", "5", "1"
-    )  # fmt: skip
-    assert (float(read[6]["bound_used_value"]), read[6]["delay_s_low"]) == (pytest.approx(0.18), "")
-    assert json.loads(FILES["decay.json"](document)) == json.loads(json.dumps(document))
-    for at, of in enumerate(document["rows"]):
-        of["tracking_deg_s"] |= {"low": 0.1 + at, "value": 0.5 + at, "high": 1.2 + at}
-    document["rows"][1]["tracking_deg_s"]["value"] = None  # of an aircraft that is lost
-    figure = FILES["decay.png"](document)
-    assert not changed(picture(figure))
-    errors = ("stiff", "windy", "all together")
-    assert [axes.get_title().partition("\n")[0] for axes in figure.axes[:3]] == [*errors]
-    shown = (("false_alarm", 100.0), ("named", 100.0), ("tracking_deg_s", 1.0))
-    for axes, ((name, times), error) in zip(figure.axes, product(shown, errors), strict=True):
-        of = [r for r in document["rows"] if r["error"] == error and r[name]["value"] is not None]
-        line, _, (bars,) = axes.containers[0].lines
-        assert line.get_xdata().tolist() == [r["factor"] for r in of]
-        assert line.get_ydata() == pytest.approx([times * r[name]["value"] for r in of])
-        ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
-        assert ends == [pytest.approx([times * r[name]["low"], times * r[name]["high"]]) for r in of]
-    assert [label.get_text() for label in figure.axes[-1].get_xticklabels()] == ["1", "1.5", "2", "4"]
-    (tmp_path / "decay.png").write_bytes(b"a picture")
-    page = FILES["decay.html"](document)(tmp_path)
-    order = [page.index(part) for part in (*sentences(document), "100 (48 to 100)", "In brackets", "<img")]
-    assert order == sorted(order)
-
-
 def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):
     with pytest.raises(BadInput, match="scheme: none diagnoses nothing"):
         run_decay(tmp_path, bf.load(SHORT | {"fdi": {"scheme": "none"}}))
-
-
-def test_errors_left_out_leave_the_signs_of_the_others_and_intervals_are_in_the_unit_asked():
-    """A sign is drawn for every error, whether it is made or not."""
-    errors = [
-        Error(name, "", lambda factor, draws, name=name: {name: factor * draws.choice([-1.0, 1.0])})
-        for name in "abcdefgh"
-    ]
-
-    def made(*names):
-        return changes_of(errors, dict.fromkeys(names, 2.0), np.random.default_rng(3))
-
-    whole = made(*"abcdefgh")
-    assert {abs(whole[name]) for name in "abcdefgh"} == {2.0}
-    assert {whole[name] for name in "abcdefgh"} == {-2.0, 2.0}
-    nothing = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
-    assert made("c", "h") == nothing | {name: whole[name] for name in "ch"}
-    found = {"value": 0.25, "low": 0.125, "high": None}
-    assert _interval(found, 100.0) == "25 (12.5 to never)"
-    assert _interval(found | {"low": 0.25, "high": 0.25}, 10.0) == "2.5"
-    assert _interval(found | {"value": None}) == "never"

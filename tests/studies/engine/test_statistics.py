@@ -5,6 +5,7 @@ import pytest
 
 from beaver_ftc.studies.engine.statistics import (
     binomial,
+    median,
     poisson,
     poisson_bound,
     quantile,
@@ -100,3 +101,15 @@ def test_wilson_bounds_are_those_whose_test_is_just_passed():
             p = wilson_bound(successes, trials, 0.95, upper)
             z = (successes / trials - p) / math.sqrt(p * (1 - p) / trials)
             assert abs(z) == pytest.approx(1.6449, abs=1e-4)
+
+
+@pytest.mark.parametrize("n", [5, 6, 20])
+def test_the_interval_of_a_median_is_that_of_the_sign_test(n):
+    """The r-th smallest is below the median with at least 97.5 %: counted by binomial coefficients."""
+    values = np.random.default_rng(n).permutation(n).astype(float)
+    found = median(values)
+    tail = [sum(math.comb(n, k) for k in range(r + 1)) / 2**n for r in range(n)]
+    low = max((r for r in range(n) if tail[r] <= 0.025), default=None)
+    assert found["low"] == (None if low is None else float(low))
+    assert found["high"] == (None if low is None else float(n - 1 - low))
+    assert median([*values, *[None] * (n + 1)])["value"] is None

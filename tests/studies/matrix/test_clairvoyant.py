@@ -10,11 +10,9 @@ from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
 from beaver_ftc.diagnosis.informed_test import healthy_positions, term_acceleration
-from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.loop.readout import FrameReadout
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.matrix import clairvoyant
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.fault_matrix import AT_S, FaultCase, beside_told, scenario_of, trimmed_deg
 from telling import apart
@@ -83,22 +81,6 @@ def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
     assert nothing["told_deflection"] < 1e-6
     assert nothing["told_chance"] < 1e-5
     assert seen_when_told(scenario, kept, "elevator")["told_chance"] > 0.99
-
-
-def test_the_time_since_the_fault_and_the_air_as_the_vanes_show_it(lost, monkeypatch):
-    """Chance has from the fault to the end; the air's noise is a deviation, the root of its variance."""
-    scenario, kept = lost
-    rough, seen = scenario.with_({"fdi.bounds.turbulence": "moderate"}), []
-    monkeypatch.setattr(clairvoyant, "detection_probability", lambda *of: seen.append(of) or 0.5)
-    told = seen_when_told(scenario, kept, "elevator")
-    rate = scenario.fdi.statistical.false_alarms_per_h
-    assert seen == [(told["told_deflection"], scenario.duration_s - AT_S, rate)]
-    monkeypatch.setattr(clairvoyant, "with_measured_gust", lambda context, std: seen.append(std) or context)
-    clairvoyant._declared(rough)
-    frames = Loop(rough).frames
-    variance = FrameReadout(frames[0]).diagnosis.acceleration_variance_from_input_noise
-    apart(variance=variance)
-    assert seen[-1] ** 2 == pytest.approx(variance)
 
 
 def test_rougher_air_shows_less(lost):

@@ -1,8 +1,6 @@
 """`mechanisms`: what is removed, what pairs amount to, and which false alarms have a reason."""
 
-import csv
 import json
-from math import inf
 
 import numpy as np
 import pytest
@@ -11,15 +9,11 @@ from typer.testing import CliRunner
 
 import needs
 from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.style import SERIES
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.margins import Margin
-from beaver_ftc.studies.mechanisms import command, effects, shown, survey
+from beaver_ftc.studies.mechanisms import command, effects, survey
 from beaver_ftc.studies.mechanisms.effects import CRITERIA, document_of, effect_of, net
 from beaver_ftc.studies.mechanisms.shown import finding, sentences
 from beaver_ftc.studies.mechanisms.survey import (
@@ -37,7 +31,6 @@ from beaver_ftc.studies.mechanisms.survey import (
     without_mechanism,
 )
 from beaver_ftc.studies.mechanisms.systems import DEFAULT, LAW, MECHANISMS, PAPER
-from kept import picture
 
 ELEVATOR = Flight("loss 80 %", "high", 0.0, "exact sensors", 1)
 EVERY = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.key)
@@ -236,23 +229,6 @@ def test_a_false_alarm_of_a_worst_case_detector_wants_a_reason(few_cells, reason
     assert sum(row["unexplained"] for row in document["false_alarms"] if row["worst_case"]) == (not passed)
 
 
-@pytest.mark.parametrize("key", [DEFAULT, PAPER, "with default: statistical detector"])
-def test_false_alarms_are_counted_by_their_reasons(key):
-    """Of worst-case detectors: one within the declaration, or without the certificate that the scheme has. Of
-    the statistical one: only within the declaration. What raises no alarm has no reason that counts."""
-    reasons = [(3, True), (0, True), (2, False), (0, False), (4, None), (0, None)]
-    rows = [
-        {key: outcome(false_alarm=True, reason={"undeclared": beyond, "certified": proved})}
-        for beyond, proved in reasons
-    ]
-    rows += [{key: outcome(reason={"undeclared": 0, "certified": False})}] * 3
-    worst_case = "statistical" not in key
-    assert effects._alarms_of(key, rows) == {
-        "flown": key, "worst_case": worst_case, "count": 6, "undeclared": 3, "certified": 2,
-        "certifiable": 4, "unexplained": 4 if worst_case else 3,
-    }  # fmt: skip
-
-
 def test_findings_in_sentences(few_cells):
     document = document_of(1, 1, rows_of({"undeclared": 3, "certified": True}), [])
     first, *said, last = sentences(document)
@@ -275,191 +251,6 @@ def test_findings_in_sentences(few_cells):
     assert finding(plain | {"same_verdict": 1}).endswith(ends.format("1 of 2 verdicts differ"))
 
 
-def rate(value, low, high, **more):
-    return {"value": value, "low": low, "high": high} | more
-
-
-MADE = {
-    "seed": 3, "draws": 12, "factors": {"error": [0.0, 0.005], "bandwidth": ["low", "high"]},
-    "systems": {
-        PAPER: {
-            "flights": 12, "false_alarms": rate(0.25, 0.055, 0.572), "detected": rate(0.75, 0.43, 0.95),
-            "named": rate(0.5, 0.21, 0.79), "lost": rate(0.083, 0.002, 0.385),
-            "tracking_deg_s": rate(0.314, 0.211, None),
-        },
-        DEFAULT: {
-            "flights": 11, "false_alarms": rate(0.0, 0.0, 0.265), "detected": rate(0.9, 0.56, 0.99),
-            "named": rate(0.8, 0.44, 0.97), "lost": rate(0.1, 0.01, 0.44),
-            "tracking_deg_s": rate(None, 0.251, None),
-        },
-    },
-    "mechanisms": [
-        {
-            "system": PAPER, "mechanism": "network", "serves": LAW, "flights": 12, "failed": 1,
-            "same_verdict": 9, "same_tracking": 5, "false_alarms": rate(0.25, 0.101, 0.42, worse=3, better=0),
-            "late": rate(-0.0833, -0.21, -0.011, worse=0, better=1),
-            "names": rate(0.0004, -0.2, 0.3, worse=1, better=1),
-            "tracking": rate(0.5, -0.07, 0.61, worse=6, better=0),
-            "delay_s": {"flights": 8, "with": rate(0.05, 0.01, 0.09), "without": rate(0.11, 0.1, None)},
-            "tracking_deg_s": {"flights": 12, "with": rate(0.22, 0.2, 0.3), "without": rate(None, 0.4, None)},
-            "tracking_ratio": rate(1.75, 1.25, None), "by": {"error": {"0.0": {
-                "names": rate(0.1, 0.05, 0.2), "late": rate(0.9, 0.8, 1.0)}, "0.005": {
-                "names": rate(-0.3, -0.4, -0.25), "late": rate(0.7, 0.6, 0.8)}}},
-        },
-        {
-            "system": DEFAULT, "mechanism": "memory", "serves": "diagnosis", "flights": 11, "failed": 0,
-            "same_verdict": 11, "same_tracking": 11, "false_alarms": rate(0.0, -0.3, 0.3, worse=0, better=0),
-            "late": rate(0.0, -0.31, 0.31, worse=0, better=0),
-            "names": rate(0.0, -0.32, 0.32, worse=0, better=0),
-            "tracking": rate(0.0, -0.33, 0.33, worse=0, better=0),
-            "delay_s": {"flights": 10, "with": rate(0.03, 0.01, 0.09), "without": rate(0.04, 0.1, None)},
-            "tracking_deg_s": {"flights": 11, "with": rate(0.6, 0.2, 0.3), "without": rate(0.7, 0.4, 0.9)},
-            "tracking_ratio": rate(1.0, 1.0, 1.0), "by": {"error": {"0.0": {"names": rate(0.2, 0.15, 0.3)},
-                                                                   "0.005": {"names": rate(0.4, 0.3, 0.5)}}},
-        },
-    ],
-    "false_alarms": [
-        {"flown": PAPER, "worst_case": True, "count": 7, "undeclared": 6, "certified": 0, "certifiable": 0,
-         "unexplained": 1},
-        {"flown": "without default: memory", "worst_case": True, "count": 5, "undeclared": 4, "certified": 3,
-         "certifiable": 5, "unexplained": 2},
-        {"flown": "with default: statistical detector", "worst_case": False, "count": 9, "undeclared": 8,
-         "certified": 2, "certifiable": 4, "unexplained": 6},
-        {"flown": DEFAULT, "worst_case": True, "count": 0, "undeclared": 0, "certified": 0, "certifiable": 0,
-         "unexplained": 0},
-    ],
-    "margins": [
-        {"system": PAPER, "bandwidth": "low", "instruments": "exact sensors", "gain_margin_db": None,
-         "phase_margin_deg": 61.7},
-        {"system": DEFAULT, "bandwidth": "high", "instruments": "real sensors", "gain_margin_db": 6.25,
-         "phase_margin_deg": None},
-    ],
-    "versions": {"ours": "1"},
-}  # fmt: skip
-NAMES = ("network (published)", "memory (default)")
-
-
-def test_each_table_has_its_own_numbers():
-    systems, nets, same, medians, alarms = shown.tables(MADE)
-    assert systems == (("quantity", "published", "95 % interval", "default", "95 % interval"), [
-        ("flights", "12", "", "11", ""), ("false alarms, %", "25", "6 to 57", "0", "0 to 26"),
-        ("detected, %", "75", "43 to 95", "90", "56 to 99"),
-        ("named rightly, %", "50", "21 to 79", "80", "44 to 97"),
-        ("aircraft lost, %", "8", "0 to 38", "10", "1 to 44"),
-        ("error, deg/s", "0.314", "0.211 to never", "never", "0.251 to never"),
-    ])  # fmt: skip
-    assert nets[0] == (
-        "mechanism", "false alarms, points", "95 % interval", "late alarms, points", "95 % interval",
-        "lost names, points", "95 % interval", "worse tracking, points", "95 % interval",
-    )  # fmt: skip
-    assert nets[1][0] == (
-        NAMES[0], "+25.0", "+10.1 to +42.0", "-8.3", "-21.0 to -1.1", "0.0", "-20.0 to +30.0", "+50.0",
-        "-7.0 to +61.0",
-    )  # fmt: skip
-    assert [row[0] for row in nets[1]] == [*NAMES]
-    assert same[1] == [(NAMES[0], "12", "9", "5"), (NAMES[1], "11", "11", "11")]
-    assert medians[1] == [
-        (NAMES[0], "0.05", "0.11", "0.22", "never", "1.75", "1.25 to never"),
-        (NAMES[1], "0.03", "0.04", "0.6", "0.7", "1", "1 to 1"),
-    ]
-    assert alarms[1] == [
-        ("published", "all", "7", "6", "-", "1"),
-        ("default", "without memory", "5", "4", "3", "2"),
-        ("default", "with statistical detector", "9", "8", "2", "-"),
-        ("default", "all", "0", "0", "0", "0"),
-    ]
-    assert shown.margin_rows(MADE) == [
-        ("published", "low", "exact sensors", "none", "61.7"),
-        ("default", "high", "real sensors", "6.25", "none"),
-    ]
-
-
-def test_a_level_of_a_factor_has_two_columns():
-    head = ("mechanism", "error 0 %", "95 % interval", "error 0.5 %", "95 % interval")
-    assert shown.level_head(MADE, "error") == head
-    assert shown.level_head(MADE, "bandwidth")[1::2] == ("low", "high")
-    assert shown.level_rows(MADE, "error", "names", LAW) == [
-        (NAMES[0], "+10.0", "+5.0 to +20.0", "-30.0", "-40.0 to -25.0")
-    ]
-    assert [row[0] for row in shown.level_rows(MADE, "error", "names", "diagnosis")] == [NAMES[1]]
-
-
-def test_findings_alarms_files_and_figure_of_a_document_made_by_hand(tmp_path, changed):
-    """Of what is worst-case alone; what is beyond chance on either side."""
-    said = [*sentences(MADE)]
-    assert said == [
-        "12 draws over 2 undeclared errors x 2 bandwidths, each flown with and without every mechanism.",
-        "network (published): without it, false alarms +25.0 points, late alarms -8.3 points.",
-        "memory (default): without it all 11 flights are the same.",
-        "In all of these flights, worst-case detectors raise 12 false alarms. The reason of 9 of them is an "
-        "undeclared error. Of 5 false alarms of the default scheme, 3 have a certificate.",
-    ]
-    text = shown.as_text(MADE)
-    assert text.startswith("\n".join(said) + "\n\nBoth systems with all of their mechanisms.\nquantity")
-    places = [text.index(caption) for caption in shown.CAPTIONS]
-    assert places == sorted(places)
-    (first, second) = csv.DictReader(shown.FILES["mechanisms.csv"](MADE).splitlines())
-    assert second["mechanism"] == "memory"
-    assert (first["false_alarms_low"], first["late_better"], first["tracking_ratio_value"]) == (
-        "0.101", "1", "1.75"
-    )  # fmt: skip
-    assert "delay_s_with" not in first
-    assert json.loads(shown.FILES["mechanisms.json"](MADE)) == MADE
-    figure = shown.figure_of(MADE)
-    assert not changed(picture(figure))
-    assert [axes.get_title() for axes in figure.axes] == [*shown.CRITERIA.values()]
-    for axes, name in zip(figure.axes, shown.CRITERIA, strict=True):
-        for place, (bar, row) in enumerate(zip(axes.containers, MADE["mechanisms"], strict=True)):
-            (dot, _, (span,)), found = bar.lines, row[name]
-            assert dot.get_color() == SERIES[place]  # of one system and of the other
-            assert dot.get_xydata().tolist() == [[pytest.approx(100 * found["value"]), place]]
-            (ends,) = span.get_segments()
-            assert ends[:, 0] == pytest.approx([100 * found["low"], 100 * found["high"]])
-    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == [*NAMES]
-    (tmp_path / "mechanisms.png").write_bytes(b"a picture")
-    page = shown.page_of(MADE, tmp_path)
-    order = [page.index(part) for part in (said[1], said[3], "<img", *shown.CAPTIONS[2:], "61.7", "ours 1")]
-    assert order == sorted(order)
-
-
-def test_what_a_mechanism_does_is_told_by_level_and_in_all(monkeypatch):
-    """Each level of a factor has the pairs of its own cases."""
-    factors = {"fault": ("loss 40 %",), "bandwidth": ("low", "high"), "error": (0.0, 0.02),
-               "instruments": ("exact sensors",)}  # fmt: skip
-    for module in (survey, effects):
-        monkeypatch.setattr(module, "FACTORS", factors)
-    keys = {f(mechanism) for mechanism in MECHANISMS for f in (with_key, without_key)}
-    rows = [{key: outcome() for key in sorted(keys)} for _ in effects.cases_of(3)]
-    first = MECHANISMS[0]
-    for case, row in zip(effects.cases_of(3), rows, strict=True):
-        changed = {"named": not (case.bandwidth == "high" and case.run < 2), "failed": case.run == 2}
-        row[without_key(first)] = outcome(**changed)
-    for row, delay_s in zip(rows, (None, 0.1, 0.2, 0.3), strict=False):
-        row[PAPER] = outcome(delay_s=delay_s, named=False, tracking_deg_s=delay_s, false_alarm=delay_s == 0.1,
-                             reason={"undeclared": 1, "certified": None})  # fmt: skip
-    found = document_of(6, 3, rows, [{"m": 1}])
-    whole = found["mechanisms"][0]
-    assert (whole["system"], whole["mechanism"], whole["serves"]) == (PAPER, first.name, first.serves)
-    assert (whole["flights"], whole["failed"]) == (8, 4)
-    by = {level: whole["by"]["bandwidth"][level] for level in ("low", "high")}
-    assert [(by[level]["flights"], by[level]["names"]["worse"]) for level in by] == [(4, 0), (4, 4)]
-    assert [by[level]["names"]["better"] for level in by] == [3, 0]  # those that have no name with it
-    assert [whole["by"]["error"][level]["flights"] for level in ("0.0", "0.02")] == [4, 4]
-    paper, default = (found["systems"][name] for name in (PAPER, DEFAULT))
-    counted = ("false_alarms", "detected", "named", "lost")
-    assert [paper[name]["count"] for name in counted] == [1, 11, 8, 1]
-    assert [default[name]["count"] for name in counted] == [0, 12, 12, 0]
-    assert (paper["flights"], paper["tracking_deg_s"]["value"]) == (12, 0.2)
-    assert paper["detected"]["value"] == pytest.approx(11 / 12)
-    told = {
-        key: found[key] for key in ("seed", "draws", "confidence", "factors", "late_s", "worse", "margins")
-    }
-    assert told == {
-        "seed": 6, "draws": 12, "confidence": 0.95, "factors": {name: [*of] for name, of in factors.items()},
-        "late_s": 0.1, "worse": 1.1, "margins": [{"m": 1}],
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("with_it", "without", "ratio"), [(0.2, 0.3, 1.5), (None, 0.3, 0.0), (0.2, None, None), (None, None, 1.0)]
 )
@@ -475,97 +266,6 @@ def test_delays_are_compared_where_no_alarm_is_false():
     assert (found["flights"], found["with"]["value"], found["without"]["value"]) == (4, 0.05, 0.05)
     assert effect_of(pairs)["late"]["worse"] == 2
     assert effect_of(pairs)["tracking_deg_s"]["flights"] == 6
-
-
-def test_an_outcome_is_of_what_was_measured(monkeypatch):
-    """The error of all axes; of a false alarm its reason; of a flight that fails its own words."""
-    document = {
-        "false_alarm": True, "fault": {"at_s": 7.0}, "departure": None,
-        "detection": {"time_s": 7.25, "delay_s": 0.25},
-        "isolation": {"fault": "rudder", "time_s": 7.5, "correct": False},
-        "tracking": {"post_fault_rms_deg_s": {"p": 0.2, "q": 0.3, "r": 0.6}},
-    }  # fmt: skip
-    flown = []
-    monkeypatch.setattr(survey, "fly", lambda scenario, watch: flown.append((scenario, watch)))
-    monkeypatch.setattr(survey, "measure", lambda landing: Metrics.of(document))
-    monkeypatch.setattr(survey, "reason_of", lambda scenario: f"reason of {scenario}")
-    found = outcome_of("the flight")
-    assert found == {
-        "failed": False, "false_alarm": True, "delay_s": None, "named": False,
-        "tracking_deg_s": pytest.approx(0.7), "verdict": [7.25, "rudder", 7.5],
-        "reason": "reason of the flight",
-    }  # fmt: skip
-    document |= {"false_alarm": False, "departure": {"time_s": 9.0, "signal": "alpha_rad"}}
-    document["isolation"]["correct"] = True
-    found = outcome_of("the flight", "verdict")
-    assert (found["delay_s"], found["named"], found["tracking_deg_s"], found["reason"]) == (
-        0.25, True, None, None
-    )  # fmt: skip
-    assert [watch is None for _, watch in flown] == [True, False]
-
-    def broken(*_, **__):
-        raise SimulationFailed("it broke")
-
-    monkeypatch.setattr(survey, "fly", broken)
-    assert outcome_of("the flight") == {
-        "failed": True, "false_alarm": False, "delay_s": None, "named": False, "tracking_deg_s": None,
-        "verdict": None, "reason": None, "error": "it broke",
-    }  # fmt: skip
-
-
-def test_a_row_of_margins_has_the_least_of_a_healthy_loop(monkeypatch):
-    asked = []
-
-    def margins_of(flown):
-        asked.append(flown)
-        return [Margin(38.0, "none", "rudder", 9.0, 7.5, 61.0), Margin(52.0, "none", "flap", 8.0, inf, 57.0)]
-
-    monkeypatch.setattr(survey, "margins_of", margins_of)
-    assert survey.margins_row((PAPER, "high", "real sensors")) == {
-        "system": PAPER, "bandwidth": "high", "instruments": "real sensors", "gain_margin_db": 7.5,
-        "phase_margin_deg": 57.0,
-    }  # fmt: skip
-    (flown,) = asked
-    assert (flown.control.law, flown.control.proportional_per_s) == ("zhang2005", 14.0)
-    assert flown.control.integral_per_s2 == pytest.approx(49.0)
-    assert not flown.sensors.is_ideal
-    assert list(survey.margin_cells()) == [
-        (system, bandwidth, instruments) for system in (PAPER, DEFAULT)
-        for bandwidth in ("low", "medium", "high") for instruments in ("exact sensors", "real sensors")
-    ]  # fmt: skip
-
-
-def test_a_draw_has_the_fault_the_instruments_and_the_bandwidth_of_its_cell():
-    """Losses take turns over the surfaces; the default law's bandwidth follows from a gain margin."""
-    cell = Flight("loss 20 %", "medium", 0.0, "real sensors, light turbulence", 0)
-    flown = [scenario_of(cell._replace(run=run), 7, DEFAULT) for run in range(6)]
-    assert [of.faults[0].actuator for of in flown] == ["aileron", "elevator", "rudder"] * 2
-    assert {of.faults[0].magnitude for of in flown} == {0.2}
-    assert {of.control.gain_margin_db for of in flown} == {12.0}
-    for of in flown:
-        assert 6.0 <= of.faults[0].at_s <= 9.0
-        assert of.duration_s == pytest.approx(of.faults[0].at_s + 8.0)
-        assert 38.0 <= of.initial.airspeed_mps <= 52.0
-        assert (of.environment.severity, of.fdi.bounds.turbulence) == ("light", "light")
-        assert (of.fdi.bounds.constant_rad_s2.q, of.fdi.bounds.inertia_coupling.r) == (0.002, 0.0)
-        for axis, hz in (("p", 0.25), ("q", 0.2), ("r", 0.15)):
-            (signal,) = getattr(of.reference, axis)
-            assert (signal.sine.amplitude_deg_s, signal.sine.frequency_hz) == (3.0, hz)
-            assert 0.0 < getattr(of.uncertainty.sinusoid, axis).amplitude_rad_s2 <= 0.002
-            assert 1.0 <= getattr(of.uncertainty.sinusoid, axis).frequency_rad_s <= 15.0
-    phases = {getattr(of.reference, axis)[0].sine.phase_deg for of in flown for axis in "pqr"}
-    assert len(phases) == 18
-    assert min(phases) < -60.0
-    assert max(phases) > 60.0
-    lost = scenario_of(Flight("unanticipated", "low", 0.005, "exact sensors", 1), 7, PAPER)
-    assert (lost.fdi.bounds.constant_rad_s2.r, lost.fdi.bounds.inertia_coupling.p) == (0.02, 0.25)
-    thetas = [getattr(lost.uncertainty.inertia_coupling, axis) for axis in "pqr"]
-    assert 0.01 < max(map(abs, thetas)) <= 0.25
-    assert (lost.faults[0].type, lost.faults[0].Cm_alpha3) == ("unanticipated", 10.0)
-    assert {round(abs(ratio - 1.0), 9) for ratio in lost.uncertainty.coefficients.values()} == {0.005}
-    assert {ratio > 1.0 for ratio in lost.uncertainty.coefficients.values()} == {True, False}
-    assert survey.surface_of(Flight("unanticipated", "low", 0.0, "exact sensors", 1)) == "-"
-    assert len(survey.cases_of(3)) == 4 * 3 * 4 * 3 * 3
 
 
 @needs.service("proof")

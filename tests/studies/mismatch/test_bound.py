@@ -6,12 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.schema import load_scenario
-from beaver_ftc.studies.mismatch import bound
 from beaver_ftc.studies.mismatch.bound import (
-    PUBLISHED_CASE,
     guarantee_with,
-    published_case,
     recommend,
     recommended_for,
     rounded_up,
@@ -25,7 +21,6 @@ from beaver_ftc.studies.mismatch.split import AxisBound, Stretch, Tally
 from flying import loss, scenario
 
 CONSTANT = np.array([0.02, 0.02, 0.02])
-PLACE = ("airspeed_mps", "altitude_m", "alpha_rad")
 
 
 def stretch(t_s, eta, fault=0.0, eta_bar=0.03, source="sinusoids"):
@@ -203,34 +198,3 @@ def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeyp
     assert settled
     assert flown == pytest.approx([0.1, 0.12, 0.15, 0.18][: alarms + 1])  # a fifth more, two digits, upwards
     assert constant["q"] == flown[-1]
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "up"),
-    [(0.0121, 2, 0.013), (0.012, 2, 0.012), (1.21, 2, 1.3), (12.1, 2, 13.0), (121.0, 2, 130.0),
-     (1200.0, 2, 1200.0),
-     (9910.0, 2, 10000.0), (1211.0, 3, 1220.0), (-1.0, 2, 0.0), (0.0, 2, 0.0)],
-)  # fmt: skip
-def test_two_digits_that_are_not_below(value, digits, up):
-    assert rounded_up(value, digits) == pytest.approx(up, rel=1e-12)
-
-
-def test_the_published_case_flies_with_the_declared_bound_and_design_of_the_flights(monkeypatch):
-    """Settled with are the flights and the published case, both under what the first flight declares."""
-    declared = {"p": 0.011, "q": 0.023, "r": 0.037}
-    like = scenario(design_model={"mass": 1.07}, fdi={"bounds": {"constant_rad_s2": declared}}, duration_s=3)
-    found = []
-    monkeypatch.setattr(bound, "tally_of_flight", lambda case: (f"tally of {case.name}", {}))
-    monkeypatch.setattr(
-        bound, "settle", lambda cases, kept: (found.append((cases, kept)), ({"p": 0.05}, 7))[1]
-    )
-    monkeypatch.setattr(bound, "guarantee_with", lambda constant, of: (constant, of))
-    said = recommended_for([like, scenario()], ["one", "two"])
-    (cases, kept), published = found[0], load_scenario(PUBLISHED_CASE)
-    assert kept == ["one", "two", f"tally of {PUBLISHED_CASE}"]
-    assert (cases[0], cases[2].faults, cases[2].duration_s) == (like, published.faults, published.duration_s)
-    assert cases[2] == published_case(declared, like)
-    assert cases[2].fdi.bounds.constant_rad_s2.model_dump() == declared
-    assert cases[2].design_model == like.design_model
-    assert said["guarantee"] == {"declared": (declared, like), "recommended": ({"p": 0.05}, like)}
-    assert said["recommended"] == {"constant_rad_s2": {"p": 0.05}, "runs": 2, "coverage": 2 / 3, "settled": 7}

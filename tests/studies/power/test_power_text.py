@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.power.shown import as_text, comparison, shares, title_of
+from beaver_ftc.studies.power.shown import as_text, comparison
 from beaver_ftc.studies.power.survey import WITHIN_S
 
 AT = {"sensors": "perfect", "turbulence": "none"}
@@ -58,13 +58,6 @@ def test_every_line_says_what_the_survey_found(document):
     assert text.endswith("could not be judged: other: broke")
 
 
-def test_by_chance_as_many_are_detected_as_alarms_fall_into_the_time(document):
-    """3.6 alarms an hour are 0.1 % of the seconds."""
-    (line,) = [line for line in as_text(document).splitlines() if "By chance" in line]
-    percent, seconds = line.split("By chance alone ")[1].split(" % are detected within ")
-    assert float(percent) == pytest.approx(0.1 * float(seconds.split()[0]), abs=0.051)
-
-
 @pytest.mark.parametrize(("p", "chance"), [(0.0002, ""), (0.3, ", so this may be chance")])
 def test_below_a_table_it_is_said_who_is_better(document, p, chance):
     """Of each surface, with intervals; the built-in detectors alone are no rivals."""
@@ -81,11 +74,6 @@ def test_below_a_table_it_is_said_who_is_better(document, p, chance):
         f": {share} is better than both 40 % (30 % to 50 %); wins: 13 against 1, p = {p:.2g}{chance}."
     )
     assert lines.index(said) < next(i for i, line in enumerate(lines) if line.startswith("per surface: "))
-
-
-def test_nothing_flown_has_no_shares():
-    assert shares(total("x", flights=0)) == "-"
-    assert title_of("tactical-grade", "light") == "tactical-grade sensors, light turbulence"
 
 
 def test_where_one_is_better_than_another_is_said_by_condition():

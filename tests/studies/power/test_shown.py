@@ -1,11 +1,9 @@
 """The survey as document, rows, words and pictures: of traces made by hand, all that there is of each."""
 
-import io
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
@@ -19,7 +17,6 @@ from beaver_ftc.studies.power.survey import (
     Block,
     Condition,
     Watched,
-    fly_block,
     scenario_of,
     strikes_at_s,
 )
@@ -86,36 +83,10 @@ def files(surveyed):
     return flown, contents(shown.FILES, (document, flown))
 
 
-def test_every_row_is_written(files, changed):
-    flown, written = files
-    assert set(written) == {"power.json", "power.txt", "power.parquet", "figures"}
-    assert sorted({name.rpartition(".")[0] for name in written["figures"]}) == [
-        "map-a-scheme", "map-adaptive-estimators", "map-both", "schemes-ideal", "schemes-tactical-grade"
-    ]  # fmt: skip
-    assert {name.rpartition(".")[2] for name in written["figures"]} == {"png", "svg"}
-    table = pq.read_table(io.BytesIO(written["power.parquet"]))
-    assert table.to_pylist() == flown
-    types = {field.name: str(field.type) for field in table.schema}
-    numbers = [name for name, kind in types.items() if kind in ("double", "int64")]
-    assert not changed({
-        "types": types, "first": flown[:2],
-        "in short": {name: in_short(np.array(table[name].to_pylist(), float)) for name in numbers},
-        "false alarms": sum(row["false_alarm"] + 100 * row["own_false_alarm"] for row in flown),
-    })  # fmt: skip
-
-
 @pytest.mark.parametrize("name", ["map-both", "map-a-scheme", "schemes-ideal"])
 def test_the_pictures(files, name, changed):
     figure = files[1]["figures"][f"{name}.png"]
     assert not changed(picture(figure))
-
-
-def test_a_map_has_a_row_a_surface_and_a_column_a_condition(surveyed):
-    document, rows = surveyed
-    grid = document["grid"] | {"conditions": document["grid"]["conditions"][:1]}
-    here = [row for row in rows if row["sensors"] == "ideal" and row["scheme"] == BOTH]
-    figure = shown._maps(document | {"grid": grid}, BOTH, here)
-    assert figure.axes[0].get_subplotspec().get_geometry()[:2] == (2, 1)
 
 
 def test_a_flight_of_the_survey(changed):
@@ -128,47 +99,6 @@ def test_a_flight_of_the_survey(changed):
     assert [one.excitation_deg_s for one in GRID.healthy()[:4]] == [2.0, 5.0, 2.0, 5.0]
     assert [one.seed for one in GRID.healthy()[8:11]] == [1_000_000, 1_000_001, 1_000_002]
     assert [one.seed for one in GRID.faulted()[:7]] == [0, 1, 2, 1000, 1001, 1002, 0]
-
-
-def test_what_comes_of_a_block_in_short_flights(changed, monkeypatch):
-    """A quarter of a second after a fault at a tenth, and a second without a fault."""
-    monkeypatch.setattr(survey, "STRIKES_S", (0.1, 0.1))
-    monkeypatch.setattr(survey, "WATCHED_S", 0.25)
-    grid = replace(GRID, surfaces=("elevator",), magnitudes=(0.5, 1.0), healthy_flight_s=0.5)
-    block = Block(GRID.conditions[1], 5.0, 7)
-    for faulted in (True, False):
-        found = fly_block((block, faulted), grid, (ESTIMATORS, BOTH))
-        assert found.failures == []
-        traces = {
-            scheme: [
-                [one.before, one.faulted, one.healthy_s, in_short(one.records), in_short(one.rises)]
-                for one in of
-            ]
-            for scheme, of in found.traces.items()
-        }
-        document = {"faults": found.faults, "deflections": found.deflections, "traces": traces}
-        assert not changed(document, part="faulted" if faulted else "healthy")
-
-
-def test_a_survey_flies_the_healthy_blocks_first(monkeypatch, tmp_path):
-    """Its document is made of these as healthy ones and of the rest as faulted ones."""
-    asked = []
-
-    def run_study(study, out, workers, progress):
-        asked.append((study, out, workers, progress))
-        return "document", "rows"
-
-    monkeypatch.setattr(shown, "run_study", run_study)
-    monkeypatch.setattr(shown, "document_of", lambda grid, healthy, faulted: (healthy, faulted))
-    assert shown.run_power(tmp_path, GRID, [BOTH], 3) == "document"
-    ((study, out, workers, progress),) = asked
-    assert (study.name, out, workers, progress) == ("power", tmp_path, 3, None)
-    assert [faulted for _, faulted in study.cases] == [False] * 16 + [True] * 12
-    assert study.document(list(range(28))) == (list(range(16)), list(range(16, 28)))
-    shown.run_power(tmp_path, GRID, [BOTH])
-    assert asked[1][2] == 1
-    lost = survey.lost(SimpleNamespace(what=study.cases[-1]), "gone")
-    assert lost.failures == ["tactical-grade light, seed 1002: gone"]
 
 
 def test_a_fault_after_which_nothing_was_seen_stands_out_of_nothing():

@@ -38,7 +38,6 @@ from beaver_ftc.studies.power.survey import (
     loss,
     scenario_of,
     strikes_at_s,
-    with_fdi,
 )
 
 STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
@@ -288,25 +287,10 @@ class Raises:
 
 
 class TestContenders:
-    def test_ours_come_first_and_only_once(self):
-        names = contenders(["observer-constant", ESTIMATORS])
-        assert names == (*BUILT_IN, "observer-constant")
-        everybody = contenders()
-        assert {"augmented-ekf", "rls-monitor"} <= set(everybody)
-        assert "none" not in everybody
-
     def test_a_scheme_that_is_none_is_refused(self):
         for name in ("none", "augmented-ekff"):
             with pytest.raises(BadInput, match=r"--schemes: .*(allowed|did you mean)"):
                 contenders([name])
-
-    def test_what_a_built_in_one_wants_is_in_its_flight(self):
-        flight = scenario_of(Block(LIGHT, 3.0, 1), 5.0)
-        for scheme in contenders([]):
-            fdi = with_fdi(flight, scheme).fdi
-            assert fdi.bounds == flight.fdi.bounds
-            assert (fdi.statistical is not None) == (scheme != ESTIMATORS)
-            assert fdi.authority == BUILT_IN[scheme].get("authority", "either")
 
     def test_a_plug_in_that_fails_is_named_and_the_others_go_on(self):
         broken = f"{__name__}:Raises"

@@ -6,7 +6,6 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.results.style import LOOKS
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.reproduce import (
     beside,
@@ -19,12 +18,10 @@ from beaver_ftc.studies.reproduce import (
 )
 from beaver_ftc.studies.reproduce.cases import (
     CASES,
-    CORNERS,
     GAINS,
     OURS,
     PUBLISHED,
     VARIANTS,
-    Changed,
     LazyFlights,
     fly_case,
     keys_of,
@@ -323,42 +320,10 @@ def test_command_writes_tables_figures_and_page(tmp_path, monkeypatch):
     assert all(f"figures/{view.name}.png" in text for view, _, _ in FIGURES)
 
 
-def test_a_row_is_the_numbers_of_a_setting_or_whether_a_healthy_flight_alarms():
-    row = reproduction.row_of((reproduction.NUMBERS, CORNERS[0]))
-    assert len(row) == 2 * len(MEASURED) + 1
-    numbers, without = row[: len(MEASURED)], row[len(MEASURED) : -1]
-    for claim, found, ablated in zip(MEASURED, numbers, without, strict=True):
-        assert np.isnan(found) == bool(claim.because), claim
-        assert np.isnan(ablated) == bool(claim.because or claim.construction), claim
-    assert row[-1] == len(reproduction.FAULTY)
-    (tracked,) = (i for i, claim in enumerate(MEASURED) if claim.where == "Fig. 2a")
-    elsewhere = fly_case(CASES["fault-free-nominal"], CORNERS[0].changes)
-    assert row[tracked] == pytest.approx(elsewhere.after_deg_s("q") / 3.0)
-    assert row[tracked] != MEASURED[tracked].number(flights_of())
-    assert reproduction.row_of((reproduction.FALSE_ALARM, CORNERS[0])) == [0.0]
-    tight = Changed("tight", {"fdi.bounds.constant_rad_s2": {"p": 0.01, "q": 0.01, "r": 0.01}}, "")
-    assert reproduction.row_of((reproduction.FALSE_ALARM, tight)) == [1.0]
-
-
-def test_no_look_in_a_figures_legend_means_two_things():
-    """Curves that look alike are called alike, and so share one entry of the legend."""
-    for view, _, _ in FIGURES:
-        said = {}
-        for trace in (trace for panel in view.panels for trace in panel.traces if trace.label):
-            look = LOOKS[trace.role]
-            said.setdefault((look.colour, look.dash), set()).add(trace.label)
-        assert all(len(labels) == 1 for labels in said.values()), (view.name, said)
-
-
 def test_what_counts_as_good_and_taken_over_is_the_same_everywhere():
     limits = {claim.source.split(":")[0]: claim.limit for claim in MEASURED}
     assert limits["'good', 'acceptable', 'satisfactory' tracking"] == measures.GOOD
     assert limits["'reallocated'"] == measures.TAKEN_OVER
-
-
-def test_settings_have_names_of_their_own():
-    names = [setting.name for setting in reproduction.SETTINGS]
-    assert len(set(names)) == len(names)
 
 
 def test_cases_that_are_shown_say_where():

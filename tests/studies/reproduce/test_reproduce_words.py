@@ -1,10 +1,8 @@
 """The reproduction's tables and sentences, of claims that differ in everything."""
 
-import pytest
-
 from beaver_ftc.diagnosis.schemes.published import N_CENTRES
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.reproduce import beside, truth_and_design, words
+from beaver_ftc.studies.reproduce import words
 
 CLAIMS = [
     {
@@ -70,86 +68,6 @@ DOCUMENT = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "said"),
-    [
-        (None, "s", "never"), (0.2468, "s", "0.247 s"), (99.94, "s", "99.9 s"), (999.9, "s", "1000 s"),
-        (1234.5, "", "1234"), (-123.4, "m", "-123 m"), (0.123, "of all", "12.3 % of all"),
-    ],
-)  # fmt: skip
-def test_numbers_have_three_digits_and_shares_are_in_percent(value, unit, said):
-    assert words.number(value, unit) == said
-
-
-def test_each_statement_is_a_row_of_the_verdict():
-    assert words.verdict_rows(DOCUMENT) == [
-        (
-            "Fig. 2", "The alarm is early.", "elevator, q: delay 0.247 s", "at most 1 s: the paper's own",
-            "the alarm: never", "borne out, elsewhere too", "",
-        ),
-        (
-            "Fig. 5", "Most of it is given.", "rudder: share 25.0 % of the demand",
-            "at least 50 %: most",
-            "the flap: 12.5 % of the demand", "not borne out", "see the text",
-        ),
-        ("IV", "There are others.", "-", "-", "-", "cannot be judged", "of others"),
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("verdict", "because", "said"),
-    [
-        ("borne out", "", "in 1 of 2 settings that the paper did not fly"),
-        ("cannot be judged", "", "holds without it as well"), ("not borne out", "as it is", "as it is"),
-        ("not borne out", "", ""), ("stronger than the paper", "", ""),
-    ],
-)  # fmt: skip
-def test_what_a_verdict_hangs_on(verdict, because, said):
-    claim = {**CLAIMS[1], "verdict": verdict, "because": because}
-    assert words.remark(claim) == said
-    built = words.remark({**claim, "construction": True})
-    assert built.startswith("true by the construction of the code")
-    assert ("settings" in built) is False
-
-
-def test_what_changes_make_of_a_statement():
-    assert words.sensitivity_rows(DOCUMENT) == [
-        ("Fig. 2", "The alarm is early.", "0.1 s", "123 s", "2 of 2"),
-        ("Fig. 5", "Most of it is given.", "nothing", "90.0 % of the demand", "2 of 2"),
-    ]
-    assert words.exceptions(DOCUMENT) == [
-        "at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand",
-        "at 50 Hz: Fig. 5, most of it is given: 60.0 % of the demand, without the flap",
-    ]
-    assert words.choice_rows(DOCUMENT) == [("lambda", "p 1.5, q 2; 3", "not in the paper")]
-    assert words.gain_rows(DOCUMENT) == [
-        (
-            "control.options.gain", "60", "how fast", "search",
-            "Fig. 5, most of it is given: 30.0 % of the demand", "none",
-        ),
-    ]  # fmt: skip
-    assert words.ablation_rows(DOCUMENT) == [("the flap", "a: 1; b.c: none; d: p 0.5", "2", "1")]
-
-
-def test_both_schemes_and_both_designs_in_rows():
-    both, designs = DOCUMENT["beside"], DOCUMENT["truth_and_design"]
-    paper, ours = beside.rows_of(both)
-    assert paper == (
-        "rudder", "paper", "0.28 s", "rudder", "0.29 s", "0.084 deg/s", "0.158 deg/s", "210 deg",
-        "864 deg²/s",
-    )  # fmt: skip
-    assert ours[1:4] == ("ours", "-", "-")
-    assert ours[6] == "aircraft lost"
-    assert beside.sentences(both) == ["rudder: isolation after 0.2 s, ours never"]
-    assert beside.alarms_sentence(both).endswith(
-        "published uncertainty: 0 with the scheme of the paper, 3 with ours."
-    )
-    assert truth_and_design.term_rows(designs) == [("Cm", "Cm_0, Cm_dpt", "Cm_0", "Cm_dpt")]
-    assert truth_and_design.flown_rows(designs) == [
-        ("as printed", "0.02", "none", "0.5", "11.2", "2", "0.123 s", "-"),
-    ]
-
-
 def test_the_outcome_in_a_sentence():
     assert words.headline(DOCUMENT) == (
         "The paper has 23 statements. 5 of them can be tested: 2 hold, 2 do not hold, and 1 hold even "
@@ -177,12 +95,6 @@ def test_the_terminal_shows_the_statements_and_what_excepts_them():
     assert lines[at + 1] == "  except at 50 Hz: Fig. 5, most of it is given: 30.0 % of the demand"
     assert "  rudder: isolation after 0.2 s, ours never" in lines
     assert lines[-1] == "page: out/reproduction.html"
-
-
-def test_what_is_not_borne_out_is_red_and_where_it_stands_is_there():
-    coloured = words.as_text(DOCUMENT, "out", colour=True)
-    assert "\x1b[1;31mnot borne out" in coloured
-    assert "\x1b[32mborne out, elsewhere too" in coloured
 
 
 def test_the_listed_deviations_have_the_numbers_of_the_code():

@@ -1,6 +1,7 @@
 """The answer to "how small?" in sentences and files: of a survey made by hand, no two numbers alike."""
 
 import json
+from pathlib import Path
 
 from beaver_ftc.studies.present.page import contents
 from beaver_ftc.studies.smallest.shown import FILES, _is_better, as_text, sentences
@@ -67,7 +68,7 @@ def test_files_hold_every_row(changed):
     files = contents(FILES, CASES["all known"])
     assert json.loads(files["smallest.json"]) == CASES["all known"]
     assert not changed(files["smallest.csv"].splitlines(), "csv")
-    assert not changed(page(files["smallest.html"]), "page")
+    assert not changed(page(files["smallest.html"](Path())), "page")
 
 
 def test_what_limits_most_is_the_variant_that_finds_the_smallest():

@@ -1,6 +1,5 @@
 """Subset simulation: known normal tails, their intervals, what it says when it cannot, and flights."""
 
-import contextlib
 import json
 import math
 from statistics import NormalDist
@@ -192,45 +191,6 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     assert len(flown) == whole["flights"] - 12
 
 
-def test_flights_that_fail_are_counted_over_all_rounds(drift, tmp_path, monkeypatch):
-    """Every tenth flight of the first round, every seventh of the others."""
-    monkeypatch.setattr(Chains.__init__, "__defaults__", (2, 10))
-    failed, first = [], 2 * 10
-
-    def flown(sweep, name, case):
-        failed.append(case[0] % (10 if case[0] < first else 7) == 0)
-        return {"score": -math.inf if failed[-1] else case[1][0] - 3.0, "failed": failed[-1]}
-
-    monkeypatch.setattr(rare, "_fly", flown)
-    document = run_rare(drift, "no_departure", tmp_path)
-    assert document["flights"] == len(failed) > first
-    assert document["failed"] == sum(failed) > sum(failed[:first]) > 0
-
-
-def test_the_likeliest_values_are_said_with_four_digits():
-    part = {"low": 0.0123, "high": 0.0456, "events": 2, "of": 90}
-    document = part | {
-        "sweep": "drift", "expectation": "no_departure", "probability": 0.0234, "flights": 180, "plain": part,
-        "failed": 0,
-        "likeliest": {"values": {"a": 1.23456, "b": -0.00987654}}, "folder": "out",
-    }  # fmt: skip
-    assert as_text(document).splitlines() == [
-        "drift: no_departure not met",
-        "  probability  0.023, 95 % 0.012 to 0.046, 180 flights",
-        "  plain        2 of 90 flights, 95 % 0.012 to 0.046",
-        "  likeliest    a 1.235, b -0.009877",
-        "  flies it     beaver-ftc run out/flight.yaml",
-        "",
-        "results: out",
-    ]
-    unknown = document | {"probability": None, "why": "too few", "failed": 7, "likeliest": None}
-    assert as_text(unknown).splitlines()[1::2] == [
-        "  probability  not known: too few, 95 % 0.012 to 0.046, 180 flights",
-        "  not flown    7 flights, counted as no event",
-        "results: out",
-    ]
-
-
 def test_which_expectations_have_a_score(drift):
     assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
 
@@ -358,50 +318,3 @@ def test_a_flight_that_cannot_be_flown_is_no_event(biased, monkeypatch):
     assert flown == [(rare.scenario_at(biased, 7, [0.5, 0.0, -1.0]), EXPECTATION)]
     monkeypatch.setattr(rare, "score_of", broken)
     assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, 0.0])) == {"score": -math.inf, "failed": True}
-
-
-@pytest.mark.parametrize("flown_first", [True, False])
-def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
-    biased, tmp_path, monkeypatch, flown_first, capsys
-):
-    """Two flights of which one fails, then one that is flown: as many failures as flights of this round."""
-
-    def flies(number, cases):
-        assert cases == [[(0, [1.0]), (1, [2.0])], [(0, [3.0])]][number]
-        failed = [number == 0, number == 0 and not flown_first]
-        return [{"failed": of, "score": -1.0 - i} for i, of in zip(range(len(cases)), failed, strict=False)]
-
-    def go(chains, fly):
-        scores = [fly(0, np.array([[1.0], [2.0]])), fly(1, np.array([[3.0]]))]
-        assert [of.tolist() for of in scores] == [[-1.0, -2.0], [-1.0]]
-
-    monkeypatch.setattr(Chains, "go", go)
-    asked = []
-    monkeypatch.setattr(rare, "in_rounds", lambda *of: asked.append(of) or contextlib.nullcontext(flies))
-    monkeypatch.setattr(rare, "_document", lambda sweep, expectation, chains, failed: {"failed": failed})
-    told = []
-    if not flown_first:
-        with pytest.raises(SimulationFailed, match="no flight could be flown"):
-            run_rare(biased, EXPECTATION, tmp_path, tell=told.append)
-        assert told == []
-        return
-    assert run_rare(biased, EXPECTATION, tmp_path, tell=told.append)["failed"] == 1
-    assert [line.partition(": ")[2] for line in told] == ["2 flights, level 0", "1 flights, level 0"]
-    ((of, out, workers),) = asked
-    assert (out, workers, of.follows_from[1:]) == (tmp_path, 1, [rare.RUNS, rare.MEMBERS])
-    assert of.lost(None, "was killed") == {"score": -math.inf, "failed": True}
-    assert "of a flight was killed; such flights count as no event" in capsys.readouterr().err
-
-
-def test_the_design_point_is_the_nearest_event_by_the_number_of_its_flight():
-    """Of three rounds of three flights: the nearest to the middle of those whose score is not below zero."""
-    chains = Chains(2, 1)
-    rounds = [
-        ([[0.1, 0.0], [3.0, 4.0], [5.0, 6.0]], [-0.1, 0.0, 2.0], (5.0, 1, [3.0, 4.0])),
-        ([[3.0, 4.1], [0.0, 0.2], [4.0, -0.5]], [1.0, -0.2, 0.0], (16.25**0.5, 5, [4.0, -0.5])),
-        ([[5.0, 5.0], [4.0, 0.5], [0.0, 0.0]], [1.0, 1.0, -3.0], (16.25**0.5, 5, [4.0, -0.5])),
-    ]
-    for points, scores, (distance, flight, point) in rounds:
-        chains._flown(lambda number, flat, scores=scores: np.array(scores), np.array(points))
-        assert chains.design[:2] == pytest.approx((distance, flight))
-        assert chains.design[2].tolist() == point

@@ -12,7 +12,7 @@ from beaver_ftc.studies.sweep.one_flight import row_of_failure, schema_of, table
 from beaver_ftc.studies.sweep.sampling import Assignment
 from beaver_ftc.studies.sweep.store import Store, identity_of
 
-from .conftest import parts_in, sweep_of
+from .conftest import sweep_of
 
 
 @pytest.fixture
@@ -83,20 +83,6 @@ def test_a_damaged_identity_loses_nothing(store, short, text, capsys):
         store.begin(identity_of(short), resume=True)
 
 
-def test_damaged_results_are_set_aside(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        store.parts.land(0, batch_of(short, range(3)))
-        store.compact([store.landed(0, range(3))])
-        whole = store.results.read_bytes()
-        for name in ("results.parquet.damaged", "results.parquet.damaged-2"):
-            store.results.write_bytes(whole[: len(whole) // 2])
-            assert not store.is_compacted(3)
-            assert store.landed(0, range(3)) is None
-            assert not store.results.exists()
-            assert (store.folder / name).read_bytes() == whole[: len(whole) // 2]
-
-
 def test_a_folder_in_the_place_of_the_results_is_set_aside(store, short):
     with store:
         store.begin(identity_of(short), resume=False)
@@ -105,22 +91,6 @@ def test_a_folder_in_the_place_of_the_results_is_set_aside(store, short):
         assert store.landed(0, range(3)) is None
         assert not store.results.exists()
         assert (store.folder / "results.parquet.damaged").is_dir()
-
-
-def test_compacting_joins_the_parts_in_order_and_removes_them(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        for number in (2, 0, 1):
-            store.parts.land(number, batch_of(short, range(3 * number, 3 * number + 3)))
-        store.compact(store.landed(n, range(3 * n, 3 * n + 3)) for n in range(3))
-    table = pq.read_table(store.results)
-    assert table.column_names[0] == "run"
-    assert table.column("run").to_pylist() == list(range(9))
-    assert parts_in(store.folder) == 0
-    for runs in (range(3, 6), range(6, 9)):  # of the whole the rows of a batch alone
-        assert store.landed(runs[0] // 3, runs).column("run").to_pylist() == list(runs)
-    assert store.is_compacted(9)
-    assert not store.is_compacted(10)
 
 
 def test_where_nothing_has_been_flown_there_is_nothing_to_go_on_with(store, short):

@@ -1,13 +1,12 @@
 """What a sweep says, line by line, of a summary in which no two numbers are alike."""
 
-import numpy as np
 import pytest
 
 from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.summary import summarise
 
-from .counted import ROWS, detected, flights_of, load_sweep_text, row
 from .counted import SWEEP as SWEEP_TEXT
+from .counted import detected, flights_of, load_sweep_text, row
 
 
 def rate(count, of):
@@ -102,15 +101,6 @@ def test_a_share_has_the_digits_that_matter(share, said):
     assert words.percent(share) == said
 
 
-def test_in_colour_a_failure_is_red_and_what_is_missed_too():
-    text = words.summary_text(SUMMARY, colour=True)
-    assert "\x1b[1;31ma-sweep" in text
-    assert "\x1b[1;31mMISSED" in text
-    assert "\x1b[32mmet" in text
-    assert "\x1b[1mresults" in text
-    assert "\x1b[1;32ma-sweep" in words.summary_text(SUMMARY | {"passed": True}, colour=True)
-
-
 def test_a_promise_counts_from_the_faults_first_frame(tmp_path):
     """Up to a frame of 0.01 s after the certain instant an alarm is in time; later it breaks the promise."""
     sweep, promised = load_sweep_text(SWEEP_TEXT), {"detection.guaranteed_delay_s": 0.25}
@@ -118,25 +108,3 @@ def test_a_promise_counts_from_the_faults_first_frame(tmp_path):
     rows = [detected(run, delay, **promised) for run, delay in enumerate(delays)]
     found = summarise(flights_of([*rows, row(4, **promised), row(5)], tmp_path), sweep)
     assert found["guarantee"] == {"promised": 5, "broken": 3}
-
-
-def test_faults_of_a_kind_are_counted_by_themselves(tmp_path):
-    other = {"fault.actuator": "rudder"}
-    rows = [*ROWS[:6], detected(6, 0.1, "rudder", **other), row(7, **other)]
-    found = summarise(flights_of(rows, tmp_path), load_sweep_text(SWEEP_TEXT))
-    elevator, rudder = found["by_fault"]
-    assert (elevator["flights"], rudder["flights"]) == (6, 2)
-    assert (elevator["detection"]["count"], elevator["detection"]["of"]) == (6, 6)
-    assert (rudder["detection"]["count"], rudder["detection"]["of"]) == (1, 2)
-    assert (elevator["isolation"]["count"], rudder["isolation"]["count"]) == (4, 1)
-    assert found["false_alarms"]["closest_residual_ratio"] == 0.5
-
-
-def test_a_worst_flight_that_many_equal_says_so():
-    from beaver_ftc.studies.sweep.outcomes import _largest
-
-    values = np.array([0.1, 0.3, 0.3 + 1e-12, 0.2, 0.3, -np.inf])
-    said = dict(_largest(values, lambda i: f"after {values[i]:.3g} s"))
-    assert next(iter(said)) == 2  # the largest of them
-    assert set(said.values()) <= {"after 0.3 s, as in 2 more", "after 0.2 s", "after 0.1 s"}
-    assert said[2] == "after 0.3 s, as in 2 more"

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -144,7 +144,7 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
 # kind -> a built-in sweep, and what its flights have besides
-KINDS: dict[str, tuple[str, dict[str, Any]]] = {
+KINDS: dict[str, tuple[str, Document]] = {
     "published": ("elevator-effectiveness", {}),
     "class all": (
         "elevator-effectiveness",
@@ -190,7 +190,7 @@ def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[s
     return {kind: _medians(rows) for kind, rows in seen.items()}
 
 
-def _flown(sweep: Sweep, changes: dict[str, Any], run: int, alike: bool = False) -> Taken:
+def _flown(sweep: Sweep, changes: Document, run: int, alike: bool = False) -> Taken:
     """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
 
     All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.

@@ -16,7 +16,7 @@ from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import aligned
+from beaver_ftc.studies.present.tables import aligned, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +26,7 @@ Cell = Callable[[Document], str]
 Columns = Sequence[tuple[str, Cell]]
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f}"
+_PERCENT = partial(percent, unit="")
 
 
 def _cell(form: Callable[[Any], str], *keys: str, none: str = "-") -> Cell:
@@ -48,16 +47,16 @@ def _free(row: Document) -> str:
     """What a scheme finds at the most sensitive level without a false alarm."""
     if row.get("free") is None:
         return "-"
-    rate, delay = _cell(_percent, "detection_rate"), _cell("{:.2f}".format, "delay_median_s", none="never")
+    rate, delay = _cell(_PERCENT, "detection_rate"), _cell("{:.2f}".format, "delay_median_s", none="never")
     return f"{rate(row['free'])} / {delay(row['free'])}"
 
 
 DIAGNOSIS: Columns = (
     ("scheme", _cell(str, "scheme")),
     ("false alarms/h (95 %)", _alarms),
-    ("detected %", _cell(_percent, "detection_rate")),
+    ("detected %", _cell(_PERCENT, "detection_rate")),
     ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
-    ("isolated %", _cell(_percent, "isolation_rate")),
+    ("isolated %", _cell(_PERCENT, "isolation_rate")),
     ("with no false alarm: detected % / delay s", _of_faults(_free)),
     ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
     ("lost", _cell(str, "departures")),

@@ -23,7 +23,7 @@ from beaver_ftc.studies.engine.statistics import (
     wilson,
     wilson_bound,
 )
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import finite, percent
 
 
 def line_of(
@@ -243,11 +243,6 @@ def leader(
         f"{what}: {said(first)} is better than {said(second)}; wins: {wins} against {losses}, "
         f"p = {duel['p']:.2g}{sure}."
     )
-
-
-def percent(share: float) -> str:
-    """A share in per cent."""
-    return f"{100 * share:.0f} %"
 
 
 def _ratio(ratio: float) -> str:

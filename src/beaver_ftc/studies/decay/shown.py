@@ -1,15 +1,15 @@
 """The decay of a verdict as sentences, a table, a figure and files."""
 
-import json
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, label_edges, panels
-from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, as_html, versions_line
-from beaver_ftc.studies.present.tables import aligned, as_csv, number
+from beaver_ftc.studies.present.page import Part, Pictures, Table, study_files, versions_line
+from beaver_ftc.studies.present.tables import aligned, estimate, grouped, or_never, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,20 +38,13 @@ def as_text(document: Document) -> str:
 
 def sentences(document: Document) -> Iterator[str]:
     """What holds as declared, and the least factor at which an error changes the verdict."""
-    *_, together = _by_error(document)
-    alarms, misnamed = (_count(together[0], name) for name in ("false_alarm", "misnamed"))
+    errors = list(grouped(document["rows"], "error").values())
+    alarms, misnamed = (_count(errors[-1][0], name) for name in ("false_alarm", "misnamed"))
     yield (
         f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
         f"false alarm and {misnamed} a wrong name."
     )
-    yield from map(_onset, _by_error(document))
-
-
-def _by_error(document: Document) -> list[list[Document]]:
-    """The rows of each error, all together last."""
-    rows = document["rows"]
-    names = dict.fromkeys(row["error"] for row in rows)
-    return [[row for row in rows if row["error"] == name] for name in names]
+    yield from map(_onset, errors)
 
 
 def _count(row: Document, name: str) -> str:
@@ -79,28 +72,28 @@ def cells(row: Document) -> tuple[str, ...]:
     """One row for HEAD."""
     return (
         row["error"], row["declared"], f"{row['factor']:g}", str(row["flights"]),
-        *(_percent(row[name]) for name in ("false_alarm", "detected", "named", "misnamed")),
-        _interval(row["delay_s"]), _interval(row["tracking_deg_s"]), _interval(row["bound_used"], 100.0),
+        *(_share(row[name]) for name in ("false_alarm", "detected", "named", "misnamed")),
+        *(_interval(row[name]) for name in ("delay_s", "tracking_deg_s")),
+        _interval(row["bound_used"], _used),
     )  # fmt: skip
 
 
-def _percent(rate: Document) -> str:
-    return f"{100 * rate['value']:.0f} ({100 * rate['low']:.0f} to {100 * rate['high']:.0f})"
+def _share(found: Document) -> str:
+    return "{} ({})".format(*estimate(found, partial(percent, unit="")))
 
 
-def _interval(found: Document, times: float = 1.0) -> str:
-    if found["value"] is None:
-        return "never"
-    value, low, high = (
-        number(None if found[key] is None else times * found[key], none="never")
-        for key in ("value", "low", "high")
-    )
-    return value if low == high else f"{value} ({low} to {high})"
+def _used(share: float | None) -> str:
+    return or_never(share and 100.0 * share)
+
+
+def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
+    value, limits = estimate(found, form)
+    return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
 
 
 def figure_of(document: Document) -> "Figure":
     """A row a quantity, a column an error, over the factor; bars are intervals."""
-    errors = _by_error(document)
+    errors = [*grouped(document["rows"], "error").values()]
     titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
     title = f"{document['scenario']}: errors larger than declared"
     size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
@@ -131,27 +124,13 @@ def _curve(panel: Any, rows: Sequence[Document], quantity: str) -> None:
     panel.errorbar(at, value, bars, color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2)
 
 
-def _flat(row: Document) -> Document:
-    flat: Document = {}
-    for name, value in row.items():
-        parts = value if isinstance(value, dict) else {"": value}
-        flat |= {f"{name}_{key}".rstrip("_"): part for key, part in parts.items()}
-    return flat
-
-
-def page_of(document: Document, folder: Path) -> str:
-    """The sentences, the table and the figure."""
-    parts: list[Part] = [
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title; the sentences, the table and the figure."""
+    return f"Beyond what is declared: {document['scenario']}", [
         *sentences(document), Table(HEAD, [list(cells(row)) for row in document["rows"]]), CAPTION,
         Pictures([("False alarms, right names and tracking over the factor", NAME)]),
         versions_line(document["versions"]),
     ]  # fmt: skip
-    return as_html(f"Beyond what is declared: {document['scenario']}", parts, {NAME: folder / f"{NAME}.png"})
 
 
-FILES: Makers = {
-    f"{NAME}.json": lambda document: json.dumps(document, indent=1) + "\n",
-    f"{NAME}.csv": lambda document: as_csv([_flat(row) for row in document["rows"]]),
-    f"{NAME}.png": figure_of,
-    f"{NAME}.html": lambda document: lambda folder: page_of(document, folder),
-}
+FILES = study_files(NAME, page_of, {NAME: itemgetter("rows")}, {NAME: figure_of})

@@ -6,11 +6,11 @@ at their limit, and all together. What is counted is what a user of the verdict 
 fault, detection, right and wrong names, and how the aircraft is flown.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -23,12 +23,13 @@ from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
 from beaver_ftc.studies.decay.shown import FILES, as_text
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, quantile, quantile_bound
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, median
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.present.tables import finite
 
 FACTORS = (1.0, 1.5, 2.0, 4.0)
 TOGETHER = "all together"
+COUNTED = ("false_alarm", "detected", "named", "misnamed", "lost")
+MEASURED = ("delay_s", "tracking_deg_s", "bound_used")
 FLIGHTS = 40  # of a row: an event that none of them has is rarer than 9 % (95 %)
 LATER_S, LEFT_S = 4.0, 5.0  # the faults come so much later at most, and so long before the end
 
@@ -70,7 +71,7 @@ def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
 def scenario_of(scenario: Scenario, errors: Sequence[Error], seed: int, flight: Flight) -> Scenario:
     """What flies: draws depend on the number of the flight alone, so that rows differ by the error."""
     draws = np.random.default_rng([seed, flight.run])
-    changes: dict[str, Any] = {"seed": int(draws.integers(2**31)), "expect": {}}
+    changes: Document = {"seed": int(draws.integers(2**31)), "expect": {}}
     later = float(draws.uniform())
     changes |= changes_of(errors, factors_of(errors, flight), draws)
     times = [fault.at_s for fault in scenario.faults]
@@ -96,9 +97,8 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
 def row_of(found: Metrics | None, bound_used: float = 0.0) -> Document:
     """What is counted of a flight; None: it could not be flown to its end."""
     if found is None:
-        return dict.fromkeys(("false_alarm", "detected", "named", "misnamed", "lost"), False) | {
-            "failed": True, "delay_s": None, "tracking_deg_s": None, "bound_used": 0.0,
-        }  # fmt: skip
+        nothing = dict.fromkeys(COUNTED, False) | {"failed": True}
+        return nothing | dict.fromkeys(MEASURED) | {"bound_used": 0.0}
     isolation, tracked = found.isolation, found.tracking
     rms = tracked.post_fault_rms_deg_s if found.fault else tracked.pre_fault_rms_deg_s
     return {
@@ -161,30 +161,13 @@ def document_of(
 def summary(rows: Sequence[Document]) -> Document:
     """Counts with their intervals; medians with theirs: of flights whose aircraft is lost, infinite."""
     flown = [row for row in rows if not row["failed"]]
-    rates = {name: rate(flown, name) for name in ("false_alarm", "detected", "named", "misnamed", "lost")}
+    counts = {name: sum(row[name] for row in flown) for name in COUNTED}
     return {
         "flights": len(flown),
         "failed": len(rows) - len(flown),
-        **rates,
-        "delay_s": median(flown, "delay_s"),
-        "tracking_deg_s": median(flown, "tracking_deg_s"),
-        "bound_used": median(flown, "bound_used"),
+        **{name: counted(count, len(flown)) for name, count in counts.items()},
+        **{name: median(row[name] for row in flown) for name in MEASURED},
     }
-
-
-def rate(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
-    """How many flights have it, as a share with its interval."""
-    count = sum(bool(row[name]) for row in rows)
-    return {"count": count, "of": len(rows), **vars(binomial(count, len(rows)))}
-
-
-def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
-    """The median of flights with its two-sided interval, free of any distribution; never is infinite."""
-    ordered = np.sort([np.inf if row[name] is None else row[name] for row in rows])
-    each = (1.0 + CONFIDENCE) / 2.0
-    bound: Callable[[bool], float] = lambda upper: quantile_bound(ordered, 0.5, each, upper)  # noqa: E731
-    limits = {"value": quantile(ordered, 0.5), "low": bound(False), "high": bound(True)}
-    return {key: finite(value) for key, value in limits.items()}
 
 
 @dataclass(frozen=True)

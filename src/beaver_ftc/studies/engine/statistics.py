@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from beaver_ftc.documents.files import Document
+from beaver_ftc.studies.present.tables import finite
+
 CONFIDENCE = 0.95
 
 
@@ -38,6 +41,11 @@ def _rate(count: int, trials: int, confidence: float, method: str) -> Estimate:
         return Estimate(math.nan, 0.0, 1.0)
     limits = binomtest(count, trials).proportion_ci(confidence, method)
     return Estimate(count / trials, float(limits.low), float(limits.high))
+
+
+def counted(events: int, trials: int) -> Document:
+    """A count for a document, as a share with its exact interval."""
+    return {"count": events, "of": trials, **vars(binomial(events, trials))}
 
 
 def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) -> float:
@@ -82,6 +90,14 @@ def quantile(ordered: np.ndarray, q: float) -> float:
     if not ordered.size:
         return math.nan
     return float(ordered[max(0, math.ceil(q * ordered.size - 1e-9) - 1)])
+
+
+def median(values: Iterable[float | None]) -> dict[str, float | None]:
+    """A median for a document with its two-sided interval; None is infinite, as it is of none."""
+    ordered = np.sort([math.inf if value is None else value for value in values])
+    ends = [quantile_bound(ordered, 0.5, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True)]
+    found = quantile(ordered, 0.5), *ends
+    return {key: finite(value) for key, value in zip(("value", "low", "high"), found, strict=True)}
 
 
 def share_within(values: Iterable[float | None], share: float) -> float:

@@ -54,7 +54,7 @@ SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it start
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
-FAULTS: tuple[tuple[str, dict[str, Any]], ...] = tuple(
+FAULTS: tuple[tuple[str, Document], ...] = tuple(
     (name, {"type": kind, **keys}) for kind, row in TYPES.items() for name, keys in row.examples
 )
 
@@ -96,7 +96,7 @@ def cases(
     ]
 
 
-def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> dict[str, Any]:
+def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
     """Real sensors, servos, air, and coefficients at the ends of their tolerance by turns, where the truth
     lets them be wrong: all of it declared.
     """

@@ -7,13 +7,10 @@ worse, and better if the opposite holds. The net share, worse less better, is wh
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 
-import numpy as np
-
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, quantile, quantile_bound
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, median
 from beaver_ftc.studies.mechanisms.survey import FACTORS, Flight, cases_of, with_key, without_key
 from beaver_ftc.studies.mechanisms.systems import MECHANISMS, SYSTEMS, Mechanism
-from beaver_ftc.studies.present.tables import finite
 
 LATE_S = 0.1  # an alarm so much later is late
 WORSE = 1.1  # a tracking error so many times as large is worse
@@ -63,7 +60,7 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
         **{name: net(flown, worse) for name, worse in CRITERIA.items()},
         "delay_s": _both(flown, "delay_s"),
         "tracking_deg_s": _both(flown, "tracking_deg_s"),
-        "tracking_ratio": median([_ratio(b, a) for a, b in flown]),
+        "tracking_ratio": median(_ratio(b, a) for a, b in flown),
     }
 
 
@@ -114,8 +111,8 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
     kept = pairs if name != "delay_s" else [p for p in pairs if not any(o["false_alarm"] for o in p)]
     return {
         "flights": len(kept),
-        "with": median([_or_never(a[name]) for a, _ in kept]),
-        "without": median([_or_never(b[name]) for _, b in kept]),
+        "with": median(a[name] for a, _ in kept),
+        "without": median(b[name] for _, b in kept),
     }
 
 
@@ -125,17 +122,6 @@ def _ratio(b: Document, a: Document) -> float:
     if not isfinite(under):
         return 0.0 if isfinite(over) else 1.0
     return over / under
-
-
-def median(values: Sequence[float]) -> Document:
-    """With its two-sided interval, free of any distribution; None is infinite, or not known."""
-    ordered, each = np.sort(values), (1.0 + CONFIDENCE) / 2.0
-    limits = {
-        "value": quantile(ordered, 0.5),
-        "low": quantile_bound(ordered, 0.5, each, False),
-        "high": quantile_bound(ordered, 0.5, each, True),
-    }
-    return {key: finite(value) for key, value in limits.items()}
 
 
 def _or_never(value: float | None) -> float:
@@ -154,7 +140,7 @@ def _system_row(outcomes: Sequence[Document]) -> Document:
     return {
         "flights": n,
         **{name: {"count": count, **vars(binomial(count, n))} for name, count in rates.items()},
-        "tracking_deg_s": median([_or_never(o["tracking_deg_s"]) for o in outcomes]),
+        "tracking_deg_s": median(o["tracking_deg_s"] for o in outcomes),
     }
 
 

@@ -1,15 +1,14 @@
 """What mechanisms are worth, as sentences, tables, a figure and files."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.mechanisms.systems import DEFAULT, PAPER
 from beaver_ftc.studies.present.figures import GRID, SERIES, label_edges, panels
-from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, as_html, versions_line
-from beaver_ftc.studies.present.tables import Rows, aligned, as_csv, number
+from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, versions_line
+from beaver_ftc.studies.present.tables import Rows, aligned, estimate, number, or_never, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,8 +111,8 @@ def net_row(row: Document) -> tuple[str, ...]:
 
 def net_cells(found: Document) -> tuple[str, str]:
     """A net share and its interval, percentage points."""
-    value, low, high = (f"{100.0 * found[key]:+.1f}" for key in ("value", "low", "high"))
-    return "0.0" if value[1:] == "0.0" else value, f"{low} to {high}"
+    value, limits = estimate(found, lambda share: f"{100.0 * share:+.1f}")
+    return "0.0" if value[1:] == "0.0" else value, limits
 
 
 def same_row(row: Document) -> tuple[str, ...]:
@@ -126,18 +125,12 @@ def median_row(row: Document) -> tuple[str, ...]:
     medians = [row[of][which]["value"] for of in ("delay_s", "tracking_deg_s") for which in _BOTH]
     return (
         label(row),
-        *(number(value, none="never") for value in medians),
-        *interval_cells(row["tracking_ratio"]),
+        *(or_never(value) for value in medians),
+        *estimate(row["tracking_ratio"]),
     )
 
 
 _BOTH = ("with", "without")
-
-
-def interval_cells(found: Document) -> tuple[str, str]:
-    """A median and its interval."""
-    value, low, high = (number(found[key], none="never") for key in ("value", "low", "high"))
-    return value, f"{low} to {high}"
 
 
 def system_head(document: Document) -> tuple[str, ...]:
@@ -151,16 +144,11 @@ def system_rows(document: Document) -> Rows:
     return [
         ("flights", *(cell for row in systems for cell in (str(row["flights"]), ""))),
         *(
-            (words, *(cell for row in systems for cell in _percent(row[name])))
+            (words, *(cell for row in systems for cell in estimate(row[name], partial(percent, unit=""))))
             for name, words in SYSTEM_SHARES.items()
         ),
-        ("error, deg/s", *(cell for row in systems for cell in interval_cells(row["tracking_deg_s"]))),
+        ("error, deg/s", *(cell for row in systems for cell in estimate(row["tracking_deg_s"]))),
     ]
-
-
-def _percent(rate: Document) -> tuple[str, str]:
-    value, low, high = (100.0 * rate[key] for key in ("value", "low", "high"))
-    return f"{value:.0f}", f"{low:.0f} to {high:.0f}"
 
 
 def alarm_rows(document: Document) -> Rows:
@@ -238,29 +226,21 @@ def _dot(panel: Any, place: int, found: Mapping[str, float], colour: str) -> Non
     )  # fmt: skip
 
 
-def page_of(document: Document, folder: Path) -> str:
-    """The sentences, the figure and the tables."""
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title; the sentences, the figure and the tables."""
     shown = zip(CAPTIONS, tables(document), strict=True)
-    parts: list[Part] = [
+    return "What each mechanism is worth", [
         *sentences(document), Pictures([(CAPTIONS[1], NAME)]),
         *(part for caption, (head, rows) in shown for part in (Heading(caption), Table(head, rows))),
         Heading("Margins of the healthy loop, the least"), Table(MARGIN_HEAD, margin_rows(document)),
         versions_line(document["versions"]),
     ]  # fmt: skip
-    return as_html("What each mechanism is worth", parts, {NAME: folder / f"{NAME}.png"})
 
 
-def _flat(row: Document) -> Document:
-    """A row of the CSV file: all pairs of a mechanism."""
-    flat: Document = {key: value for key, value in row.items() if not isinstance(value, dict)}
-    for name in CRITERIA:
-        flat |= {f"{name}_{key}": value for key, value in row[name].items()}
-    return flat | {f"tracking_ratio_{key}": value for key, value in row["tracking_ratio"].items()}
+def pairs_of(document: Document) -> list[Document]:
+    """The rows of the CSV file: all pairs of each mechanism."""
+    left_out = ("delay_s", "tracking_deg_s", "by")
+    return [{key: row[key] for key in row if key not in left_out} for row in document["mechanisms"]]
 
 
-FILES: Makers = {
-    f"{NAME}.json": lambda document: json.dumps(document, indent=1) + "\n",
-    f"{NAME}.csv": lambda document: as_csv([_flat(row) for row in document["mechanisms"]]),
-    f"{NAME}.png": figure_of,
-    f"{NAME}.html": lambda document: lambda folder: page_of(document, folder),
-}
+FILES = study_files(NAME, page_of, {NAME: pairs_of}, {NAME: figure_of})

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import Any
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Truth
 from beaver_ftc.scenario.schema import Scenario, load_scenario
@@ -42,7 +42,7 @@ def rounded_up(value: float, digits: int = 2) -> float:
     return ceil(scaled - 1e-9 * scaled) / 10.0**step if step >= 0 else ceil(scaled) * 10.0**-step
 
 
-def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> dict[str, Any]:
+def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> Document:
     """The published elevator case, flown with this bound and the design model of `like`.
 
     Delays are in s from the fault's first frame, None for never.
@@ -70,7 +70,7 @@ def with_bound(scenario: Scenario, constant_rad_s2: PerAxis) -> Scenario:
     return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
 
 
-def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> dict[str, Any]:
+def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> Document:
     """The bound that covers these flights, and the published elevator case flown with it and the design.
 
     The case is one of the flights to be covered: a bound that suits calmer air alone would raise a false

@@ -12,6 +12,7 @@ import numpy as np
 
 from beaver_ftc.design import fdc
 from beaver_ftc.design.model import ALPHA, design_of, engine_power_kw, jacobian, slipstream
+from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
@@ -109,7 +110,7 @@ def air_data(point: FlightState, faster_mps: Any = 0.0, higher_m: Any = 0.0) -> 
     return np.array([V, 0.5 * density * V**2, slipstream(power, density, V)])
 
 
-def linear_document(analysis: LinearAnalysis) -> dict[str, Any]:
+def linear_document(analysis: LinearAnalysis) -> Document:
     """Modes side by side, how far the models are apart, zeros of the surface-to-rate channels."""
     apart = {name: analysis.deviation(name) for name in analysis.models if name != "truth"}
     return {
@@ -136,7 +137,7 @@ def linear_document(analysis: LinearAnalysis) -> dict[str, Any]:
     }
 
 
-def _mode(mode: Mode) -> dict[str, Any]:
+def _mode(mode: Mode) -> Document:
     return {
         "real_per_s": mode.pole.real,
         "imaginary_rad_s": mode.pole.imag,

@@ -7,11 +7,11 @@ readers who want to look closer.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
 from beaver_ftc.results.metrics import measure
@@ -134,7 +134,7 @@ class AxisBound:
     worst_at_s: float = 0.0
     exceeded_frames: int = 0
     stays: int = 0
-    exceedances: list[dict[str, Any]] = field(default_factory=list)
+    exceedances: list[Document] = field(default_factory=list)
     outside: bool = False
 
 

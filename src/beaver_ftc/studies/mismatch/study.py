@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -49,7 +48,7 @@ ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
 _OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
 _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 DECLARED = "declared"
-VARIANTS: dict[str, dict[str, Any]] = {
+VARIANTS: dict[str, Document] = {
     DECLARED: {},
     "engine-neglected": {"engine_terms": False},
     "linearised": {"linearised": True},
@@ -252,7 +251,7 @@ def variant_of(scenario: Scenario, text: str) -> Scenario:
         raise BadInput("\n".join(f"--variant {text}: {line}" for line in str(error).splitlines())) from None
 
 
-def _changes(piece: str) -> dict[str, Any]:
+def _changes(piece: str) -> Document:
     """Dotted keys of `design_model` and their values."""
     if piece in VARIANTS:
         return VARIANTS[piece]

@@ -14,7 +14,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BOTH, BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import finite, grouped
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def level_at(healthy: Sequence[Trace], level: float) -> Level:
     return Level(level, *alarms_at(healthy, level))
 
 
-Row = dict[str, Any]
+Row = Document
 Key = tuple[str, str, str]  # sensors, turbulence, scheme
 
 
@@ -117,14 +117,6 @@ def limit(rows: Sequence[Row], per_h: float) -> Document:
     }
 
 
-def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
-    """Rows by the values of some columns, in order of appearance."""
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[name] for name in names), []).append(row)
-    return groups
-
-
 PLACE = ("sensors", "turbulence", "surface")
 CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
 SIGNIFICANT = 0.05
@@ -174,6 +166,12 @@ def _said(grid: Grid) -> Iterable[tuple[str, Any]]:
     return ((key, value) for key, value in asdict(grid).items() if key != "where" or value)
 
 
+def title_of(sensors: str, turbulence: str) -> str:
+    """A condition in words."""
+    air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
+    return f"{sensors} sensors, {air}"
+
+
 def answers(document: Document, surface: str) -> list[str]:
     """A line for each condition, excitation and magnitude: how many losses of a surface our scheme of both
     detectors finds how soon."""
@@ -184,10 +182,9 @@ def answers(document: Document, surface: str) -> list[str]:
                 f"within {s} s in {of['value']:.0%} ({100 * of['low']:.0f} to {of['high']:.0%})"
                 for s, of in cell["within"].items()
             )
-            air = "still air" if cell["turbulence"] == "none" else f"{cell['turbulence']} turbulence"
             lines.append(
-                f"{cell['sensors']} sensors, {air}, {cell['excitation_deg_s']:g} deg/s: a loss of {surface} "
-                f"of {cell['magnitude']:.0%} is found {soon} of {cell['flights']} flights"
+                f"{title_of(cell['sensors'], cell['turbulence'])}, {cell['excitation_deg_s']:g} deg/s: a "
+                f"loss of {surface} of {cell['magnitude']:.0%} is found {soon} of {cell['flights']} flights"
             )
     pointer = (
         "In brackets 95 % intervals. `beaver-ftc smallest SCENARIO` finds the size found in 90 % of flights."

@@ -24,7 +24,7 @@ from beaver_ftc.commands import (
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
-from beaver_ftc.studies.compare.scores import leader, percent
+from beaver_ftc.studies.compare.scores import leader
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.power import probabilities, survey
 from beaver_ftc.studies.power.probabilities import (
@@ -32,9 +32,9 @@ from beaver_ftc.studies.power.probabilities import (
     SIGNIFICANT,
     Row,
     document_of,
-    grouped,
     limit,
     summary,
+    title_of,
 )
 from beaver_ftc.studies.power.survey import (
     BOTH,
@@ -49,7 +49,7 @@ from beaver_ftc.studies.power.survey import (
 )
 from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Files, Makers
-from beaver_ftc.studies.present.tables import plain, printed, seconds
+from beaver_ftc.studies.present.tables import grouped, percent, plain, printed, seconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,12 +118,6 @@ def _table(document: Document, sensors: str, turbulence: str) -> "Table":
 
 def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
     return (line for line in lines if where.items() <= line.items())
-
-
-def title_of(sensors: str, turbulence: str) -> str:
-    """A condition in words."""
-    air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
-    return f"{sensors} sensors, {air}"
 
 
 def _rate(alarms: Document | None) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -16,6 +16,7 @@ from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.diagnosis.informed_test import WhiteningFilter
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.files import Document
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.airframe import air_of, find_aircraft
 from beaver_ftc.scenario.schema import Scenario
@@ -60,7 +61,7 @@ class Grid:
     healthy_flight_s: float
     per_h: float
     # what its scenarios say besides: another aircraft, and where it starts
-    where: dict[str, Any] = field(default_factory=dict, hash=False)
+    where: Document = field(default_factory=dict, hash=False)
 
     @property
     def faults(self) -> tuple[tuple[str, float], ...]:
@@ -89,7 +90,7 @@ class Grid:
             raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
         given = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
         initial = {name: value for name, value in given.items() if value is not None}
-        where: dict[str, Any] = {"initial": initial} if initial else {}
+        where: Document = {"initial": initial} if initial else {}
         where |= {"aircraft": aircraft} if aircraft else {}
         surfaces = self.surfaces if aircraft is None else known
         return replace(self, where=where, surfaces=(surface,) if surface else surfaces)
@@ -120,8 +121,8 @@ GRIDS = TypeAdapter(dict[str, Grid]).validate_json((Path(__file__).parent / "gri
 def scenario_of(
     block: Block,
     duration_s: float,
-    faults: list[dict[str, Any]] | None = None,
-    where: dict[str, Any] | None = None,
+    faults: list[Document] | None = None,
+    where: Document | None = None,
 ) -> Scenario:
     """A flight of a block: everything in it but the fault and where it is flown follows from the block.
     Another aircraft than the Beaver has the error of its own model, and none is added."""
@@ -151,7 +152,7 @@ def strikes_at_s(block: Block) -> float:
     return round(_draws(block, 2).uniform(*STRIKES_S) * _RATE_HZ) / _RATE_HZ
 
 
-def loss(surface: str, magnitude: float, at_s: float) -> dict[str, Any]:
+def loss(surface: str, magnitude: float, at_s: float) -> Document:
     """The fault of a cell."""
     kind = {"type": "loss_of_effectiveness", "actuator": surface}
     return kind | {"magnitude": magnitude, "at_s": at_s}
@@ -162,7 +163,7 @@ def _draws(block: Block, purpose: int) -> np.random.Generator:
     return np.random.default_rng([block.seed, purpose])
 
 
-def _reference(block: Block) -> dict[str, Any]:
+def _reference(block: Block) -> Document:
     phase_deg = _draws(block, 0).uniform(-180.0, 180.0, 3)
     return {
         axis: [{"sine": {"amplitude_deg_s": block.excitation_deg_s, "frequency_hz": hz, "phase_deg": phase}}]
@@ -170,7 +171,7 @@ def _reference(block: Block) -> dict[str, Any]:
     }
 
 
-def _uncertainty(block: Block) -> dict[str, Any]:
+def _uncertainty(block: Block) -> Document:
     """Inside the published bound [Zhang2005, sec. VII]: half of it at the bound, whatever the frequency."""
     draws = _draws(block, 1)
     coupling = draws.uniform(-0.25, 0.25, 3).tolist()
@@ -189,7 +190,7 @@ ESTIMATORS = "adaptive-estimators"
 
 STATISTICAL, BOTH = "statistical", "both"
 # Schemes of which the statistic comes with the flight itself, and what its `fdi` says beside the bounds.
-BUILT_IN: dict[str, dict[str, Any]] = {
+BUILT_IN: dict[str, Document] = {
     ESTIMATORS: {},
     STATISTICAL: {"statistical": {}, "authority": "statistical"},
     BOTH: {"statistical": {}},

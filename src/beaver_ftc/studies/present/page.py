@@ -1,13 +1,15 @@
 """A page from its parts, as Markdown and as one HTML file that needs nothing else; a study's files."""
 
+import json
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.present.tables import Rows, html_table, markdown_table
+from beaver_ftc.studies.present.tables import Rows, as_csv, html_table, markdown_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,6 +96,27 @@ def _picture(title: str, path: Path) -> str:
 def picture_data(path: Path) -> str:
     """A picture as it stands in a page."""
     return b64encode(path.read_bytes()).decode("ascii")
+
+
+def study_files(
+    name: str, page: Callable[[Any], tuple[str, Sequence[Part]]], rows: Mapping[str, Callable[[Any], Any]],
+    figures: "Makers",
+) -> "Makers":  # fmt: skip
+    """A study's files: document, rows as CSV, figures, and the page of a title and parts that shows them."""
+
+    def html(document: Any) -> Content:
+        return lambda folder: as_html(*page(document), {stem: folder / f"{stem}.png" for stem in figures})
+
+    return {
+        f"{name}.json": lambda document: json.dumps(document, indent=1) + "\n",
+        **{f"{stem}.csv": partial(_csv, rows_of) for stem, rows_of in rows.items()},
+        **{f"{stem}.png": draw for stem, draw in figures.items()},
+        f"{name}.html": html,
+    }
+
+
+def _csv(rows_of: Callable[[Any], Any], document: Any) -> str:
+    return as_csv(rows_of(document))
 
 
 def replace_between(path: Path, begin: str, end: str, text: str) -> None:

@@ -2,10 +2,12 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.documents.files import Document
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -34,9 +36,33 @@ def _digits(value: float, digits: int) -> str:
     return f"{value:.0f}" if abs(value) >= 10 ** (digits - 1) else f"{value:.{digits}g}"
 
 
+def percent(share: float | None, unit: str = " %", none: str = "none") -> str:
+    """A share in whole per cent."""
+    return none if share is None else f"{100.0 * share:.0f}{unit}"
+
+
+def or_never(value: float | None) -> str:
+    """A number; None never comes."""
+    return number(value, none="never")
+
+
+def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = or_never) -> tuple[str, str]:
+    """The value of an estimate, and its interval, each number in this form."""
+    value, low, high = (form(found[key]) for key in ("value", "low", "high"))
+    return value, f"{low} to {high}"
+
+
 def seconds(value: float | None, none: str = "never") -> str:
     """Return a time, s, as text; `none` if there is no time."""
     return none if value is None else f"{value:.2f} s"
+
+
+def grouped(rows: Iterable[Document], *names: str) -> dict[tuple[Any, ...], list[Document]]:
+    """Rows by the values of some columns, in order of appearance."""
+    groups: dict[tuple[Any, ...], list[Document]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return groups
 
 
 def aligned(rows: Rows) -> str:
@@ -47,12 +73,20 @@ def aligned(rows: Rows) -> str:
 
 
 def as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows of equal keys as CSV with a header; None is an empty cell."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    """Rows of equal keys as CSV with a header; None is an empty cell, and each key of a part a column."""
+    text, flat = io.StringIO(), [_flat(row) for row in rows]
+    writer = csv.DictWriter(text, fieldnames=list(flat[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows(flat)
     return text.getvalue()
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        flat |= {f"{name}_{key}".rstrip("_"): part for key, part in parts.items()}
+    return flat
 
 
 def markdown_table(head: Sequence[str], rows: Rows) -> str:

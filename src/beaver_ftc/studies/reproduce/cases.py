@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.document import parse
+from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
@@ -167,7 +168,7 @@ def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
     return _fly(case.name, keys_of(case, changes or {}))
 
 
-def keys_of(case: Changed, changes: Mapping[str, Any]) -> dict[str, Any]:
+def keys_of(case: Changed, changes: Mapping[str, Any]) -> Document:
     """The dotted keys of a case with further changes: two with the same keys are the same flight."""
     merged = _apt({**case.changes, **changes})
     size, at_s = merged.pop(SIZE, PUBLISHED_LOSS), merged.pop(AT, FAULT_AT_S)
@@ -176,7 +177,7 @@ def keys_of(case: Changed, changes: Mapping[str, Any]) -> dict[str, Any]:
     return merged | ({"faults": faults} if "faults" in merged else {}) | later
 
 
-def _struck(fault: Mapping[str, Any], size: float, at_s: float) -> dict[str, Any]:
+def _struck(fault: Mapping[str, Any], size: float, at_s: float) -> Document:
     """The size and instant of a fault; a slight loss, and what is no loss, keep theirs."""
     return {"at_s": at_s} | ({"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {})
 
@@ -207,7 +208,7 @@ class LazyFlights(Mapping[str, Flown]):
         return len(CASES)
 
 
-def _apt(changes: Mapping[str, Any]) -> dict[str, Any]:
+def _apt(changes: Mapping[str, Any]) -> Document:
     """The changes without options of the published scheme or law where another one flies."""
     others = [
         f"{options}."

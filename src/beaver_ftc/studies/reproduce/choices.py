@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from beaver_ftc.documents.files import Document
 from beaver_ftc.documents.validation import parse_key, with_values
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of
 from beaver_ftc.scenario.schema import Scenario
@@ -33,7 +34,7 @@ class Choice:
     reason: str
 
 
-def _sine(frequency_hz: float) -> list[dict[str, Any]]:
+def _sine(frequency_hz: float) -> list[Document]:
     return [{"sine": {"amplitude_deg_s": AMPLITUDE_DEG_S, "frequency_hz": frequency_hz}}]
 
 
@@ -104,7 +105,7 @@ def gains() -> list[Gain]:
 
 
 # Both together, as the sections of a scenario.
-SETTING: dict[str, Any] = with_values(
+SETTING: Document = with_values(
     {}, {parse_key(key): value for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}}.items()}
 )
 

@@ -245,30 +245,28 @@ def _also_without(numbers: list[float], ablated: list[float], published: list[fl
     """The testable claims that hold in a setting without their mechanism as well; published: the numbers
     without it in the published setting, in which they do not."""
     return [
-        {
-            "where": c.where,
-            "statement": c.statement,
-            "number": finite(ablated[i]),
-            "unit": c.measure.unit,
-            "none": c.measure.none,
-            "without": TAKES[c.ablation],
-        }
+        _found_of(c, ablated[i]) | {"without": TAKES[c.ablation]}
         for i, c in enumerate(MEASURED)
         if c.measure and c.testable and not c.because
         if c.holds(numbers[i]) and c.holds(ablated[i]) and not c.holds(published[i])
     ]
 
 
+def _found_of(claim: Claim, number: float) -> Document:
+    assert claim.measure is not None
+    return {
+        "where": claim.where,
+        "statement": claim.statement,
+        "number": finite(number),
+        "unit": claim.measure.unit,
+        "none": claim.measure.none,
+    }
+
+
 def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     """The claims that hold as flown and no longer in a setting, with the number there."""
     return [
-        {
-            "where": c.where,
-            "statement": c.statement,
-            "number": finite(number),
-            "unit": c.measure.unit,
-            "none": c.measure.none,
-        }
+        _found_of(c, number)
         for c, as_flown, number in zip(MEASURED, ours, numbers, strict=True)
         if c.measure and c.holds(as_flown) and not c.holds(number)
     ]

@@ -10,7 +10,7 @@ from beaver_ftc.studies.present.tables import number, seconds
 from beaver_ftc.studies.reproduce.cases import CASES, Changed, Flown, fly_case
 
 COVERED = {"p": 0.05, "q": 0.3, "r": 0.06}  # rad/s2: more than the engine's moments, `beaver-ftc mismatch`
-_PRINTED: dict[str, Any] = {"design_model.engine_terms": False}
+_PRINTED: Document = {"design_model.engine_terms": False}
 _WIDE = {**_PRINTED, "fdi.bounds.constant_rad_s2": COVERED}
 DESIGNS: tuple[tuple[str, str, Mapping[str, Any]], ...] = (  # name, bound, changes
     ("all terms of the truth", "as published", {}),

@@ -1,20 +1,22 @@
 """The answer in sentences, and as files."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.present.page import Makers, Part, Table, as_html
-from beaver_ftc.studies.present.tables import aligned, as_csv
+from beaver_ftc.studies.present.page import Part, Table, study_files
+from beaver_ftc.studies.present.tables import aligned, percent
 
 HEAD = ("", "found in 90 %", "95 % interval", "flights", "certain")
 
 
 def as_text(document: Document) -> str:
     """What is certain, what is found, what limits it, and what would help."""
-    rows = [document, *document["compared"]]
-    return "\n".join([*sentences(document), "", aligned([HEAD, *map(_cells, rows)])])
+    return "\n".join([*sentences(document), "", aligned([HEAD, *map(_cells, _answers(document))])])
+
+
+def _answers(document: Document) -> list[Document]:
+    return [document, *document["compared"]]
 
 
 def sentences(document: Document) -> Iterator[str]:
@@ -26,7 +28,7 @@ def sentences(document: Document) -> Iterator[str]:
     )
     if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
         yield (
-            f"Half of these flights use {_percent(document['bound_used'])} of the bound or more before the "
+            f"Half of these flights use {percent(document['bound_used'])} of the bound or more before the "
             f"loss: the size found "
             "then measures the uncertainty that the scenario flies with, not the diagnosis."
         )
@@ -55,7 +57,7 @@ def _certain(document: Document) -> str:
             f"it was in {certain['at_total_loss']} of {n} flights."
         )
     return (
-        f"A loss of {_percent(certain['size'])} {_what(document)} and more is certain to be detected "
+        f"A loss of {percent(certain['size'])} {_what(document)} and more is certain to be detected "
         f"{within}: in each "
         f"of {n} flights, whatever the declared uncertainty does."
     )
@@ -64,16 +66,16 @@ def _certain(document: Document) -> str:
 def _found(document: Document) -> str:
     found, total, within = document["found"], document["total_loss"], f"within {document['within_s']:g} s"
     if found["size"] is None:
-        limits = f"{100 * total['low']:.0f} to {_percent(total['high'])}"
+        limits = f"{100 * total['low']:.0f} to {percent(total['high'])}"
         return (
             f"Not even a total loss of {document['surface']} is found {within} in "
-            f"{_percent(document['share'])} of flights: "
-            f"it is in {_percent(total['value'])} (95 % interval {limits}; {total['count']} of "
+            f"{percent(document['share'])} of flights: "
+            f"it is in {percent(total['value'])} (95 % interval {limits}; {total['count']} of "
             f"{total['of']})."
         )
     return (
-        f"A loss of {_percent(found['size'])} {_what(document)} is found {within} in "
-        f"{_percent(document['share'])} of "
+        f"A loss of {percent(found['size'])} {_what(document)} is found {within} in "
+        f"{percent(document['share'])} of "
         f"flights (95 % interval {_interval(found)}; {found['flights']} flights)."
     )
 
@@ -117,46 +119,40 @@ def _help(document: Document) -> str:
 def _effect(row: Document) -> str:
     found, total = row["found"], row["total_loss"]
     if found["size"] is None:
-        return f"{row['variant']}, a total loss is found in {_percent(total['value'])} of flights"
-    return f"{row['variant']}, it would be {_percent(found['size'])} ({_interval(found)})"
+        return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"
+    return f"{row['variant']}, it would be {percent(found['size'])} ({_interval(found)})"
 
 
 def _cells(row: Document) -> Sequence[str]:
     found, certain = row["found"], row["certain"]
     return (
-        row["variant"], _percent(found["size"]), _interval(found), str(found["flights"]),
-        _percent(certain["size"]),
+        row["variant"], percent(found["size"]), _interval(found), str(found["flights"]),
+        percent(certain["size"]),
     )  # fmt: skip
-
-
-def _percent(size: float | None) -> str:
-    return "none" if size is None else f"{size:.0%}".replace("%", " %")
 
 
 def _interval(found: Document) -> str:
     if found["low"] is None:
         return "more than a total loss"
     if found["low"] == found["high"]:
-        return _percent(found["low"])
+        return percent(found["low"])
     low = f"{100.0 * found['low']:.0f}"
-    return f"{low} % or more" if found["high"] is None else f"{low} to {_percent(found['high'])}"
+    return f"{low} % or more" if found["high"] is None else f"{low} to {percent(found['high'])}"
 
 
-def _flat(row: Document) -> Document:
-    found = {f"found_{name}": value for name, value in row["found"].items()}
-    certain = {f"certain_{name}": value for name, value in row["certain"].items()}
-    return {"variant": row["variant"], **found, **certain, "total_loss_found": row["total_loss"]["value"]}
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title; the answers and the table."""
+    title = f"How small: {document['surface']} of {document['scenario']}"
+    return title, [*sentences(document), Table(HEAD, list(map(_cells, _answers(document))))]
 
 
-def page_of(document: Document) -> str:
-    """The answers and the table."""
-    rows = [document, *document["compared"]]
-    parts: list[Part] = [*sentences(document), Table(HEAD, [list(_cells(row)) for row in rows])]
-    return as_html(f"How small: {document['surface']} of {document['scenario']}", parts, {})
+def rows_of(document: Document) -> list[Document]:
+    """The rows of the CSV file."""
+    return [
+        {"variant": row["variant"], "found": row["found"], "certain": row["certain"],
+         "total_loss_found": row["total_loss"]["value"]}
+        for row in _answers(document)
+    ]  # fmt: skip
 
 
-FILES: Makers = {
-    "smallest.json": lambda document: json.dumps(document, indent=1) + "\n",
-    "smallest.csv": lambda document: as_csv([_flat(row) for row in (document, *document["compared"])]),
-    "smallest.html": page_of,
-}
+FILES = study_files("smallest", page_of, {"smallest": rows_of}, {})

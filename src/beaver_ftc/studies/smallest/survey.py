@@ -28,7 +28,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import SETTLED_S
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted
 from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
 from beaver_ftc.studies.present.page import contents, write_files
 from beaver_ftc.studies.present.tables import finite
@@ -240,7 +240,7 @@ def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
             "size": finite(certain / LARGEST), "flights": stages[0],
             "at_total_loss": sure,
         },
-        "total_loss": _counted(sum(row["found"] for row in total), len(total)),
+        "total_loss": counted(sum(row["found"] for row in total), len(total)),
         "false_alarms": sum(row["false_alarm"] for row in total),
         "failed": sum(row["failed"] for row in total),
     }  # fmt: skip
@@ -250,10 +250,6 @@ def _shares(found: Threshold) -> Document:
     """As shares of 1; null: not even a total loss."""
     of = {name: finite(getattr(found, name) / LARGEST) for name in ("size", "low", "high")}
     return of | {"flights": found.flights}
-
-
-def _counted(count: int, of: int) -> Document:
-    return {"count": count, "of": of, **vars(binomial(count, of))}
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents import document as source
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.files import Document
 from beaver_ftc.documents.validation import key_path, problems_of
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
 
 
-Row = dict[str, Any]
+Row = Document
 
 FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics

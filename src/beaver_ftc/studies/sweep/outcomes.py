@@ -4,11 +4,11 @@ import shlex
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.files import Document
 from beaver_ftc.results.metrics import strikes_within
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, flight_name, kind_of
@@ -133,7 +133,7 @@ BINS = 8
 MOST_FLIGHTS = 4000  # of more, evenly spaced ones are taken: the ranking does not need them all
 PERMUTATIONS = 199
 
-Ranking = list[dict[str, Any]]
+Ranking = list[Document]
 
 
 def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
@@ -157,7 +157,7 @@ def ranks_of(values: np.ndarray) -> np.ndarray:
     return rankdata(values) - 1.0
 
 
-def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> dict[str, Any]:
+def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
     groups = _groups(values)
     share = _explained(groups, ranks)
     generator = np.random.Generator(np.random.PCG64(0))
@@ -203,7 +203,7 @@ def _spearman(values: np.ndarray, ranks: np.ndarray) -> float | None:
 OF_EACH_KIND = 3
 
 
-def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[dict[str, Any]]:
+def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
     """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
     whys: dict[int, list[str]] = {}
     for position, why in _candidates(flights):

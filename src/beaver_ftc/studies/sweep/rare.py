@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, say_once, suggestion
+from beaver_ftc.documents.files import Document
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.results.writer import result_folder
@@ -56,7 +56,7 @@ class Estimate:
     high: float
     flights: int
     levels: int
-    plain: dict[str, Any]
+    plain: Document
     why: str
 
 
@@ -197,7 +197,7 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     return min(score, _BEFORE) if found.passed else max(score, 0.0)
 
 
-def values_at(sweep: Sweep, point: Sequence[float]) -> dict[str, Any]:
+def values_at(sweep: Sweep, point: Sequence[float]) -> Document:
     """The varied keys at a point of standard normals."""
     units = [min(_NORMAL.cdf(u), 1.0 - 2.0**-53) for u in point]
     return {key: value_at(how, u) for (key, how), u in zip(sweep.file.vary.items(), units, strict=True)}
@@ -208,7 +208,7 @@ def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
     return scenario_of(sweep, Assignment(run, values_at(sweep, point)))
 
 
-def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> dict[str, Any]:
+def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> Document:
     """The row of one flight; one that cannot be flown is no event."""
     try:
         return {"score": score_of(scenario_at(sweep, *case), expectation), "failed": False}
@@ -218,7 +218,7 @@ def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> dict[
 
 def run_rare(
     sweep: Sweep, expectation: str, out: Path, workers: int = 1, tell: Callable[[str], None] = lambda _: None
-) -> dict[str, Any]:
+) -> Document:
     """Estimate the probability that a sweep's flights do not meet an expectation of its base scenario; write
     `out/<sweep>-rare-<expectation>/` and return its document.
 
@@ -239,7 +239,7 @@ def run_rare(
         tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
         return scores
 
-    def lost(case: Case, why: str) -> dict[str, Any]:
+    def lost(case: Case, why: str) -> Document:
         say_once(f"{name}: of a flight {why}; such flights count as no event")
         return {"score": -math.inf, "failed": True}
 
@@ -260,7 +260,7 @@ def run_rare(
     return document | {"folder": str(out / name)}
 
 
-def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> dict[str, Any]:
+def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Document:
     found = asdict(chains.estimate())
     said = {key: finite(value) for key, value in found.items() if key != "plain"}
     likeliest = None
@@ -275,7 +275,7 @@ def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> di
     }  # fmt: skip
 
 
-def as_text(document: dict[str, Any]) -> str:
+def as_text(document: Document) -> str:
     """For a terminal."""
     plain, likeliest, p = document["plain"], document["likeliest"], document["probability"]
     said = f"{p:.2g}" if p is not None else f"not known: {document['why']}"
@@ -296,5 +296,5 @@ def as_text(document: dict[str, Any]) -> str:
     return "\n".join([*lines, f"\nresults: {document['folder']}"])
 
 
-def _between(found: dict[str, Any]) -> str:
+def _between(found: Document) -> str:
     return f"95 % {found['low']:.2g} to {found['high']:.2g}"

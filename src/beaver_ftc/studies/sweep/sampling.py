@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
 
 _ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
@@ -25,7 +26,7 @@ class Assignment(NamedTuple):
     """One flight to be flown: its index and the value of each varied key."""
 
     run: int
-    values: dict[str, Any]
+    values: Document
 
 
 def flight_seed(sweep_seed: int, index: int) -> int:
@@ -96,7 +97,7 @@ class Plan:
             [_generator(seed, index, _OF_VALUES).random(dimensions) for index in indices.tolist()]
         )
 
-    def _values(self, index: int, point: np.ndarray) -> dict[str, Any]:
+    def _values(self, index: int, point: np.ndarray) -> Document:
         values = {key: value_at(how, float(u)) for (key, how), u in zip(self._drawn, point, strict=True)}
         for key, how in reversed(self._in_turn):
             index, position = divmod(index, how.count or 1)

@@ -15,6 +15,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
@@ -119,12 +120,12 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
         evolution.select(np.array([score(objective, row) for row in table.to_pylist()]))
 
 
-def _values(sweep: Sweep, point: np.ndarray) -> dict[str, Any]:
+def _values(sweep: Sweep, point: np.ndarray) -> Document:
     keys = sweep.file.vary.items()
     return {key: value_at(how, float(u)) for (key, how), u in zip(keys, point, strict=True)}
 
 
-def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
+def found(objective: str, results: Path, sweep: Sweep) -> Document:
     """What the search found: the worst flight, and the worst score after each generation."""
     from pyarrow.parquet import read_table
 

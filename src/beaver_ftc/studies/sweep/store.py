@@ -147,7 +147,7 @@ class Store:
     def _manifest(self) -> Path:
         return self.folder / "sweep.json"
 
-    def _identity(self) -> dict[str, Any] | None:
+    def _identity(self) -> Document | None:
         """Whose flights these are; None where no file says so, or it is damaged."""
         try:
             there = read_json(self._manifest)

@@ -82,7 +82,7 @@ def trace(scenario: str, at_s: float | None, after_alarm: int) -> tuple[float, l
     """Time of the frame, s, and its calls; frames are counted from the alarm on where no time is given."""
     flight = Simulation(scenario)
     record = flight._loop.frames  # that every kernel works on
-    while flight.t_s < at_s if at_s is not None else not record["fdi"]["verdict"]["detected"][0]:
+    while flight.t_s < at_s if at_s is not None else not flight.verdict.detected:
         flight.step()
     for _ in range(after_alarm - 1 if at_s is None else 0):
         flight.step()
@@ -92,7 +92,7 @@ def trace(scenario: str, at_s: float | None, after_alarm: int) -> tuple[float, l
         flight.step()
     finally:
         sys.setprofile(None)
-    return float(record["t"][0]), seen.calls
+    return flight.t_s, seen.calls
 
 
 def writers(calls: list[Call]) -> list[Call]:

@@ -73,8 +73,11 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.level_of_positions(new_map(), np.array(u)) == level
-    assert bounds.level_of_positions(new_map(two_free=1), np.array(u)) == 2
+    exact, off = np.zeros(len(u)), np.full(len(u), 0.07)
+    assert bounds.level_of_positions(new_map(), np.array(u), exact) == level
+    assert bounds.level_of_positions(new_map(two_free=1), np.array(u), exact) == 2
+    either = [bounds.level_of_positions(new_map(), np.array(u) + side * off, exact) for side in (-1, 0, 1)]
+    assert bounds.level_of_positions(new_map(), np.array(u), off) == max(either)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +117,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record = new_map(time_s=time_s)
     y = Y.copy()
     y[2] = airspeed
-    bounds.look_up_map(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]))
+    bounds.look_up_map(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), np.zeros(4))
     age = 0 if time_s <= 10.0 else 1
     expected = record["e"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert record["e_now"] == pytest.approx(np.full(3, expected))

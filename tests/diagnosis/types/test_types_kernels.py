@@ -44,8 +44,8 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     (
         surface["actuator"]["stop_lo"],
         surface["actuator"]["stop_hi"],
-        surface["actuator"]["approach_share"],
-        surface["actuator"]["step"],
+        surface["actuator"]["approaches"],
+        surface["actuator"]["steps"],
     ) = LOW, HIGH, 0.5, 0.1
     surface["actuator"]["reach_lo"], surface["actuator"]["reach_hi"] = (
         min(LOW, 0.0),
@@ -142,6 +142,7 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
 
 def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
+    surface["actuator"]["near"] = 2.0 * slowest_step
     fdi["types"]["config"]["single_instant"] = whole
     surface["commands"]["cmd_min"], surface["commands"]["cmd_max"] = commands[0], commands[1]
     for k, place in enumerate(places):
@@ -292,7 +293,7 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
     surface["judged"]["kappa"] = 0.25 * (G.max() - G.min()) / G.mean()
-    mean, _, room = on(held_surface.simulate_return, fdi, surface, held)
+    mean, _, room = on(held_surface.simulate_return, fdi, surface, held, 1.0)
     assert abs(shown - mean) <= room + 1e-15
     (
         surface["judged"]["u"],

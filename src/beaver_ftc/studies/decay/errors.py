@@ -14,12 +14,12 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import air_of
 from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.diagnosis import ActuatorBound
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import PRESETS
 
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
-UNDECLARED_SERVO = {"bandwidth": 0.1, "rate_limit": 0.1, "dead_band_deg": 0.05}
 UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
 INTENSITY = {"none": 0.0, "light": 1.0, "moderate": 2.0, "severe": 3.0}  # wind at 20 ft: 15, 30, 45 kt
 _RATIO, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
@@ -52,7 +52,7 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
         _coefficients(scenario, declared),
         _inertia(bounds.inertia),
         *(error for error in published if error),
-        *(() if scenario.actuators.is_ideal and declared.servo_errors.is_none else (_servos(declared),)),
+        *(() if declared.servo_errors.is_none else (_servos(declared),)),
         _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
         _air(bounds.turbulence),
     )
@@ -134,8 +134,6 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
 def _servos(declared: Declared) -> Error:
     """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
     bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
-    known = any(value for bound in bounds.values() for value in bound.values())
-    bounds = bounds if known else dict.fromkeys(bounds, UNDECLARED_SERVO)
 
     def change(times: float, draws: np.random.Generator) -> Document:
         truth = {}
@@ -145,9 +143,9 @@ def _servos(declared: Declared) -> Error:
             truth[name]["dead_band_deg"] = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
         return {"uncertainty.actuators": truth}
 
-    largest = {key: max(bound[key] for bound in bounds.values()) for key in UNDECLARED_SERVO}
+    largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}
     says = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
-    return Error("actuators", says if known else _unknown(says), change, known)
+    return Error("actuators", says, change)
 
 
 def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:

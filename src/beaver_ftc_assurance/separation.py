@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout, type_index_of
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import Stepping, fly
 from beaver_ftc.results import Document, MemoryLog, result_folder
-from beaver_ftc.scenario import Scenario
+from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc.studies import DOUBLET_COLUMNS
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged_columns
@@ -115,7 +115,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     check_scheme(scenario)
     if scenario.fdi.pairs:
         raise BadInput(f"{scenario.name}: fdi.pairs: two faults leave no one parameter, allowed: false")
-    if not scenario.fdi.bounds.actuators.is_none:
+    if not Declared.of(scenario).servo_errors.is_none:
         says = "fdi.bounds.actuators: where a doublet brings the surfaces is then not certain"
         raise BadInput(f"{scenario.name}: {says}, allowed with separate: none")
     log, recorder = MemoryLog(), Recorder(scenario)

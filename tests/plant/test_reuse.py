@@ -10,6 +10,7 @@ from beaver_ftc.plant import conditions
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.trim import take_off
 from beaver_ftc.scenario.schema import load
+from beaver_ftc.scenario.truth import Truth
 from samples import samples
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -140,7 +141,7 @@ def test_every_property_of_jsbsim_is_as_in_a_fresh_one(monkeypatch):
     scenario = scenario_of({"faults": []})
     with monkeypatch.context() as patch:
         patch.setattr(conditions, "_free", {})
-        fresh, trim = ready(scenario)
+        fresh, trim = ready(Truth.of(scenario))
         take_off(fresh, scenario, trim)
         expected = readable(fresh)
     gusty = {
@@ -151,7 +152,7 @@ def test_every_property_of_jsbsim_is_as_in_a_fresh_one(monkeypatch):
         }
     }
     flown(scenario_of(gusty | {"faults": [{"actuator": "flap", "type": "float", "at_s": 0.2}]}))
-    again, trim = ready(scenario)
+    again, trim = ready(Truth.of(scenario))
     take_off(again, scenario, trim)
     assert again is not fresh
     assert len(expected) > 500
@@ -172,11 +173,11 @@ def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
 
 def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
     scenario = scenario_of({"faults": [], "initial": {"airspeed_mps": 41.5}})
-    plant, first = ready(scenario)
+    plant, first = ready(Truth.of(scenario))
     conditions.give_back(plant)
     flown(scenario_of({"faults": [], "initial": {"airspeed_mps": 50.0}}))
     monkeypatch.setattr(conditions, "_trims", {})
-    plant, again = ready(scenario)
+    plant, again = ready(Truth.of(scenario))
     conditions.give_back(plant)
     assert first == again
 

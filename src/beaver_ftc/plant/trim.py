@@ -386,7 +386,8 @@ def _actuators(plant: Plant, truth: Truth) -> None:
         plant.write(f"actuators/{surface}/bandwidth-rad_sec", off.bandwidth * dynamics.bandwidth_rad_s)
         rate_rad_s = off.rate_limit * radians(dynamics.rate_limit_deg_s)
         plant.write(f"actuators/{surface}/rate-limit-rad_sec", rate_rad_s)
-        plant.write(f"actuators/{surface}/dead-band-rad", radians(off.dead_band_deg))
+        key, name = f"uncertainty.actuators.{surface}.dead_band_deg", f"actuators/{surface}/dead-band-rad"
+        _set(plant, key, name, radians(off.dead_band_deg))
         if dynamics.travel_deg is not None:
             low, high = dynamics.travel_deg
             plant.write(f"actuators/{surface}/position-min-rad", radians(low))

@@ -326,8 +326,8 @@ DeadBand = Annotated[Number, Field(ge=0, le=10)]
 class TrueActuator(Section):
     """What the actuator of one surface has in the truth.
 
-    bandwidth: bandwidth, divided by that in `actuators`
-    rate_limit: rate limit, divided by that in `actuators`
+    bandwidth: bandwidth, divided by that in `actuators`, 1
+    rate_limit: rate limit, divided by that in `actuators`, 1
     dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
     """
 

@@ -294,6 +294,7 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     working directory. What is wrong with the other aircraft's truth is not with this one's."""
     find_aircraft(reference, Path())
     document = scenario.model_dump(mode="json", exclude_none=True)
+    del document["fdi"]["bounds"]["actuators"]
     given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
     return Scenario.model_validate({**document, **given, "faults": [], "expect": {}})
 
@@ -357,6 +358,7 @@ def _point(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, l
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
     """The scenario flown elsewhere, its references scaled."""
     document = scenario.model_dump(mode="json", exclude_none=True)
+    del document["fdi"]["bounds"]["actuators"]
     document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
     for signal in (signal for signals in document["reference"].values() for signal in signals):
         parameters = next(iter(signal.values()))

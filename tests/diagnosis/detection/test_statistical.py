@@ -137,7 +137,7 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
         n = block["n"]
         assert block["Q_x"][:n] == pytest.approx(square[block["axes"][:n]], rel=0.02)
     half_a_degree = np.abs(_rates(design, x, y, u) - _rates(design, x, y, u + np.deg2rad([0, 0.5, 0, 0])))[1]
-    assert alone.detector["noise"]["eta_u"][1] >= half_a_degree
+    assert alone.detector["noise"]["G_trim"][1, 1] * np.deg2rad(0.5) == pytest.approx(half_a_degree)
     calm = Detector(100.0, bounds=TACTICAL)
     assert alone.blocks[0]["Q_d"][0, 0] > calm.blocks[0]["Q_d"][0, 0]
     assert PITCH_BLOCK == 0

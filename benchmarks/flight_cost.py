@@ -66,7 +66,8 @@ def git(*words: str) -> bytes:
 def unpack(revision: str, folder: Path) -> Path:
     """The code of a revision, in a new folder."""
     with tarfile.open(fileobj=io.BytesIO(git("archive", revision))) as archive:
-        archive.extractall(folder, filter="data")
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # from Python 3.11.4 on
+        archive.extractall(folder)
     return folder
 
 

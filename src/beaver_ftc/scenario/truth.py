@@ -1,4 +1,5 @@
-"""The other half of a scenario than `declared`: what flies, and what breaks in it. `plant/` knows no more."""
+"""The other half of a scenario than `declared`, as far as the plant is configured from it. Faults and errors
+of instruments are true as well: the loop hands them to their schedules."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,7 +12,8 @@ from beaver_ftc.scenario.schema import Scenario, Uncertainty
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true of a flight. substeps: JSBSim steps in a frame. seed: of its random numbers."""
+    """What is true of an aircraft, its start and the air. substeps: JSBSim steps in a frame. seed: of the
+    random numbers of the air."""
 
     aircraft: Aircraft
     rate_hz: float
@@ -20,21 +22,32 @@ class Truth:
     uncertainty: Uncertainty
     actuators: Actuators
     environment: Environment
-    seed: int
+    seed: int = 1
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """That of a scenario."""
-        of = scenario
         return cls(
-            of.airframe, of.rate_hz, of.substeps, of.initial, of.uncertainty, of.actuators, of.environment,
-            of.seed,
-        )  # fmt: skip
+            aircraft=scenario.airframe,
+            rate_hz=scenario.rate_hz,
+            substeps=scenario.substeps,
+            initial=scenario.initial,
+            uncertainty=scenario.uncertainty,
+            actuators=scenario.actuators,
+            environment=scenario.environment,
+            seed=scenario.seed,
+        )
 
     @classmethod
     def as_declared(cls, declared: Declared) -> Self:
         """The one that the designer believes in: no errors, and still air."""
-        of = declared
-        with checked_against(of.aircraft):
-            nothing = Uncertainty(), of.servos, Environment()
-        return cls(of.aircraft, of.rate_hz, of.substeps, of.initial, *nothing, seed=1)
+        with checked_against(declared.aircraft):
+            return cls(
+                aircraft=declared.aircraft,
+                rate_hz=declared.rate_hz,
+                substeps=declared.substeps,
+                initial=declared.initial,
+                uncertainty=Uncertainty(),
+                actuators=declared.servos,
+                environment=Environment(),
+            )

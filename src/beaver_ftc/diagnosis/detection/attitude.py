@@ -12,7 +12,8 @@ of variance S, is white. A fault of a surface is part of nu as well, but the att
 contains its response.
 
 Two kinds of sums gather what g contains. Leaky sums z suit any course of a fault. N is the correlation with
-the response g_s to a loss of surface s, summed over roll and yaw:
+the response g_s to a loss of surface s, summed over roll and yaw. It begins at the alarm of the rates, since
+what was before the fault only adds noise:
 
     z <- a z + g / sqrt S          N <- b N + g_s g / S      M <- b M + g_s^2 / S
 
@@ -32,7 +33,7 @@ exceeds the same margin about one axis, and no sum above does. e_T, rad/s, bound
 gyros and attitude turn.
 """
 
-from math import sqrt
+from math import exp, sqrt
 
 import numpy as np
 
@@ -49,7 +50,7 @@ from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 
 LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
-LOSS_MEMORIES_S = (2.0, 10.0)
+LOSS_MEMORY_S = 30.0
 COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
@@ -59,15 +60,13 @@ N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and t
 def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     """The comparison of attitude and rates, for the capacity of a block of the rates."""
     n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
-    n_b = len(LOSS_MEMORIES_S)
     return record(
-        enabled=int, level=float,  # level of both sums, standard deviations
-        D=(3, 3), R=float, a=n_a, b=n_b,  # 1/s; variance of v, rad2; leaks per frame
+        enabled=int, alarmed=int, level=float,  # level of both sums, standard deviations
+        D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; leaks per frame
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
-        n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h, n_b), M=(3, n_h, n_b),
-        R_j=(3, n_h, n, n_b),
+        n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h), M=(3, n_h), R_j=(3, n_h, n),
         score=float,  # the larger sum of the frame, over its level, after an alarm
         e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
         T=(3, n_a), E=(3, n_a), T_std=n_a,
@@ -83,7 +82,7 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
     att["enabled"], att["level"], att["gyro"] = 1, sqrt(2.0 * margin), -1
     att["D"], att["R"] = D, v**2
-    att["a"], att["b"] = a, np.exp(-dt_s / np.array(LOSS_MEMORIES_S))
+    att["a"], att["b"] = a, exp(-dt_s / LOSS_MEMORY_S)
     att["P_start"] = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
     att["T_std"] = np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2))
     drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ("phi", "theta", "psi"))
@@ -99,11 +98,17 @@ def restart(att):
     """Forget what was compared: the attitude shows no turn now."""
     att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
     att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
-    att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
-    att.T[:], att.E[:] = 0.0, 0.0
+    att.z[:], att.z_j[:], att.T[:], att.E[:] = 0.0, 0.0, 0.0, 0.0
+    forget_losses(att)
     for i in range(3):
         for k in range(3):
             att.P[i, k, k] = att.P_start[k]
+
+
+@kernel
+def forget_losses(att):
+    """Begin the correlations with losses anew."""
+    att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0
 
 
 @kernel
@@ -119,6 +124,9 @@ def compare_attitude(att, blocks, eta, with_Z, x, dt, detected):
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
     they can decide anything: after an alarm of the rates, `detected`, or if a turn is beyond its level.
     """
+    if detected and not att.alarmed:
+        att.alarmed = 1
+        forget_losses(att)
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
     for i in range(3):
@@ -193,10 +201,10 @@ def advance_axis(att, i, blk, row, eta, with_Z, dt):
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
-            leak(att.N[i, h], att.b, g_s * g)
-            leak(att.M[i, h], att.b, g_s * g_s)
+            att.N[i, h] = att.b * att.N[i, h] + g_s * g
+            att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
             for j in range(att.n[i]):
-                leak(att.R_j[i, h, j], att.b, g_s * att.g_j[j])
+                att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
 
 
 @kernel
@@ -228,19 +236,18 @@ def largest_correlation(att, blk, first, step):
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind != LOSS:
             continue
-        for m in range(att.b.size):
-            N, M, excess = 0.0, 0.0, 0.0
+        N, M, excess = 0.0, 0.0, 0.0
+        for i in range(first, 3, step):
+            N += att.N[i, h]
+            M += att.M[i, h]
+        for j in range(n):
+            R = 0.0
             for i in range(first, 3, step):
-                N += att.N[i, h, m]
-                M += att.M[i, h, m]
-            for j in range(n):
-                R = 0.0
-                for i in range(first, 3, step):
-                    R += att.R_j[i, h, j, m]
-                excess -= tol(blk, j, n) * abs(R)
-            excess += abs(N)
-            if M > 0.0:
-                largest = max(largest, excess / np.sqrt(M))
+                R += att.R_j[i, h, j]
+            excess -= tol(blk, j, n) * abs(R)
+        excess += abs(N)
+        if M > 0.0:
+            largest = max(largest, excess / np.sqrt(M))
     return largest / att.level
 
 

@@ -753,17 +753,23 @@ def expect_pressure(mon, pressure):
 
 @kernel
 def allows_isolation(mon, is_earlier):
-    """Whether a surface may be isolated; is_earlier: the alarm was a frame or more ago.
+    """Whether the data may speak about surfaces; is_earlier: the alarm was a frame or more ago.
 
-    None is while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
-    flight a sideslip of zero stays zero.
+    They do not while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In
+    symmetric flight a sideslip of zero stays zero.
     """
     if not mon.config.enabled:
         return True
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
         if stands_still(mon, i):
             return False
-    return is_earlier == 1 and (mon.memory.gyros_excluded == 1 or not mon.config.noisy)
+    return is_earlier == 1 or doubts_gyros(mon)
+
+
+@kernel
+def doubts_gyros(mon):
+    """Whether a gyro may be the cause of the alarm of the surfaces."""
+    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.memory.gyros_excluded == 0
 
 
 @kernel

@@ -180,9 +180,12 @@ def exclude_or_wait(fdi, fie, possible, t):
     """Exclude the fault of estimator fie at t s, unless it is possible.
 
     Where sensors are monitored, a fault that has been isolated is excluded a frame later: it may be a gyro
-    that contradicts it, and the attitude shows that a frame late.
+    that contradicts it, and the attitude shows that a frame late. While a gyro may be the cause of the alarm,
+    what excludes a fault is only kept.
     """
-    if not possible or fie.pending:
+    if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
+        fie.pending = max(fie.pending, not possible)
+    elif not possible or fie.pending:
         isolated = fdi.verdict.from_s[fie.surface] >= 0.0
         isolation.exclude_fault(fie, t, fdi.sensor_monitor.config.enabled and isolated)
 
@@ -198,6 +201,8 @@ def exclude_worst_case(fdi, x, t, started):
 @kernel
 def decide_loss(fdi, t):
     """Isolate the loss of effectiveness whose estimator is the only one left."""
+    if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
+        return
     conclusion.set_isolated(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
 
 
@@ -254,6 +259,8 @@ def decide_type(fdi, t, started):
         return
     if started or fdi.isolation.config.reach:
         registry.observe_frame(types, layout, fies, bank.output.innovation, bound)
+    if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
+        return
     conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
 
 

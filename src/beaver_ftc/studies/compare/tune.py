@@ -118,15 +118,15 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
             TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group], {}
         )
         of_kind[method.name] = row["values"]
-    counts = {grade: len(flights(grade, how.most, how.draw)) for grade in grades}
-    said = {"procedure": PROCEDURE, **asdict(how), "flights": counts}
-    del said["most"]  # which the numbers of flights say
+    said = {"procedure": PROCEDURE, **asdict(how)}
+    del said["most"]  # which the numbers of flights in the rows say
     return said | {"grades": grades, "methods": rows}
 
 
 def tune_method(method: Method, how: Search) -> Document:
-    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, margins; on a
-    draw that does not choose what ships, the gain of the values found, small or large."""
+    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, flights of a
+    trial, margins; on a draw that does not choose what ships, the gain of the values found, small or large.
+    """
     cost = (
         DetectorCost(method.name, flights(method.grade, how.most, how.draw))
         if method.group == DETECTORS
@@ -136,7 +136,8 @@ def tune_method(method: Method, how: Search) -> Document:
     found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
     values = found.values if gains else start
-    row = {**_row(method, found), "values": values, **_margins(cost, values)}
+    count = len(flights(method.grade, how.most, how.draw))
+    row = {**_row(method, found), "values": values, "flights": count, **_margins(cost, values)}
     if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
         row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw)
     return row

@@ -2,8 +2,8 @@
 
 Each frame that health does not explain bounds the surface's position from below, or above; a fault type
 forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and yields what it finds: pairs
-(greater, less), where the type requires greater <= less. The pairs of each rule, in order, are Table 10 of
-docs/explanation/certificates.md, "Types that pairs exclude".
+(greater, less), where the type requires greater <= less. docs/explanation/certificates.md, "Types that pairs
+exclude", has the pairs of each rule, in order.
 """
 
 from collections.abc import Callable, Iterator

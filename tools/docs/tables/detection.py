@@ -1,4 +1,4 @@
-"""Figures and numbers of docs/explanation/detection.md and isolation.md, from one built-in flight."""
+"""Figures of docs/explanation/detection.md and isolation.md, from one built-in flight."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +16,6 @@ import beaver_ftc as bf
 from beaver_ftc.design.model import design_of, response
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
-from beaver_ftc.studies.present.tables import markdown_table
 
 SCENARIO, SURFACE = "elevator-partial-loss", "elevator"
 LOSS, AT_S = 0.08, 12.8  # small, so that alarm and certainty come at different frames
@@ -135,17 +134,12 @@ def _apart(heights: np.ndarray, least: float) -> np.ndarray:
     return moved
 
 
-def _since() -> tuple[np.ndarray, list[np.ndarray]]:
-    """Time since the fault, s, and the ends of the sets: of the frame, then of all frames so far."""
-    frames = _frames()
-    struck = (frames.t > 1e-6) & (frames.t < SHOWN_S)
-    low, high = (ends[struck] for ends in frames.sets())
-    return frames.t[struck], [low, high, np.maximum.accumulate(low), np.minimum.accumulate(high)]
-
-
 def feasible_set() -> str:
     """The losses of the elevator that are consistent with each frame, and with all frames since the fault."""
-    t, (low, high, least, largest) = _since()
+    frames = _frames()
+    struck = (frames.t > 1e-6) & (frames.t < SHOWN_S)
+    t, (low, high) = frames.t[struck], [ends[struck] for ends in frames.sets()]
+    least, largest = np.maximum.accumulate(low), np.minimum.accumulate(high)
     with plt.rc_context(_LOOK):
         figure, axis = plt.subplots(figsize=(7.2, 3.2))
         axis.vlines(t, 100 * low, 100 * high, color=GREY, lw=1.2)
@@ -160,17 +154,6 @@ def feasible_set() -> str:
         axis.set_xlim(0.0, SHOWN_S)
         figure.subplots_adjust(left=0.09, right=0.98, top=0.96, bottom=0.16)
         return _saved(figure, "feasible-set", "The feasible set of the loss shrinks")
-
-
-def feasible_set_numbers() -> str:
-    """The same at some instants, %."""
-    t, ends = _since()
-    rows = []
-    for after in (0.01, 0.1, 0.2, 0.5, 0.9):
-        k = int(np.argmin(np.abs(t - after)))
-        rows.append((f"{t[k]:.2f}", *(f"{100 * end[k]:.1f}" for end in ends)))
-    head = ("time, s", "frame, least, %", "frame, largest, %", "all, least, %", "all, largest, %")
-    return markdown_table(head, rows)
 
 
 def _saved(figure: Figure, name: str, says: str) -> str:

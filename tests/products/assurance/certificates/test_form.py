@@ -1,7 +1,9 @@
 """The form of a certificate, field by field, and what of it the scenario declares: by hand, not flown."""
 
 import copy
+import csv
 from math import radians
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -136,3 +138,11 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     np.testing.assert_allclose(sums, [*ours.totals, ours.calm_prediction], rtol=1e-7)
     assert room == pytest.approx(min(ours.room_by_swings, ours.room_by_change_rate), rel=1e-6)
     assert (ours.room_by_change_rate < ours.room_by_swings) == (pace < 1.0)
+
+
+def test_the_page_lists_the_fields_that_the_checker_accepts():
+    page = Path(__file__).parents[4] / "docs" / "explanation" / "certificate-fields.csv"
+    rows = csv.DictReader(page.read_text(encoding="utf-8").splitlines())
+    listed = {row["field"] for row in rows if row["object"] != "log"}
+    accepted = [value for name, value in vars(check_certificate).items() if name.endswith("_FIELDS")]
+    assert listed == set().union(*accepted)

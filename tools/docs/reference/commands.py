@@ -24,7 +24,7 @@ brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
 [Columns](reference/columns.md) lists the columns of the tables that commands write."""
 _NEXT = """## Next
 
-[Assert in CI](how-to/ci.md) uses the exit statuses."""
+[Assert in CI](how-to/evidence.md#in-ci) uses the exit statuses."""
 _KINDS = re.compile(r" <(?:str|int|path|(?:int|float) range|list\[\w+\])>")  # the text or the range says it
 _SHARED = 3  # so many commands with the same option share its row
 _SHARED_SAYS = "## Options of several commands\n\nEach command lists which of these options it has."

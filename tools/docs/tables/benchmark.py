@@ -74,9 +74,9 @@ def benchmark_gains() -> str:
     none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
     other = len(rows) - kept - len(none)
     says = (
-        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and grade, "
-        f"the last search found no better values for {kept}, no admissible values for {', '.join(none)}, and "
-        f"values that were not adopted for {other}."
+        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
+        f"grade, the last search found no better values for {kept}, no admissible values for "
+        f"{', '.join(none)}, and values that were not adopted for {other}."
     )
     table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"

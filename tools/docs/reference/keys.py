@@ -343,7 +343,7 @@ _AIRCRAFT_LINKS = {
     "`model_error_map`": f"[measurement of the error]({_DERIVED}#4-measure)",
     "`effectors.NAME`": "[fly with the engines](how-to/engines.md)",
     "`channels`": "[fly under an autopilot](how-to/autopilots.md)",
-    "`damage.NAME`": "[damage on the GTM](results/gtm.md)",
+    "`damage.NAME`": "[damage on the GTM](results/aircraft.md#damage-on-nasas-gtm)",
 }
 KINDS = {
     "scenario-keys": Kind(

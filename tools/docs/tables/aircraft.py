@@ -88,17 +88,9 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
     ]
     return (
         "*Table 3. All aircraft together; columns as explained above.*\n\n"
-        f"{markdown_table(BESIDE, together)}\n\n{_read_beside(*together[-1])}\n\n"
+        f"{markdown_table(BESIDE, together)}\n\n"
         "*Table 4. Each aircraft at 0.001 false alarms an hour, the default: share of the losses that each "
         f"test finds within 1 s, %.*\n\n{markdown_table(head, each)}"
-    )
-
-
-def _read_beside(rate: str, _: str, losses: str, page: str, ours: str, ratio: str, *ends: str) -> str:
-    return (
-        f"The last row of Table 3 reads: at {rate} false alarms an hour, Page's test finds {page} % of "
-        f"the {losses} losses, and our diagnosis finds {ours} %. Our diagnosis finds {ratio} % of the number "
-        f"that Page's test finds (95 % interval: {ends[0]} to {ends[1]} %)."
     )
 
 
@@ -121,18 +113,7 @@ def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
     for name in chosen:
         derive_if_needed(f"jsbsim:{name}")
         rows.append(row_of(name, args)[0][: len(FLOWN) + 1])
-    return f"{markdown_table(('aircraft', *FLOWN), rows)}\n\n{_read_flown(*rows[0])}"
-
-
-def _read_flown(name: str, healthy: str, alarms: str, losses: str, *counts: str) -> str:
-    detected, named, wrong, left_out, certain, late = counts
-    return (
-        f"The first row reads: the {name} flew {healthy} without a fault, with {alarms} false alarms. "
-        f"In {losses} further flights a random surface lost effectiveness. The diagnosis detected {detected} "
-        f"of these losses. It gave the correct name to {named} and a wrong name to {wrong}. "
-        f"For {left_out} losses it excluded the true cause. G3 guarantees the detection of {certain} losses; "
-        f"{late} of these were late."
-    )
+    return markdown_table(("aircraft", *FLOWN), rows)
 
 
 def _derived(chosen: Iterable[str]) -> str:
@@ -147,16 +128,7 @@ def _derived(chosen: Iterable[str]) -> str:
     table = markdown_table(
         ("aircraft", "reason"), [(", ".join(those), why) for why, those in refused.items()]
     )
-    return f"{markdown_table(DERIVED, rows)}\n\n{_read_derived(*rows[0])}\n\n{REFUSED}\n\n{table}"
-
-
-def _read_derived(name: str, airspeed: str, roll: str, pitch: str, yaw: str, *losses: str) -> str:
-    elevator = "no loss of the elevator" if losses[1] == "-" else f"an elevator loss of {losses[1]} % or more"
-    return (
-        f"The first row reads: the {name} is in level flight at {airspeed} m/s. Near trim its design "
-        f"model is wrong by at most {roll} rad/s² in roll, {pitch} in pitch and {yaw} in yaw. If "
-        f"the elevator is 3 deg from neutral, {elevator} is certain to be detected."
-    )
+    return f"{markdown_table(DERIVED, rows)}\n\n{REFUSED}\n\n{table}"
 
 
 def _derive(name: str) -> tuple[dict | None, str]:

@@ -73,17 +73,13 @@ def benchmark_gains() -> str:
     kept = sum(again.get("gain") == 0.0 for again in last)
     none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
     other = len(rows) - kept - len(none)
-    largest = max(again.get("gain", 0.0) for again in last)
-    says = [
-        f"The table leaves out searches that found no better values. There are {len(rows)} pairs of "
-        f"method and grade. For {kept} of them, the last search found no values that cost at least 5 % less.",
-        f"For {', '.join(none)}, no values were admissible.",
-        f'For the other {other} pairs, the last search found new values, but they were not adopted ("no").',
-        f"The largest gain that a last search reached is {100.0 * largest:.1f} %.",
-        'After each row with "yes" in the column "adopted", a further search followed.',
-    ]
+    says = (
+        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
+        f"grade, the last search found no better values for {kept}, no admissible values for "
+        f"{', '.join(none)}, and values that were not adopted for {other}."
+    )
     table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
-    return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{' '.join(says)}"
+    return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"
 
 
 def _gain(row: Document, again: Document) -> tuple[str, ...]:

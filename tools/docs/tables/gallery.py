@@ -47,10 +47,7 @@ def _sections() -> Iterator[str]:
         names = [name for name in left if name.startswith(beginnings)]
         left = [name for name in left if name not in names]
         rows = [_row(name) for name in names]
-        caption = (
-            f"*Table {number}. {heading}: picture, scenario and outcome of each flight. "
-            "Deflections are in deg, times in s.*"
-        )
+        caption = f"*Table {number}. {heading}.*"
         yield f"## {heading}\n\n{caption}\n\n{markdown_table(('flight', 'scenario', 'outcome'), rows)}"
 
 
@@ -59,9 +56,7 @@ def _row(name: str) -> tuple[str, str, str]:
     path = Path("images/gallery", f"{name}.svg")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(_thumbnail(flight), encoding="utf-8")
-    sentences = re.split(r"(?<=[.!?]) (?=[A-Z])", " ".join(bf.load(name).description.split()))
-    description = " ".join(sentences[:2])
-    description = re.sub(r"(Compare it with )([\w-]+)", r"\1`\2`", description)
+    description = re.split(r"(?<=[.!?]) (?=[A-Z])", " ".join(bf.load(name).description.split()))[0]
     shown = f"![{name}]({path.as_posix()})"
     return shown, f"`{name}`<br>{description}", _outcome(flight)
 

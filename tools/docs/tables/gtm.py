@@ -1,29 +1,22 @@
-"""Tables and pictures of gtm.md: the converted model beside its specification, `BEAVER_FTC_GTM`."""
+"""Tables and pictures of the GTM: the converted model beside its specification, `BEAVER_FTC_GTM`."""
 
 import csv
 import os
 import tempfile
-import time
-from collections.abc import Callable
 from functools import cache
 from math import cos, radians, sin
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from beaver_ftc.aircraft import load
-from beaver_ftc.plant.adapter import bare
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_aircraft.gtm.database import read
-from beaver_ftc_aircraft.gtm.folder import write_model
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import aside, shared
 from tools.gtm import flights
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
-from tools.gtm.specification import DATABASE, SURFACES, Specification
+from tools.gtm.specification import SURFACES, Specification
 
 PICTURE = "images/gtm-flights.png"
 SPEEDS_KT = (46, 55, 65, 75, 85, 95, 105, 115, 130)
@@ -32,10 +25,8 @@ BETWEEN_DEG = (3.0, 5.0, 7.0, 8.5, 9.5, 10.5, 11.5)
 DRAWN = 500
 TITLES = {  # of the tables beside the page
     "checks": "Coefficients, mass, atmosphere, trim and modes: largest differences",
-    "trim": "Trim at an angle of attack of 3 deg",
     "spiral": "A steady steep spiral, in JSBSim and as published",
     "flights": "Eight flights: largest differences, % of the span of the signal",
-    "cost": "Processor time of the GTM",
 }
 _SHOWN = (
     ("airspeed V, m/s", None, 0.3048),
@@ -153,19 +144,6 @@ def gtm_checks() -> str:
     return aside("gtm-checks", TITLES["checks"], table)
 
 
-def gtm_trim() -> str:
-    """Trim at 3 deg of angle of attack, and gravity: JSBSim and the specification."""
-    here, there = _bench().steady(Condition(alpha_deg=3.0)), _steady(heavy=False)
-    source, heavy = _specifications()
-    rows = [
-        ("elevator", "deg", f"{here.elevator_deg:.3f}", f"{there.elevator_deg:.3f}"),
-        ("throttle", "%", f"{here.throttle_percent:.2f}", f"{there.throttle_percent:.2f}"),
-        ("gravity", "ft/s²", f"{heavy.gravity:.3f}", f"{source.gravity:.3f}"),
-    ]
-    table = markdown_table(("quantity", "unit", "JSBSim", "specification"), rows)
-    return aside("gtm-trim", TITLES["trim"], table)
-
-
 def _air() -> float:
     _bench().place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
     found = np.array([_bench().fdm[f"atmosphere/{name}"] for name in ("P-psf", "rho-slugs_ft3")])
@@ -261,42 +239,6 @@ def _modes() -> tuple[float, float]:
             frequency = max(frequency, abs(found[name][0] / omega - 1.0))
             damping = max(damping, abs(found[name][1] - zeta))
     return frequency, damping
-
-
-def gtm_cost() -> str:
-    """What a frame costs in frames of the Beaver, and how long loading takes."""
-    folder = Path(tempfile.mkdtemp(prefix="beaver-ftc-")) / "gtm"
-    model = write_model(read(_where() / DATABASE), folder)
-    load_s = min(_processor(lambda: bare(model)) for _ in range(3))
-    bench, beaver = Bench(model), bare(load().jsbsim)
-    flights.begin(bench, flights.state_of(_steady(heavy=True)), flights.of_steady(_steady(heavy=True)))
-    rows = [["frame in steady flight", _ratio(bench.fdm, beaver), "frames of the Beaver"]]
-    for i, name in enumerate(NAMES.values()):
-        bench.fdm[f"fcs/{name}-cmd-rad"] = 0.005 + 0.002 * i
-    rows.append(
-        ["frame with all surfaces deflected differently", _ratio(bench.fdm, beaver), "frames of the Beaver"]
-    )
-    bench.damage(4)
-    rows.append(["the same with a wing tip off", _ratio(bench.fdm, beaver), "frames of the Beaver"])
-    rows.append(["loading the model", f"{load_s:.2f}", "s"])
-    table = markdown_table(("quantity", "processor time", "unit"), rows)
-    return aside("gtm-cost", TITLES["cost"], table)
-
-
-def _processor(work: Callable[[], object]) -> float:
-    began = time.process_time()
-    work()
-    return time.process_time() - began
-
-
-def _ratio(one: Any, other: Any) -> str:
-    """Medians of short runs, taken in turn."""
-    runs = [
-        [_processor(lambda fdm=fdm: [fdm.run() for _ in range(40)]) for fdm in (one, other)]
-        for _ in range(50)
-    ]
-    mine, plain = np.median(runs, axis=0)
-    return f"{mine / plain:.1f}"
 
 
 # A steep spiral in equilibrium, elevators at -30 deg, other surfaces at 0, no thrust [Cunis2018]; m/s, deg,

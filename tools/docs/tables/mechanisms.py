@@ -1,19 +1,13 @@
 """What docs/results/mechanisms.md shows of the study of `beaver-ftc mechanisms`."""
 
-from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.metrics import measure
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.mechanisms import shown
 from beaver_ftc.studies.mechanisms.command import run_mechanisms
-from beaver_ftc.studies.mechanisms.survey import DRAWS, Flight, cases_of, fly_one, scenario_of
-from beaver_ftc.studies.mechanisms.systems import DEFAULT, DIAGNOSIS, LAW, NORM_BOUND, Changes
+from beaver_ftc.studies.mechanisms.survey import DRAWS, Flight, fly_one
+from beaver_ftc.studies.mechanisms.systems import DIAGNOSIS, LAW
 from beaver_ftc.studies.present.tables import markdown_table, number
 from tools.docs.tables import aside, shared
 
@@ -24,15 +18,6 @@ PROBED = (
     Flight("loss 40 %", "high", 0.0, "exact sensors", 1),
     Flight("unanticipated", "low", 0.02, "real sensors", 0),
 )
-BESIDE: dict[str, Changes] = {  # what stays of the sharpened tests while the signed interval test is removed
-    "all": {"fdi.sharpen": "all"},
-    "all but the memory before the alarm": {"fdi.sharpen": {"memory": False}},
-    "none": {"fdi.sharpen": "none"},
-}
-SIGNED_HEAD = (
-    "other sharpened tests", "flights", "same alarm", "same name", "same alarm, name and time of it",
-    "earlier name with it", "later name with it",
-)  # fmt: skip
 GROUPS = {  # some criterion is worse, some is better without the mechanism: title
     (True, False): "Mechanisms that help",
     (True, True): "Mechanisms that help by one criterion and cost by another",
@@ -132,43 +117,3 @@ def mechanisms_probe() -> str:
         for flight in PROBED
         for key, outcome in fly_one(SEED, flight).items()
     )
-
-
-def mechanisms_signed() -> str:
-    """In how many draws the signed interval test changes something, by the tests beside it."""
-    return _signed(cases_of(DRAWS))
-
-
-def mechanisms_signed_probe() -> str:
-    """The same of two draws."""
-    return _signed(PROBED, workers=1)
-
-
-def _signed(cases: Sequence[Flight], workers: int = 2) -> str:
-    rows = [
-        (name, *_of_pairs(fly_all(partial(_pair, beside), cases, workers))) for name, beside in BESIDE.items()
-    ]
-    return markdown_table(SIGNED_HEAD, rows)
-
-
-def _pair(beside: Changes, flight: Flight) -> list[list[Any]]:
-    """Alarm, name and its time with the signed interval test and without it."""
-    whole = scenario_of(flight, SEED, DEFAULT).with_(beside)
-    return [_verdict(whole), _verdict(whole.with_(NORM_BOUND))]
-
-
-def _verdict(scenario: Scenario) -> list[Any]:
-    found = measure(fly(scenario))
-    return [found.detection.time_s, found.isolation.fault, found.isolation.time_s]
-
-
-def _of_pairs(pairs: Sequence[list[list[Any]]]) -> tuple[str, ...]:
-    named = [(a[2], b[2]) for a, b in pairs if None not in (a[2], b[2])]
-    counts = (
-        len(pairs),
-        *(sum(a[i] == b[i] for a, b in pairs) for i in (0, 1)),
-        sum(a == b for a, b in pairs),
-        sum(with_it < without for with_it, without in named),
-        sum(with_it > without for with_it, without in named),
-    )
-    return tuple(map(str, counts))

@@ -13,7 +13,7 @@ from benchmarks import own_logs as own
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, result_files, run_benchmark
-from tools.docs.tables import shared
+from tools.docs.tables import aside, shared
 
 Document = dict[str, Any]
 PICTURE = "images/recorded-flights.png"
@@ -96,7 +96,8 @@ def own_logs_of_aircraft() -> str:
             [aircraft.removeprefix("jsbsim:"), AIR_TEXT[air], *row]
             for row in _own_rows(results, OWN_OF_AIRCRAFT)
         ]
-    return markdown_table(("aircraft", "air", *OWN_OF_AIRCRAFT.values()), rows)
+    table = markdown_table(("aircraft", "air", *OWN_OF_AIRCRAFT.values()), rows)
+    return aside("own-logs-of-aircraft", "Simulated losses, other aircraft and still air", table)
 
 
 def _by_identified(of: own.Campaign) -> list[Document]:

@@ -8,7 +8,7 @@ from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.present.tables import number as plain_number
 from beaver_ftc.studies.reproduce import beside
-from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, MEASURED, NOT_BORNE_OUT, STRONGER
+from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, MEASURED, NOT_BORNE_OUT
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, figures_of
 from beaver_ftc.studies.reproduce.reproduction import fly_published, reproduced
 from beaver_ftc.studies.reproduce.words import (
@@ -31,60 +31,20 @@ IN_WORDS = {  # names of settings and of ablations that the document has, as the
     "the health (an elevator fault instead)": "nothing is removed; an elevator fault is added",
 }
 CAPTIONS = {  # of each figure: what it shows, and what to see
-    "fig-2a": ("Nominal law, no fault", "The pitch rate follows its reference"),
-    "fig-2b": (
-        "Nominal law, elevator fault at 12 s",
-        "After the fault the pitch rate no longer follows its reference",
-    ),
-    "fig-3": (
-        "Detection of the elevator fault",
-        "The residual of the pitch rate exceeds its threshold after one frame",
-    ),
-    "fig-4a": (
-        "Isolation estimator of the aileron, elevator fault",
-        "The residual of the pitch rate exceeds its threshold, so the aileron is excluded (grey)",
-    ),
-    "fig-4b": (
-        "Isolation estimator of the elevator, elevator fault",
-        "No residual exceeds its threshold, so the elevator remains the only candidate",
-    ),
-    "fig-4c": (
-        "Isolation estimator of the rudder, elevator fault",
-        "The residual of the pitch rate exceeds its threshold, so the rudder is excluded (grey)",
-    ),
-    "fig-5": (
-        "Fault-tolerant law, elevator fault",
-        "After isolation the flap moves in place of the elevator",
-    ),
-    "fig-6": (
-        "Nominal law, unanticipated fault at 12 s",
-        "The aircraft departs",
-    ),
-    "fig-7": (
-        "Fault-tolerant law, unanticipated fault",
-        "The pitch rate follows its reference again",
-    ),
-    "aileron": (
-        "Fault-tolerant law, aileron fault",
-        "The roll rate follows its reference with a larger error than before the fault",
-    ),
-    "rudder": (
-        "Fault-tolerant law, rudder fault",
-        "The alarm comes later than after a fault of aileron or elevator",
-    ),
-    "unanticipated-detection": (
-        "Detection of the unanticipated fault",
-        "The residual of the pitch rate exceeds its threshold after one frame",
-    ),
-    "as-printed": (
-        "Detection with equation (2) as printed, no fault",
-        "The residual of the pitch rate exceeds its threshold at the start of the flight",
-    ),
-    SENSITIVITY: (
-        "How far each number stays from its limit",
-        "One row for each statement that can be tested. Horizontal: ratio of number and limit, logarithmic",
-        "Left of 1 the number keeps its limit",
-    ),
+    "fig-2a": "Nominal law, no fault. The pitch rate follows its reference",
+    "fig-2b": "Nominal law, elevator fault. The pitch rate no longer follows its reference",
+    "fig-3": "Detection of the elevator fault. The residual of the pitch rate exceeds its threshold",
+    "fig-4a": "Isolation estimator of the aileron, elevator fault. The aileron is excluded",
+    "fig-4b": "Isolation estimator of the elevator, elevator fault. The elevator remains the only candidate",
+    "fig-4c": "Isolation estimator of the rudder, elevator fault. The rudder is excluded",
+    "fig-5": "Fault-tolerant law, elevator fault. After isolation the flap moves in place of the elevator",
+    "fig-6": "Nominal law, unanticipated fault. The aircraft departs",
+    "fig-7": "Fault-tolerant law, unanticipated fault. The pitch rate follows its reference again",
+    "aileron": "Fault-tolerant law, aileron fault. The error of the roll rate grows",
+    "rudder": "Fault-tolerant law, rudder fault. The alarm comes later than after the other faults",
+    "unanticipated-detection": "Detection of the unanticipated fault after one frame",
+    "as-printed": "Detection with equation (2) as printed, no fault. The alarm comes at once",
+    SENSITIVITY: "Ratio of number and limit of each testable statement. Left of 1 the number keeps its limit",
 }
 
 
@@ -114,19 +74,6 @@ def _not_borne_out(document: Document) -> str:
 def _ours(claim: Document) -> str:
     """Quantity and number, with a colon between: a cell has no heading that names the quantity."""
     return f"{claim['quantity']}: {number(claim['number'], claim['unit'], claim['none'])}"
-
-
-def reproduction_stronger() -> str:
-    """The statements read off a figure that hold wherever the paper did not fly, too, with their ablation."""
-    return aside("reproduction-everywhere", "Statements that hold in every setting", _stronger(_document()))
-
-
-def _stronger(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "limit", "removed", "ours without it"), [
-        (claim["where"], claim["statement"].rstrip("."), *_both(claim))
-        for claim in measured(document)
-        if claim["verdict"] == STRONGER and claim["where"].startswith("Fig.") and not claim["construction"]
-    ])  # fmt: skip
 
 
 def _both(claim: Document) -> tuple[str, str, str, str]:
@@ -216,9 +163,7 @@ def _figures() -> str:
 
 def _caption(title: str, name: str) -> str:
     """What a figure shows; of a figure of the paper, also its number there."""
-    of_paper = f" ({title} of the paper)" if title.startswith("Fig.") else ""
-    shows, *says = CAPTIONS[name]
-    return ". ".join([f"{shows}{of_paper}", *says])
+    return CAPTIONS[name] + (f" ({title} of the paper)" if title.startswith("Fig.") else "")
 
 
 def reproduction_probe() -> str:

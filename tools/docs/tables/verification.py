@@ -1,4 +1,4 @@
-"""The table of docs/results/verification.md: how small a loss is certain to be found."""
+"""The table of docs/results/validation.md: how small a loss is certain to be found."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -336,7 +336,7 @@ _LINKS = {
 }
 _AIRCRAFT_LINKS = {
     "`surfaces.NAME`": "[properties of the Beaver](reference/properties.md), "
-    "[signs](reference/nomenclature.md#axes-and-signs)",
+    "[signs](reference/glossary.md#axes-and-signs)",
     "`moments`": "[terms of the Beaver](reference/properties.md#aerodynamic-terms), "
     f"[fit of the terms]({_DERIVED}#3-fit)",
     "`model_error_rad_s2`": f"[meaning of the bound]({_DERIVED}#what-the-bound-means)",

@@ -192,19 +192,13 @@ class InertiaCoupling(Section):
     that comes from products of two body rates. In the published study [Zhang2005] these errors are at most
     0.25."""
 
-    p: Number = number(
-        0.0, "share of 1", "error in roll, of the coefficient of q r", ge=-1, le=1, examples=[0.2]
-    )
-    q: Number = number(
-        0.0, "share of 1", "error in pitch, of the coefficient of p r", ge=-1, le=1, examples=[0.2]
-    )
-    r: Number = number(
-        0.0, "share of 1", "error in yaw, of the coefficient of p q", ge=-1, le=1, examples=[0.2]
-    )
+    p: Number = number(0.0, "share of 1", "coefficient of q r", ge=-1, le=1, examples=[0.2])
+    q: Number = number(0.0, "share of 1", "coefficient of p r", ge=-1, le=1, examples=[0.2])
+    r: Number = number(0.0, "share of 1", "coefficient of p q", ge=-1, le=1, examples=[0.2])
 
 
 class Sinusoid(Section):
-    """An error of one angular acceleration: amplitude times sin(frequency t). t is the time of the flight."""
+    """amplitude times sin(frequency t), t: time of the flight."""
 
     amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
@@ -232,15 +226,14 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 class Uncertainty(Section):
     """Differences between the truth and the design model.
 
-    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates. In
-    [Zhang2005] they are at most 0.25
+    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates
 
-    sinusoid: for each axis, an error of the angular acceleration: amplitude times sin(frequency t)
-    coefficients: factors on aerodynamic terms of the truth, by name of the term. 1: no error
+    sinusoid: a sinusoidal error of each angular acceleration
+    coefficients: factors on aerodynamic terms of the truth, by name
     mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
     inertia: inertia of the truth, divided by the inertia in the aircraft file
 
-    cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
+    cg_m: shift of the true centre of gravity: forward, right, down, m
     actuators: actuators of the truth, compared with `actuators`
     """
 

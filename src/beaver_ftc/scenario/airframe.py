@@ -326,7 +326,7 @@ class TrueActuator(Section):
 
     bandwidth: bandwidth, divided by that in `actuators`, 1
     rate_limit: rate limit, divided by that in `actuators`, 1
-    dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
+    dead_band_deg: largest distance from the command at which the actuator does not move, deg
     """
 
     bandwidth: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])

@@ -219,8 +219,7 @@ class Stuck(Switched):
     """The surface jams.
 
     actuator: surface that fails. Of the Beaver: `aileron`, `elevator`, `rudder` or `flap`
-    position_deg: position at which the surface jams, between its stops; left out: the position at the start
-    of the fault, deg
+    position_deg: position of the jam; left out: the position at the start of the fault, deg
     """
 
     properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"

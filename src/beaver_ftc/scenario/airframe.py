@@ -160,8 +160,8 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The flight condition at the start: trimmed straight flight with wings level. Another aircraft has "
-    "its own engine settings and surfaces."""
+    """The flight condition at the start: trimmed straight flight with wings level. Another aircraft has
+    its own engine settings and surfaces."""
 
     airspeed_mps: Number = number(45.0, "m/s", "true airspeed", ge=20, le=70)
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
@@ -306,8 +306,8 @@ class OfSurfaces(Section, extra="allow"):
 
 
 class Actuators(OfSurfaces):
-    """A preset, or a key directly in this section, applies to all surfaces. A key of one surface replaces "
-    "it."""
+    """A preset, or a key directly in this section, applies to all surfaces. A key of one surface replaces
+    it."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
     of_one, presets = ActuatorDynamics, PRESETS

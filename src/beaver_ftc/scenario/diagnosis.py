@@ -275,9 +275,8 @@ class FdiConfig(Section, strict=True):
     slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface,
     rad/s
     slowest_rate_deg_s: lowest rate limit of a slow surface. A slower one counts as jammed, deg/s
-    probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
-    statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
-    left out: off
+    probing: active diagnosis, for `fault_class: all`. `{}`: on; left out: off
+    statistical: statistical detector besides the worst-case detector. `{}`: on; left out: off
     authority: detector that can raise the alarm and exclude, with `statistical`
     thresholds: isolation tests: the residual must stay in an interval, or its magnitude below one bound
     detection_pole_per_s: pole of the first detection filter, 1/s

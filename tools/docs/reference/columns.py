@@ -134,7 +134,7 @@ def _said() -> str:
 
 
 def _table(name: str, text: Mapping[str, str]) -> str:
-    rows = markdown_table(("column", "unit or type", "what it is"), list(_rows(name, text["columns"])))
+    rows = markdown_table(("column", "unit or type", "meaning"), list(_rows(name, text["columns"])))
     return f"## {text['title']}\n\n{text['says']}\n\n{rows}"
 
 

@@ -11,7 +11,7 @@ from beaver_ftc.cli.main import app, every_command
 from beaver_ftc.documents import errors
 from beaver_ftc.studies.present.tables import markdown_table
 
-_HEAD = ("option", "what it is")
+_HEAD = ("option", "meaning")
 PARSER: Any = typer.main.get_command(app)
 
 

@@ -27,7 +27,7 @@ _NAMED = {  # sections that stand in many places: heading, part
 }
 _SURFACES = load().surfaces
 _FEW = 6  # words of a key that shares its row
-_HEAD = ("in", "key", "what it is", "value", "default")
+_HEAD = ("in", "key", "meaning", "value", "default")
 _WORDS = {"string": "text", "boolean": "flag", "integer": "whole number", "number": "number"}
 
 
@@ -307,13 +307,13 @@ def _of_scenarios() -> Iterator[str]:
     for group, what, where in ((DETECTORS, "scheme", "fdi"), (LAWS, "law", "control")):
         yield f"## {what.capitalize()}s, and their `{where}.options`"
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
-        yield markdown_table((what, "what it is"), [(f"`{one.name}`", one.description()) for one in entries])
+        yield markdown_table((what, "meaning"), [(f"`{one.name}`", one.description()) for one in entries])
         rows = [
             (f"`{one.name}`", f"`{name}`", of["says"], _option_range(of), f"`{of['default']:g}`")
             for one in entries
             for name, of in options_of(group, one.name).items()
         ]
-        yield markdown_table((what, "option", "what it is", "value", "default"), rows)
+        yield markdown_table((what, "option", "meaning", "value", "default"), rows)
     for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
         yield f"## Presets of `{what}`"
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]

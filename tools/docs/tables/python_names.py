@@ -55,7 +55,7 @@ def python_names() -> str:
     parts = []
     for number, (heading, names) in enumerate(NAMES.items(), FIRST):
         caption = " ".join(filter(None, [f"Table {number}. {heading}.", SAYS.get(heading)]))
-        parts += [f"*{caption}*", markdown_table(("name", "what it is"), list(_described(names)))]
+        parts += [f"*{caption}*", markdown_table(("name", "meaning"), list(_described(names)))]
     return "\n\n".join(parts) + "\n"
 
 

@@ -35,13 +35,11 @@ def derive(
     Examples:
       beaver-ftc derive jsbsim:c172p
 
-    aircraft: jsbsim:NAME for an aircraft of the installed jsbsim package, the path of a JSBSim model, or the
-    folder of an aircraft.
-    envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg;
-    and with the names of the model's surfaces, if they are not the usual ones: surfaces.
+    aircraft: jsbsim:NAME of the jsbsim package, path of a JSBSim model, or folder of an aircraft.
+    envelope: YAML file with ranges: airspeed_mps, alpha_deg, altitude_m and sideslip_deg; and with surfaces,
+    the names of the model's surfaces, if they are not the usual ones.
     out: Folder of the aircraft folder. Default: the cache.
-    engines: Give each engine a lever of its own, with which the law can turn the aircraft. Requires
-    --out.
+    engines: Give each engine a lever of its own, which the law moves. Requires --out.
     """
     from beaver_ftc_aircraft.derive.derivation import derive
     from beaver_ftc_aircraft.derive.derived import document_of, text_of

@@ -154,7 +154,7 @@ def diagnose(options: DiagnoseOptions) -> None:
     model: Model file that `identify` wrote. A log of `run` needs no model file.
     aircraft: Diagnose with the design model of this aircraft instead of an identified model.
     scenario: With --aircraft: scenario whose sections fdi, actuators and design_model declare the errors.
-    vehicle: With --aircraft: path of the vehicle file. Default: vehicle.yaml beside the log.
+    vehicle: With --aircraft: vehicle file. Default: vehicle.yaml beside the log.
     out: Folder for the results.
     score: After the diagnosis, compare its result with the labels in the log.
     detector: Name of the detector.

@@ -49,8 +49,8 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class QuantityColumn(Section):
-    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. For
-    numbers in the SI unit, the name of the column is enough."""
+    """A column of the log: the value in `unit` is `scale` times its number, plus `offset`. For SI units, the
+    name of the column is enough."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
     unit: Literal[tuple(SI_UNITS)] | None = Field(  # type: ignore[valid-type]
@@ -62,7 +62,7 @@ class QuantityColumn(Section):
     offset: Number = number(
         0.0,
         unit="as the column",
-        says="constant that is added after the multiplication by `scale`",
+        says="constant that is added",
         range="any",
         examples=[-1.5],
     )
@@ -100,7 +100,7 @@ ColumnSpec = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
 
 
 class TimeColumn(Section):
-    """The column that contains the time, if the log is a table."""
+    """The column of the time, if the log is a table."""
 
     column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
     unit: Literal[tuple(TIME_UNITS)] = Field(  # type: ignore[valid-type]
@@ -109,7 +109,7 @@ class TimeColumn(Section):
 
 
 class RateColumns(Section):
-    """The columns of the three body rates. Without `unit`, the numbers are in rad/s."""
+    """The columns of the body rates."""
 
     p: ColumnSpec = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
     q: ColumnSpec = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
@@ -117,8 +117,8 @@ class RateColumns(Section):
 
 
 class AttitudeColumns(Section):
-    """Columns of the attitude angles. With these angles, wrong units and signs of the body rates are found.
-    If turbulence is declared, `diagnose --aircraft` requires these columns."""
+    """Columns of the attitude angles, which show wrong units and signs of the rates. `diagnose --aircraft`
+    requires them if turbulence is declared."""
 
     roll: ColumnSpec = Field(description="column of the roll angle, rad", examples=["roll_rad"])
     pitch: ColumnSpec | None = Field(
@@ -130,7 +130,7 @@ class AttitudeColumns(Section):
 
 
 class EnergyColumns(Section):
-    """Columns that show an engine failure. After an engine failure, altitude and airspeed fall together."""
+    """Columns that show an engine failure: altitude and airspeed fall together."""
 
     altitude: ColumnSpec = Field(description="column of the altitude, m", examples=["altitude_m"])
     airspeed: ColumnSpec = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
@@ -142,8 +142,8 @@ class Vehicle(Section):
     name: VehicleName = Field(description="name of the vehicle", examples=["flying-wing"])
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
         default=None,
-        description="format of the logs. `table`: CSV or Parquet. `ulog`: PX4. `ardupilot`: "
-        "ArduPilot. `alfa`: a folder of the ALFA data set; left out: the format follows from the path",
+        description="format of the logs. `table`: CSV or Parquet. `ulog`: PX4. `alfa`: folder of the ALFA "
+        "data set; left out: found from the path",
     )
     time: TimeColumn | None = Field(
         default=None,
@@ -153,30 +153,28 @@ class Vehicle(Section):
     commands: list[ColumnSpec] = Field(
         min_length=1,
         max_length=20,
-        description="columns of the commands that the autopilot sends to the servos, not of measured "
-        "positions. Can be left out for a log of PX4 or ArduPilot, if the parameters in the "
-        "log state the surfaces",
+        description="columns of the commands to the servos, not of measured positions. Not required if the "
+        "parameters of a PX4 or ArduPilot log state the surfaces",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[ColumnSpec] = Field(
         default=[],
         max_length=12,
-        description="columns of other measured quantities. With rates and commands, the model predicts the "
-        "next body rates from them",
+        description="columns of other measured quantities that affect the body rates",
         examples=[["roll_rad", "pitch_rad"]],
     )
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
         max_length=20,
-        description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
-        "each multiplied by a weight. Can be left out as `commands` can",
+        description="mixer: the deflection of each healthy surface is a weighted sum of commands. Required "
+        "as `commands`",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
     labels: dict[str, ColumnSpec] = Field(
         default={},
-        description="columns with the true effectiveness of each surface, for test flights with known "
-        "faults. 1: the surface is healthy. `identify` and `diagnose --score` read these columns",
+        description="columns with the true effectiveness of each surface, for `identify` and `diagnose "
+        "--score`",
         examples=[{"left": "left_truth"}],
     )
     attitude: AttitudeColumns | None = Field(
@@ -185,15 +183,13 @@ class Vehicle(Section):
     )
     acceleration: ColumnSpec | None = Field(
         default=None,
-        description="column of the specific force along the z axis, whose median must be about 1 g. Its "
-        "sign does not matter",
+        description="column of the specific force along the z axis, about 1 g",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
     airspeed: ColumnSpec | None = Field(
         default=None,
-        description="column of the airspeed. With it, the diagnosis draws conclusions only in the range of "
-        "airspeeds that the fit used",
+        description="column of the airspeed, to draw conclusions only in the range of the fit",
         json_schema_extra={"unit": "m/s"},
         examples=["airspeed_m_s"],
     )
@@ -204,30 +200,27 @@ class Vehicle(Section):
     )
     flow: dict[str, ColumnSpec] = Field(
         default={},
-        description="columns of further inputs of the design model, for `diagnose --aircraft`. The keys are "
-        "`alpha_rad`, `beta_rad`, `qdyn_pa` and the signals in the aircraft file",
+        description="columns of `alpha_rad`, `beta_rad`, `qdyn_pa` and signals, for `diagnose --aircraft`",
         examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}],
     )
     full_deflection_rad: dict[str, Number] = Field(
         default={},
-        description="deflection of each surface at a command of 1. Only `diagnose --aircraft` uses it; left "
-        "out: 1",
+        description="deflection of each surface at a command of 1, for `diagnose --aircraft`; left out: 1",
         json_schema_extra={"unit": "rad", "range": "any"},
         examples=[{"left": 0.4}],
     )
     reference_airspeed_mps: Number | None = Field(
         default=None,
         gt=0,
-        description="airspeed V0 of the factor (airspeed / V0)^n on each command. The exponent n is in "
-        "`airspeed_powers`; left out: `identify` uses a factor, with a V0 of its own choice, only if this "
-        "improves the fit",
+        description="V0 of the factor (airspeed / V0)^n on each command; left out: `identify` chooses V0, "
+        "if a factor improves the fit",
         json_schema_extra={"unit": "m/s"},
         examples=[20.0],
     )
     airspeed_powers: dict[str, Number] = Field(
         default={},
-        description="exponent n of each surface, see `reference_airspeed_mps`. With `other_laws: true`, "
-        "`identify` estimates n; left out: 2",
+        description="exponent n of each surface. With `other_laws: true`, `identify` estimates n; left "
+        "out: 2",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
@@ -241,27 +234,25 @@ class Vehicle(Section):
         gt=0,
         le=MAX_ALARMS_PER_HOUR,
         unit="1/h",
-        says="accepted number of false alarms in each hour of healthy flight; left out: 1 for logs without "
-        "labels. For logs with labels no rate is set",
+        says="accepted false alarms in each hour of healthy flight; left out: 1 for logs without labels",
         examples=[2],
     )
     faults: list[FaultKind] = Field(
         default=["loss"],
         min_length=1,
-        description="fault types that the diagnosis looks for. `loss`: loss of effectiveness. `stuck`: jam",
+        description="fault types to test",
         examples=[["loss", "stuck"]],
     )
     other_laws: bool | None = Field(
         default=None,
-        description="true: the diagnosed flights can have another control law. An alarm and a name then "
-        "require more evidence; left out: false for logs with labels, otherwise "
-        "true",
+        description="true: the diagnosed flights can have another law, so more evidence is required; left "
+        "out: false for logs with labels, otherwise true",
         examples=[True],
     )
     moving_air: bool | None = Field(
         default=None,
-        description="true: gusts can move the aircraft. The diagnosis then estimates the spectrum of "
-        "the noise from the flight; left out: false for logs with labels, otherwise true",
+        description="true: gusts can move the aircraft, so the spectrum of the noise is estimated; left "
+        "out: false for logs with labels, otherwise true",
         examples=[True],
     )
     max_rate_hz: Number | None = number(
@@ -269,8 +260,8 @@ class Vehicle(Section):
         gt=0,
         le=1000,
         unit="Hz",
-        says="largest sample rate. A log with a higher rate is averaged to this rate; left out: 100 with "
-        "`moving_air: true`, otherwise 20",
+        says="sample rate to which a faster log is averaged; left out: 100 with `moving_air: true`, "
+        "otherwise 20",
         examples=[50],
     )
 

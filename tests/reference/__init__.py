@@ -5,7 +5,7 @@ half of a scenario, and the readings and commands of a flight, and gives the col
 It depends on no name of the package but its public ones (flights.py), so the package may be rebuilt under it.
 
     declaration.py   what is declared: aircraft.yaml, scenario keys with their defaults
-    prediction.py    f, G, servos, means over a frame, tolerance r_s        detection.md, nomenclature.md
+    prediction.py    f, G, servos, means over a frame, tolerance r_s        detection.md, glossary.md
     bounds.py        eta_bar with all its parts, gyro errors, maps          detection.md, derived-aircraft.md
     detection.py     bank of filters, poles, thresholds, alarm              detection.md
     isolation.py     hypotheses, estimators, tests 1 to 4, decision         isolation.md, fault-types.md

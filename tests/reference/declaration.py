@@ -20,7 +20,7 @@ SUFFIXES = {
     "V": ("mps", 1.0), "qdyn": ("pa", 1.0), "altitude": ("m", 1.0),
     "engine_rpm": ("rpm", 1.0), "manifold_pressure": ("inhg", 1.0),
 }  # fmt: skip
-NOISE_LIMIT_SIGMA = 4.0  # table "constants" of nomenclature.md
+NOISE_LIMIT_SIGMA = 4.0  # table "constants" of glossary.md
 POSITION, LOSS = "position", "loss"
 
 

@@ -23,9 +23,8 @@ _TEXTS = Path(__file__).with_suffix(".yaml")
 
 _HEAD = """# Properties of the aircraft
 
-Which JSBSim properties does the Beaver have, and what does each of them mean? A scenario file contains no
-property names: its sections `faults`, `uncertainty` and `actuators` set the properties
-([scenarios](reference/scenarios.md)). In JSBSim alone, set a property by its name:
+Which JSBSim properties does the Beaver have, and what does each of them mean? A scenario contains none: its
+sections `faults`, `uncertainty` and `actuators` set them. In JSBSim alone, write
 `fdm["failures/elevator/effectiveness"] = 0.6`. *Example.* This program flies 1 s and prints the position of
 the elevator in rad:
 
@@ -37,26 +36,23 @@ sim.step(frames=100)
 print(sim["fcs/elevator-pos-rad"])
 ```
 
-The names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of the files of its
-actuators:
+Names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of its actuators:
 
-- `<s>` stands for aileron, elevator, rudder or flap, `<a>` for p, q or r, and `<c>` for CX, CY, CZ, Cl, Cm or
-  Cn.
+- `<s>` stands for aileron, elevator, rudder or flap, `<a>` for p, q or r, `<c>` for CX, CY, CZ, Cl, Cm or Cn.
 - A name ends with its unit: `rad_sec` is rad/s, `mps` is m/s, `lbs` is pound-force, `lbsft` is pound-force
-  times foot. A name without a unit is dimensionless.
+  times foot. Otherwise it is dimensionless.
 - The body axes are X forward, Y to the right and Z down. A force is its coefficient (CX, CY, CZ) times the
-  dynamic pressure times the wing area S. A moment is its coefficient (Cl, Cm, Cn), times the same product,
-  times the span b in roll and yaw, or the chord c in pitch.
+  dynamic pressure times the wing area S; a moment (Cl, Cm, Cn) also times the span b, or the chord c in pitch.
 - p, q, r: body rates. V: airspeed. rho: air density. Ix, Iy, Iz, Jxz:
   [moments of inertia](results/validation.md#data-sheet-of-the-beaver). n: engine speed, rpm. pz: manifold
   pressure, inHg. P: shaft power, kW. [TM88]: [source](../REFERENCES.md).
-- The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to
-  the stops. The demand is the input of the actuator."""
+- The *command* is the position that the law requires. The *demand* is the command, limited to the stops: the
+  input of the actuator."""
 _TILTED = "aero/coefficient/CY_betadot-tilted"
 _PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))
 _TERMS = """Each coefficient is the sum of its terms. A term is the product of its value [TM88], the
-quantities in the column "times", and its scale `uncertainty/<term>-scale`, which is 1 and can be
-set. Angles and positions are in rad. The position of a surface is `fcs/<s>-effective-rad`."""
+quantities in the column "times" in rad, with `fcs/<s>-effective-rad` of a surface, and its scale
+`uncertainty/<term>-scale`, which is 1 and can be set."""
 _NEXT = """## Next
 
 The [data sheet](results/validation.md#data-sheet-of-the-beaver) has mass, travel and trim of the Beaver.

@@ -1,4 +1,4 @@
-"""How pages are written: tables have captions, symbols are in the nomenclature, sentences have verbs, and a
+"""How pages are written: tables have captions, symbols are in the glossary, sentences have verbs, and a
 page ends with the next step. On pages of results, a command prints the numbers of prose.
 
 A page that is older than a rule may break it as often as `prose.yaml` says, and no more often.
@@ -18,7 +18,7 @@ from tools.docs.pages import ROOT, Finding, is_generated
 
 ALLOWED = Path(__file__).with_name("prose.yaml")
 VERBS = Path(__file__).with_name("verbs.txt")
-NOMENCLATURE = ROOT / "docs/reference/nomenclature.md"
+GLOSSARY = ROOT / "docs/reference/glossary.md"
 CAPTION, SYMBOL, VERB, NEXT, NUMBER = "caption", "symbol", "verb", "next", "number"
 RESULTS = "docs/results/"
 _HOME = ("README.md", "docs/README.md")  # they are the way to all pages
@@ -115,10 +115,10 @@ def _tables(text: str) -> Iterator[tuple[str, int, str]]:
 
 
 @cache
-def nomenclature() -> frozenset[str]:
-    """The symbols of the tables of the nomenclature, without index and accent."""
+def known_symbols() -> frozenset[str]:
+    """The symbols of the tables of the glossary, without index and accent."""
     found: set[str] = set()
-    for line in NOMENCLATURE.read_text(encoding="utf-8").splitlines():
+    for line in GLOSSARY.read_text(encoding="utf-8").splitlines():
         if line.startswith("|"):
             found.update(symbol for cell in line.split("|")[1:3] for symbol in symbols_of(cell))
     return frozenset(found)
@@ -147,12 +147,12 @@ def _letters(word: str) -> Iterator[str]:
 
 
 def _symbols(text: str) -> Iterator[tuple[str, int, str]]:
-    known = nomenclature()
+    known = known_symbols()
     for found in _MATHS.finditer(text):
         line = text.count("\n", 0, found.start()) + 1
         for symbol in dict.fromkeys(symbols_of(found[0])):
             if symbol not in known:
-                yield SYMBOL, line, f"${symbol}$ is not in docs/reference/nomenclature.md"
+                yield SYMBOL, line, f"${symbol}$ is not in docs/reference/glossary.md"
 
 
 @cache

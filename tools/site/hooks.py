@@ -26,7 +26,7 @@ _FRAME = f'<iframe class="replay" src="{REPLAY}" title="a flight, replayed" load
 _MARK = re.compile(r"^<!-- (?:printed|/printed|from ).*?-->$|<!--[=/].*?-->", re.MULTILINE)
 _LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./)+[^)#\s]+)(?:#[^)]*)?\)")  # out of its folder
 _SHOWN = (".cff", ".css", ".csv", ".js", ".json", ".md", ".py", ".toml", ".xml", ".yaml", ".yml")  # as text
-PYTHON_NAMES = "reference/python-names.md"  # from docstrings, with links to the source
+_NAMES = re.compile(r"^<!-- printed: \S+ -m tools\.docs table python-names -->\n.*?^<!-- /", re.M | re.S)
 SOURCES = "REFERENCES.md"  # a file of its own beside the README, here a page
 
 
@@ -81,17 +81,13 @@ def _copy_of(path: str) -> str:
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """Take out the marks of what is printed; link into the site what is linked out of docs/."""
-    markdown = _MARK.sub("", markdown)
+    markdown = _MARK.sub("", _NAMES.sub(_public_names, markdown))
     if page.file.src_uri == "README.md":
         markdown = _PICTURE.sub(_FRAME, markdown, count=1)
         page.meta.setdefault("hide", ["navigation", "toc"])
     if page.file.src_uri in _reference_pages():
         page.meta.setdefault("hide", ["toc"])  # their tables are wide
         page.meta.setdefault("search", {"boost": 0.5})  # who searches for a word wants what explains it
-    if page.file.src_uri == PYTHON_NAMES:
-        from tools.docs.reference import python_names
-
-        return python_names.directives()
     above = "../" * page.file.src_uri.count("/")
 
     def inward(link: re.Match[str]) -> str:
@@ -103,6 +99,13 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return f"[{link[1]}]({above}{_copy_of(path)})"
 
     return _LINK.sub(inward, markdown)
+
+
+def _public_names(printed: re.Match[str]) -> str:
+    """From docstrings, with links to the source, in place of the tables."""
+    from tools.docs.tables import python_names
+
+    return f"{python_names.directives()}\n\n<!-- /"
 
 
 @cache

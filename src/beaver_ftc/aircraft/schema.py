@@ -44,13 +44,11 @@ class OutputSection(Section):
     """One output of an autopilot that moves a surface or the engine.
 
     channel: number of the output, counted from 1
-    share: deflection at full output, divided by the travel to the stop. With a negative share, a larger
-    output moves the surface towards its lower stop
-    reversed: true: a longer pulse gives a smaller output. Together with a negative `share`, the direction is
-    the original one again
+    share: deflection at full output, divided by the travel. Negative: towards the lower stop
+    reversed: true: a longer pulse gives a smaller output
     pwm_us: shortest and longest pulse, us
-    trim_us: pulse at which the surface is at 0 deg or the throttle is closed; left out: the middle of
-    `pwm_us` for a surface, its lower end for a throttle, us
+    trim_us: pulse of 0 deg or closed throttle; left out: the middle of `pwm_us`, or its lower end for a
+    throttle, us
     """
 
     channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
@@ -72,8 +70,7 @@ class OutputSection(Section):
 
 
 class ChannelsSection(Section):
-    """The outputs of an autopilot, listed by the surface or engine that each output moves. A surface that is
-    not listed stays at trim.
+    """The outputs of an autopilot. A surface that is not listed stays at trim.
 
     surfaces: the outputs of each surface
     throttle: the output of the engine
@@ -133,18 +130,16 @@ Stops = Annotated[tuple[_Stop, _Stop], AfterValidator(_in_order)]
 
 
 class SurfaceSection(Section):
-    """One control surface: its properties in JSBSim, and its travel."""
+    """One control surface."""
 
-    command: Property = Field(
-        description="property that commands the deflection", examples=["fcs/elevator-cmd-rad"]
-    )
+    command: Property = Field(description="property of the command", examples=["fcs/elevator-cmd-rad"])
     position: Property = Field(
-        description="property of the actuator's output",
+        description="property of the position",
         json_schema_extra={"unit": "rad"},
         examples=["fcs/elevator-pos-rad"],
     )
     effective: Property = Field(
-        description="property of the deflection on which the aerodynamics depend",
+        description="property of the effective deflection",
         json_schema_extra={"unit": "rad"},
         examples=["fcs/elevator-effective-rad"],
     )
@@ -154,20 +149,18 @@ class SurfaceSection(Section):
 
 
 class SignalSection(Section):
-    """A measured dimensionless signal in addition to rates, alpha, beta, airspeed and dynamic pressure."""
+    """A further measured signal, dimensionless."""
 
-    property: Property = Field(description="property with the value of the signal", examples=["aero/dpt"])
+    property: Property = Field(description="property of the signal", examples=["aero/dpt"])
     sensed: Literal[True] = Field(
         default=True,
-        description="true: an instrument measures the signal. Only true is allowed, because the diagnosis "
-        "needs every signal",
+        description="whether an instrument measures the signal",
         examples=[True],
     )
 
 
 class MassSection(Section):
-    """Mass, and inertia about the centre of gravity in body axes. Jxz enters the inertia tensor with a minus
-    sign."""
+    """Mass, and inertia about the centre of gravity in body axes. Jxz enters the tensor with a minus sign."""
 
     mass_kg: Number | None = number(
         None, unit="kg", says="mass. `engine.thrust` requires it", ge=1e-6, le=1e7, examples=[2288.231]
@@ -198,7 +191,7 @@ class TermSection(Section):
     """One term of a coefficient. The term is `value` times powers of signals (`of`). With `surface`, it is
     also multiplied by the deflection of this surface.
 
-    name: name of the term. Each name is used once. `uncertainty.coefficients` of a scenario uses this name
+    name: name of the term, used once
     source: source of the value
     description: meaning of the term
     """
@@ -213,15 +206,14 @@ class TermSection(Section):
     )
     of: dict[str, Power] = Field(
         default_factory=dict,
-        description="exponent of each signal: `alpha` and `beta` in rad, ph = p b/(2 V), qh = q c/V, rh "
-        "= r b/(2 V) with span b, chord c and airspeed V, and the entries of `signals`. "
-        "`forces` also allow betadoth = betadot b/(2 V). In `moments`, "
-        "a term with a `surface` must not contain a rate",
+        description="exponents of `alpha`, `beta`, ph = p b/(2 V), qh = q c/V, rh = r b/(2 V), and of "
+        "`signals`; in `forces` also of betadoth = betadot b/(2 V). In `moments`, a term with a `surface` "
+        "contains no rate",
         examples=[{"alpha": 1}],
     )
     surface: Name | None = Field(
         default=None,
-        description="surface whose deflection multiplies the term",
+        description="surface that multiplies the term",
         examples=["elevator"],
     )
     source: Text = entry("", examples=["TM88"])
@@ -271,16 +263,14 @@ _Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "1"})]
 
 
 class TrimSection(Section):
-    """Quantities that trim changes besides the main surface of each axis: the power setting, and surfaces
-    that move together."""
+    """Quantities that trim changes besides the main surface of each axis."""
 
     throttle: Property = Field(
         description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="surfaces that move together in trim: here the rudder with the aileron, by 0.2 of "
-        "its deflection",
+        description="surfaces that move together in trim",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
@@ -289,8 +279,8 @@ class LimitSection(Section):
     """A property that must be within a range in trim.
 
     property: property of JSBSim
-    says: name of the property for messages
-    unit: unit of `range`, for messages
+    says: name in messages
+    unit: unit in messages
     range: lowest and highest value
     """
 
@@ -303,7 +293,7 @@ class LimitSection(Section):
 class SettingSection(LimitSection):
     """An engine setting that a scenario can have.
 
-    default: value if the scenario has none
+    default: default of the scenario
     """
 
     default: Number = number(..., "the unit in `unit`", range="in `range`", examples=[100])
@@ -335,10 +325,9 @@ class ThrustSection(Section):
     that trim moves.
 
     airspeed_mps: true airspeeds, m/s
-    setting: values of the property that `trim.throttle` names
-    force_n: table of the force: one row for each airspeed, one column for each setting. In a row, the force
-    must not decrease, N
-    lag_s: time constant of the thrust: the time until 63 % of a change is reached, s
+    setting: values of `trim.throttle`
+    force_n: force, a row for each airspeed, a column for each setting, N
+    lag_s: time constant of the thrust, s
     """
 
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
@@ -362,14 +351,12 @@ class ThrustSection(Section):
 
 
 class EngineSection(Section):
-    """Settings of the engine, and limits for trim. The name of a setting is its key in the section `initial`
-    of a scenario.
+    """Settings of the engine, which are keys of `initial` of a scenario, and limits for trim.
 
-    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start
-    them. `off`: they do not run
-    settings: settings that a scenario can have
-    limits: properties that must be within a range in trim
-    thrust: force at each value of the power setting; left out: the airspeed is held with `forces` alone
+    start: how the engines start. `steady`: they run. `run_up`: starters start them
+    settings: settings
+    limits: limits in trim
+    thrust: force at each power setting; left out: `forces` alone hold the airspeed
     """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
@@ -381,7 +368,7 @@ class EngineSection(Section):
 class EffectorSection(Section):
     """An engine with a lever of its own, which the law moves.
 
-    throttle: property that moves the lever of this engine alone. Its value is added to the common lever
+    throttle: property of the lever of this engine, which is added to the common lever
     share: share of the thrust of all engines, `engine.thrust`
     """
 
@@ -394,7 +381,7 @@ class EffectorSection(Section):
 
 
 class ModelErrorSection(Section):
-    """Largest error of each angular acceleration, in addition to `fdi.bounds`. `derive` measures it."""
+    """Largest error of each angular acceleration, besides `fdi.bounds`."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
@@ -423,11 +410,11 @@ class ErrorBox(Section):
     r_rad_s: yaw rate, rad/s
     density_kg_m3: air density, kg/m3
     signals: a range for each declared signal
-    error_p_rad_s2: largest error of the roll acceleration, rad/s2
-    error_q_rad_s2: largest error of the pitch acceleration, rad/s2
-    error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: largest magnitude of Cn, the yawing moment coefficient, that the running engines
-    cause when all levers are equal. The moment of their thrust is not included; left out: unknown
+    error_p_rad_s2: largest error in roll, rad/s2
+    error_q_rad_s2: largest error in pitch, rad/s2
+    error_r_rad_s2: largest error in yaw, rad/s2
+    engines_apart: largest yawing moment coefficient Cn of the running engines at equal levers, without that
+    of the thrust; left out: unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -461,21 +448,19 @@ class ErrorMapSection(Section):
     travel_share: Shares = number(
         ...,
         "share of 1",
-        "parts of the travel of the surfaces, rising. For each part, the error is "
-        "measured with deflections in this part",
+        "parts of the travel of the surfaces, rising, for each of which the error is measured",
         examples=[[1]],
     )
     stand_ins: Number = number(
         1.0,
         unit="share of 1",
-        says="factor for stand-ins, the surfaces that only replace other surfaces. For them, each part in "
-        "`travel_share` except the last is multiplied by this factor",
+        says="factor on all but the last part, for stand-ins",
         gt=0,
         le=1,
     )
     until_s: Ages = entry(
         ...,
-        "times since the start of the flight, rising, because fuel burns and the inertia changes, s",
+        "times since the start of the flight, rising, as fuel burns, s",
         examples=[[600]],
     )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
@@ -519,13 +504,13 @@ class GroundSection(Section):
     height_m: Number = number(
         ...,
         unit="m",
-        says="height of the centre of gravity above the ground when the aircraft stands",
+        says="height of the standing centre of gravity",
         gt=0,
         le=100,
         examples=[1.5],
     )
     pitch_deg: Number = number(
-        ..., unit="deg", says="pitch angle when the aircraft stands", ge=-45, le=45, examples=[11]
+        ..., unit="deg", says="pitch angle of the standing aircraft", ge=-45, le=45, examples=[11]
     )
 
 
@@ -543,16 +528,15 @@ class DamageSection(Section):
 class AircraftFile(Section):
     """Name, JSBSim model and sections of one aircraft.
 
-    jsbsim: file name of the JSBSim model, in the same folder
-    groups: groups of surfaces that can replace each other. A surface is replaced by the next surface of its
-    group
+    jsbsim: JSBSim model in the same folder
+    groups: groups of surfaces that replace each other, each by the next
     model_error_rad_s2: largest error of the design model. It is added to the bound in `fdi.bounds`
     model_error_map: largest error of the design model for each range of states, instead of one value
     channels: outputs of an autopilot, and the surfaces that they move
     ground: the aircraft on the ground; left out: no flight begins on the ground
     damage: cases of damage that a scenario can have, by name
     name: name of the aircraft
-    description: description of the aircraft in one line
+    description: description in one line
     surfaces: two or more control surfaces, by name
     signals: measured dimensionless signals that multiply terms
     mass: mass and inertia

@@ -300,9 +300,7 @@ def _span(seconds: float) -> str:
 
 
 ScenariosArgument = Annotated[list[str], SCENARIO]
-ResultsOption = Annotated[
-    Path, typer.Option(help="Folder in which each scenario has a result folder of its own.")
-]
+ResultsOption = Annotated[Path, typer.Option(help="Folder for the results.")]
 NoReportOption = Annotated[
     bool, typer.Option("--no-report", help="Do not write report.html and the figures.")
 ]
@@ -315,8 +313,7 @@ PluginOption = Annotated[
     typer.Option(
         "--plugin",
         metavar="[NAME=]MODULE:CLASS",
-        help="Register your own detector or law as NAME for this command. "
-        "Without NAME, class MyClass is registered as my-class.",
+        help="Register your own detector or law as NAME for this command. Without NAME: MyClass as my-class.",
     ),
 ]
 

@@ -67,21 +67,18 @@ def command(options: Options) -> None:
     sweep: Compare on the flights of this sweep.
     benchmark: Compare on the benchmark's standard sets of flights, and update the ranking.
     tune: Choose parameters of schemes and laws on the calibration flights.
-    grade: With --tune: use only flights of this grade: exact, actuators (they lag) or errors (of
-    sensors or air). Default: all.
+    grade: With --tune: use only flights of this grade: exact, actuators or errors. Default: all.
     trials: With --tune: number of trials of each search.
-    restarts: With --tune: largest number of further searches for each method and grade.
+    restarts: With --tune: largest number of further searches.
     seed: With --tune: seed of the search.
-    draw: With --tune: number of the set of calibration flights. Another set than 0 also compares tuned
-    and default parameters.
+    draw: With --tune: number of the set of calibration flights.
     tuned: With --sweep or --benchmark: read the parameters from this file.
     schemes: Names of schemes, separated by commas. Default: all registered schemes and laws.
     laws: Names of laws, separated by commas. Default: all registered schemes and laws.
     only: With --benchmark: fly only this set of flights.
     flights: N: at most N flights of each sweep. FOLDER: compare detectors on its recorded flights.
-    other_days: With --flights FOLDER: diagnose changed copies of the labelled flights, as of other
-    days.
-    out: Folder for the comparison.
+    other_days: With --flights FOLDER: diagnose changed copies of the labelled flights.
+    out: Folder for the results.
     leaderboard: With --benchmark or --flights FOLDER: path of the page with the ranking.
     """
     most, folder = _most_or_folder(options.flights)

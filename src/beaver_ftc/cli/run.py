@@ -73,12 +73,11 @@ def command(options: Options) -> None:
       beaver-ftc run elevator-partial-loss --format json --no-report
 
     csv: Also write the log as log.csv.
-    acmi: Also write the flight path as flight.acmi, for the program Tacview.
-    recording: Also write the log in this format of an on-board recorder, and the vehicle file vehicle.yaml.
-    flightgear: Show the flight in real time in the FlightGear program at this address.
+    acmi: Also write the flight path as flight.acmi, for Tacview.
+    recording: Also write the log of an on-board recorder in this format, and vehicle.yaml.
+    flightgear: Show the flight in real time in FlightGear at this address.
     certificate: Also write certificate.json, the proof of the alarm and of the exclusions.
-    figures: Formats of the figures, separated by commas: png, pdf, svg. Figures in pdf and svg are sized for
-    a paper.
+    figures: Formats of the figures, separated by commas: png, pdf, svg.
     """
     formats = _formats(options.figures)
     from beaver_ftc.results.model import Judged

@@ -68,17 +68,16 @@ def command(arguments: Arguments) -> None:
       beaver-ftc sweep elevator-effectiveness --search delay
 
     file: A sweep file, or the name of a built-in sweep.
-    out: Folder in which each sweep has a result folder of its own.
+    out: Folder for the results.
     workers: Number of parallel processes or Ray tasks. Default: one for each core.
     backend: Where the flights run: local processes, or a Ray cluster.
     ray_address: Address of the Ray cluster, e.g. auto. Default: a cluster on this machine.
     resume: Continue an interrupted sweep from its finished flights.
     keep_logs: Which flights keep a result folder: none, failed, missed, worst, all, or indices such as 3,17.
-    replay: Fly only the flight with this index again, and write its result folder as `run` does.
+    replay: Fly only this flight again, and write its result folder as `run` does.
     search: Search for the flight with the worst value of this objective.
-    certificate: Write a certificate into each kept result folder. Without --keep-logs, the worst flights are
-    kept.
-    rare: Estimate the probability that a flight misses this expectation, by subset simulation.
+    certificate: Write a certificate into each kept result folder. Default of --keep-logs then: worst.
+    rare: Estimate the probability that a flight misses this expectation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early

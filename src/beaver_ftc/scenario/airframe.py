@@ -161,15 +161,13 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 class Initial(Section):
     """The flight condition at the start: trimmed straight flight with wings level. Another aircraft has
-    the settings in `engine.settings` of its file, and the surfaces that its trim does not move."""
+    its own engine settings and surfaces."""
 
-    airspeed_mps: Number = number(
-        45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70
-    )
+    airspeed_mps: Number = number(45.0, "m/s", "true airspeed", ge=20, le=70)
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
         None,
-        "true: the aircraft stands on the ground, whose elevation is `altitude_m`. Only `sitl` accepts true",
+        "true: the aircraft stands on the ground at `altitude_m`. Only for `sitl`",
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -252,7 +250,7 @@ def initial_schema(schema: dict[str, Any]) -> None:
 
 
 class ActuatorDynamics(Section):
-    """First-order lag, rate limit and stops of one surface.
+    """one surface.
 
     bandwidth_rad_s: bandwidth of the first-order lag. 0: no lag, rad/s
     rate_limit_deg_s: largest rate of the surface. 0: no limit, deg/s
@@ -308,8 +306,8 @@ class OfSurfaces(Section, extra="allow"):
 
 
 class Actuators(OfSurfaces):
-    """A preset, or a key directly in this section, applies to all surfaces. A key in the section of a
-    surface replaces it for this surface. Another aircraft has the names of its own surfaces."""
+    """A preset, or a key directly in this section, applies to all surfaces. A key of one surface replaces
+    it."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
     of_one, presets = ActuatorDynamics, PRESETS
@@ -324,11 +322,11 @@ DeadBand = Annotated[Number, Field(ge=0, le=10)]
 
 
 class TrueActuator(Section):
-    """What the actuator of one surface has in the truth.
+    """one surface.
 
     bandwidth: bandwidth, divided by that in `actuators`, 1
     rate_limit: rate limit, divided by that in `actuators`, 1
-    dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
+    dead_band_deg: largest distance from the command at which the actuator does not move, deg
     """
 
     bandwidth: Number = number(1.0, "1", ge=0.1, le=10, examples=[0.8])
@@ -368,7 +366,7 @@ class Gust(Section):
     velocity_mps: tuple[Wind, Wind, Wind] = number(
         ...,
         "m/s",
-        "largest velocity of the gust: its components towards north, east and down",
+        "largest velocity, towards north, east and down",
         examples=[[0, 0, -3]],
     )
     rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
@@ -405,7 +403,7 @@ class Environment(Section):
 
     turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
         "none",
-        "`none`: no turbulence. `dryden`: turbulence of the Dryden model",
+        "turbulence of the Dryden model, or none",
         needs={"severity": "light"},
         examples=["dryden"],
     )
@@ -415,7 +413,7 @@ class Environment(Section):
     wind_mps: tuple[Wind, Wind, Wind] = number(
         (0.0, 0.0, 0.0),
         "m/s",
-        "steady wind: its components towards north, east and down",
+        "steady wind towards north, east and down",
         examples=[[5, 0, 0]],
     )
     gust: (
@@ -427,7 +425,7 @@ class Environment(Section):
         | None
     ) = entry(
         None,
-        "one gust, or a list of gusts that do not overlap. Its velocity rises, stays constant, and falls",
+        "one gust, or a list of gusts that do not overlap",
         examples=[[{"at_s": 10, "velocity_mps": [0, 0, -3]}]],
     )
 

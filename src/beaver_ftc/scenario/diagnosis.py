@@ -140,11 +140,11 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
 class ActuatorBound(Section, strict=True):
-    """Largest errors of the actuator of one surface.
+    """one surface.
 
     bandwidth: of the bandwidth, relative
     rate_limit: of the rate limit, relative
-    dead_band_deg: largest distance from the commanded position at which the actuator does not move, deg
+    dead_band_deg: largest distance from the command at which the actuator does not move, deg
     """
 
     bandwidth: Share = number(0.0, "share of 1", examples=[0.2])
@@ -171,21 +171,16 @@ class ActuatorBounds(OfSurfaces):
 
 
 class Bounds(Section, strict=True):
-    """Declared uncertainty. The thresholds follow from this uncertainty [Zhang2005, sec. VII].
+    """Declared errors, from which the thresholds follow.
 
-    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is that
-    of [Zhang2005]
-    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is that
-    of [Zhang2005], rad/s2
-    coefficients: largest relative error of the moment coefficients: of all terms, or of each by name
+    inertia_coupling: largest relative error of the inertia coupling
+    constant_rad_s2: largest other error of the angular acceleration, rad/s2
+    coefficients: largest relative error of the moment coefficients: of all, or of each by name
     inertia: largest relative error of Ix, Iy, Iz and Jxz
-    sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
-    actuators: largest errors of the actuators: the position of a surface is between those of the slowest and
-    the fastest actuator
-    deflection_deg: largest further difference between the position of a surface and the model of its
-    actuator, deg
-    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, because
-    airspeed and flow angles contain its translation
+    sensors: largest measurement errors: noise, bias, resolution and slope error
+    actuators: largest errors of the actuators
+    deflection_deg: largest further error of the position of a surface, deg
+    turbulence: strongest turbulence (Dryden model)
     vertical_wind_mps: strongest steady vertical wind, up or down, for the sensor monitor, m/s
     """
 
@@ -212,10 +207,9 @@ class Statistical(Section, strict=True):
     """Likelihood ratio tests in addition to the worst-case thresholds. Their alarm levels follow from the
     keys of this section.
 
-    false_alarms_per_h: largest accepted number of false alarms in each flight hour, under the declared noise
-    misnaming: probability that noise excludes the true fault within one second
-    uncertainty_rad_s: highest angular frequency of the model error. The default is the frequency in the
-    published study, rad/s
+    false_alarms_per_h: accepted number of false alarms in each flight hour
+    misnaming: probability that noise excludes the true fault in one second
+    uncertainty_rad_s: highest angular frequency of the model error, rad/s
     """
 
     false_alarms_per_h: float = number(1e-3, "1/h", gt=0, le=3600)
@@ -233,8 +227,8 @@ class Probing(Section):
     """
 
     amplitude_deg: float = entry(3.0, "largest flap deflection, downwards, deg", gt=0, le=10)
-    frequency_hz: float = entry(0.5, "number of movements of the flap in each second, Hz", gt=0, le=5)
-    duration_s: float = entry(4.0, "longest duration of the probing, s", gt=0, le=60)
+    frequency_hz: float = entry(0.5, "frequency of its movements, Hz", gt=0, le=5)
+    duration_s: float = entry(4.0, "longest duration, s", gt=0, le=60)
 
 
 class Sharpen(Section, strict=True):
@@ -243,17 +237,13 @@ class Sharpen(Section, strict=True):
 
     pole_bank: bool = entry(
         True,
-        "several detection filters with different poles (`fdi.pole_bank_per_s`). Each filter can raise the "
-        "alarm",
+        "several detection filters (`fdi.pole_bank_per_s`), each of which can raise the alarm",
     )
     memory: bool = entry(True, "each fault must explain the whole flight, not only the time after the alarm")
-    shared_effectiveness: bool = entry(
-        True, "each surface has one parameter for all axes, not one parameter for each axis"
-    )
+    shared_effectiveness: bool = entry(True, "each surface has one parameter for all axes")
     set_membership: bool = entry(
         True,
-        "only with `fault_profile: abrupt`: a value of the parameter is excluded as soon as one frame "
-        "contradicts it",
+        "with `fault_profile: abrupt`: one frame can exclude a value of the parameter",
     )
 
     @model_validator(mode="before")
@@ -271,37 +261,30 @@ class Sharpen(Section, strict=True):
 
 
 class FdiConfig(Section, strict=True):
-    """The diagnosis: scheme, fault class, declared bounds and poles.
+    """The diagnosis.
 
-    scheme: name of the diagnosis scheme. `beaver-ftc list schemes` prints all names. `none`: no diagnosis
+    scheme: diagnosis scheme, a name that `beaver-ftc list schemes` prints
     options: parameters of the scheme, by name
     fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
-    elevator or rudder; sensors are assumed to be sound (A11). `all`: all fault types on all surfaces, and
-    faults of sensors
-    pairs: true: also look for simultaneous faults of two surfaces (Beaver: elevator with flap, aileron
-    with rudder). This requires `fault_class: all`
-    sensor_monitor: whether instruments are compared with each other. `never`: they are assumed to be
-    sound. Left out: `always` with `fault_class: all`, `never` with `published`. `auto` is a former
-    value: as left out
-    slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface in the fault class `all`,
+    elevator or rudder; sensors are assumed to be sound. `all`: all fault types on all surfaces, and faults
+    of sensors
+    pairs: true: also look for simultaneous faults of two surfaces (elevator with flap, aileron with rudder),
+    with `fault_class: all`
+    sensor_monitor: whether instruments are compared with each other. Left out, or `auto`: `always` with
+    `fault_class: all`, otherwise `never`
+    slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface,
     rad/s
-    slowest_rate_deg_s: lowest rate limit of a slow surface in the fault class `all`. A slower surface counts
-    as jammed, deg/s
-    probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
-    statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
-    left out: off
-    authority: detector that can raise the alarm and exclude candidates, with `statistical`
-    thresholds: isolation tests. `interval`: the residual must stay between two bounds. `published`: its
-    magnitude must stay below one bound, as in the published study
-    detection_pole_per_s: pole of the first detection filter. The published study has only this filter, 1/s
+    slowest_rate_deg_s: lowest rate limit of a slow surface. A slower one counts as jammed, deg/s
+    probing: active diagnosis, for `fault_class: all`. `{}`: on; left out: off
+    statistical: statistical detector besides the worst-case detector. `{}`: on; left out: off
+    authority: detector that can raise the alarm and exclude, with `statistical`
+    thresholds: isolation tests: the residual must stay in an interval, or its magnitude below one bound
+    detection_pole_per_s: pole of the first detection filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
-    forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
-    period of the reference, s
-    sharpen: steps beyond the published scheme: all, none, or single ones
-    pole_bank_per_s: poles of the detection filters after the first. With the default, the filter uses
-    only the last frame, 1/s
-    fault_profile: assumption about the parameter of a fault, for example its size. `any`: it can change
-    with time. `abrupt`: it is constant from the start of the fault
+    forgetting_time_s: time constant of the estimates, longer than one period of the reference, s
+    sharpen: steps beyond the published scheme
+    pole_bank_per_s: poles of the detection filters after the first, 1/s
+    fault_profile: assumption about the size of a fault. `any`: it can change. `abrupt`: it is constant
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -422,19 +405,17 @@ class EnginePower(Section, strict=True):
     `fault-tolerant` with `fault_class: all`, or the law `oracle`.
 
     enabled: false: the engine keeps its trim setting
-    speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This
-    feedback damps the phugoid, inHg per m/s
-    attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the pitch attitude is too
-    high. More power lowers the nose, inHg per deg
-    washout_s: time constant of the mean airspeed. It should be about one period of the phugoid, s
-    attitude_memory_s: time constant with which an earlier error of the pitch rate is forgotten, s
-    smoothing_s: time constant of a first-order lag. The lag smooths noise and gusts in the measured airspeed,
+    speed_gain_inhg_per_mps: less manifold pressure for each m/s above the mean airspeed, inHg per m/s
+    attitude_gain_inhg_per_deg: more manifold pressure for each deg that the nose is too high, inHg per deg
+    washout_s: time constant of the mean airspeed, about one period of the phugoid, s
+    attitude_memory_s: time constant of the memory of the pitch rate error, s
+    smoothing_s: time constant of the lag on the measured airspeed,
     s
     lowest_inhg: manifold pressure with the throttle closed, inHg
-    highest_inhg: highest manifold pressure. The default is the take-off rating of the engine R-985, inHg
+    highest_inhg: highest manifold pressure, inHg
     rate_inhg_s: fastest change of the manifold pressure, inHg/s
-    patience_s: time for which both surfaces must be lost before engine power controls pitch, s
-    release_s: time for which a surface must act again until the engine returns to its trim setting, s
+    patience_s: time for which both surfaces must be lost before, s
+    release_s: time for which a surface must act again after, s
     """
 
     enabled: bool = True
@@ -457,33 +438,28 @@ class EnginePower(Section, strict=True):
 
 
 class ControlConfig(Section, strict=True):
-    """The control law and its gains. The published study states no gains, so this project chose the default
-    values.
+    """The control law and its gains, which the published study does not state.
 
-    law: name of the control law. `beaver-ftc list laws` prints all names
+    law: control law, a name that `beaver-ftc list laws` prints
     options: parameters of the law, by name
-    gain_margin_db: smallest gain margin of every loop of the default law, both for larger and for smaller
-    gains, dB
-    phase_margin_deg: smallest phase margin of every loop of the default law, deg
-    noise_share: limit for the surface rate that gyro noise causes with the default law: its standard
-    deviation, divided by the rate limit of the surface
+    gain_margin_db: smallest gain margin of each loop of the default law, dB
+    phase_margin_deg: smallest phase margin of each loop of the default law, deg
+    noise_share: largest standard deviation of the surface rate by gyro noise, divided by the rate limit of
+    the surface
     proportional_per_s: proportional gain Kp of the tracking error, 1/s
-    integral_per_s2: integral gain Ki of the tracking error. With Ki = Kp^2/4 the error has two equal poles at
-    Kp/2, 1/s2
-    reference_natural_frequency_rad_s: natural frequency of the reference model. It should be higher than the
-    bandwidth of the control loop, rad/s
-    reference_damping: damping ratio of the reference model. A ratio of 1 or more gives no overshoot
+    integral_per_s2: integral gain Ki of the tracking error, 1/s2
+    reference_natural_frequency_rad_s: natural frequency of the reference model, higher than the bandwidth of
+    the control loop, rad/s
+    reference_damping: damping ratio of the reference model
     network_gain_per_s2: learning gain of the network of the laws `adaptive` and `fault-tolerant-published`,
     1/s2
-    network_leak_per_s: rate at which the network forgets after the isolation. The isolated fault then
-    explains the error, 1/s
+    network_leak_per_s: rate at which the network forgets after the isolation, 1/s
     network_weight_limit_rad_s2: largest magnitude of each weight of the network, rad/s2
-    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses. It prevents jumps of the
-    command, 1/s
+    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses, 1/s
     least_effectiveness: smallest effectiveness with which the law still uses a surface
     hand_over_s: duration of the reallocation from a failed surface to its stand-in, s
-    power: control of pitch by engine power, if elevator and flap are both lost. It requires the law
-    `fault-tolerant` with `fault_class: all`, or the law `oracle`
+    power: control of pitch by engine power, if elevator and flap are both lost: law `fault-tolerant` with
+    `fault_class: all`, or `oracle`
     """
 
     law: Law = entry("fault-tolerant", examples=["nominal"])

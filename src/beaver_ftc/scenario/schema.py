@@ -192,19 +192,13 @@ class InertiaCoupling(Section):
     that comes from products of two body rates. In the published study [Zhang2005] these errors are at most
     0.25."""
 
-    p: Number = number(
-        0.0, "share of 1", "error in roll, of the coefficient of q r", ge=-1, le=1, examples=[0.2]
-    )
-    q: Number = number(
-        0.0, "share of 1", "error in pitch, of the coefficient of p r", ge=-1, le=1, examples=[0.2]
-    )
-    r: Number = number(
-        0.0, "share of 1", "error in yaw, of the coefficient of p q", ge=-1, le=1, examples=[0.2]
-    )
+    p: Number = number(0.0, "share of 1", "coefficient of q r", ge=-1, le=1, examples=[0.2])
+    q: Number = number(0.0, "share of 1", "coefficient of p r", ge=-1, le=1, examples=[0.2])
+    r: Number = number(0.0, "share of 1", "coefficient of p q", ge=-1, le=1, examples=[0.2])
 
 
 class Sinusoid(Section):
-    """An error of one angular acceleration: amplitude times sin(frequency t). t is the time of the flight."""
+    """amplitude times sin(frequency t), t: time of the flight."""
 
     amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
@@ -232,15 +226,14 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 class Uncertainty(Section):
     """Differences between the truth and the design model.
 
-    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates. In
-    [Zhang2005] they are at most 0.25
+    inertia_coupling: relative errors of the inertia coupling, the acceleration from products of two rates
 
-    sinusoid: for each axis, an error of the angular acceleration: amplitude times sin(frequency t)
-    coefficients: factors on aerodynamic terms of the truth, by name of the term. 1: no error
+    sinusoid: a sinusoidal error of each angular acceleration
+    coefficients: factors on aerodynamic terms of the truth, by name
     mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
     inertia: inertia of the truth, divided by the inertia in the aircraft file
 
-    cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
+    cg_m: shift of the true centre of gravity: forward, right, down, m
     actuators: actuators of the truth, compared with `actuators`
     """
 
@@ -268,14 +261,12 @@ class InertiaScale(Section):
 class DesignModel(Section):
     """Deliberate errors of the design model. The truth does not change.
 
-    engine_terms: false: the design model has no slipstream terms (`dpt`) in Cl, Cm and Cn, as in the
-    published study
-    linearised: true: the design model is linearised about the trim at the start
-    frozen_alpha: true: the design model uses the trim value of alpha at all times
-    mass: mass of the design model, divided by the mass in the aircraft file. The inertia is multiplied by the
-    same factor, 1
+    engine_terms: false: no slipstream terms (`dpt`) in Cl, Cm and Cn, as in the published study
+    linearised: true: linearised about the trim at the start
+    frozen_alpha: true: alpha has its trim value
+    mass: mass, divided by that in the aircraft file; the inertia is scaled too, 1
     inertia: inertia of the design model
-    coefficients: factors on aerodynamic terms of the design model, by name of the term. 1: no error
+    coefficients: factors on aerodynamic terms, by name
     actuators: actuators for the diagnosis and the laws. Left out: as `actuators`
     sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`
     """
@@ -296,7 +287,7 @@ class Change(Section):
     at_s: Number = number(..., "s", "time of the change", gt=0, le=360_000, examples=[20])
     law: Law | None = entry(
         None,
-        "new law, as in `control.law`. Commands and reference continue without a jump",
+        "new law, as in `control.law`",
         examples=["nominal"],
     )
     scheme: Scheme | None = entry(
@@ -304,11 +295,11 @@ class Change(Section):
     )
     sensors: Sensors | None = entry(
         None,
-        "new sensor errors, as in `sensors`. If sensor errors are declared, the diagnosis restarts",
+        "new sensor errors. If sensor errors are declared, the diagnosis restarts",
         examples=["tactical-grade"],
     )
     declared_sensors: BoundedSensors | None = entry(
-        None, "new declared sensor errors, as in `fdi.bounds.sensors`. The diagnosis restarts"
+        None, "new declared sensor errors. The diagnosis restarts"
     )
 
     @model_validator(mode="after")
@@ -334,9 +325,7 @@ class Arrival(Section):
     altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
     airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
     heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180, examples=[5])
-    in_envelope: Flag | None = entry(
-        None, "true: the flight must end inside the validated envelope. false: it must end outside"
-    )
+    in_envelope: Flag | None = entry(None, "whether the flight must end inside the validated envelope")
 
 
 def _one_or_list(given: Any) -> str:
@@ -349,29 +338,24 @@ Names = Annotated[tuple[Nameable, ...], Field(max_length=MOST_NAMES)]
 class Expect(Section):
     """Conditions that the flight must meet. A condition that is left out is not checked.
 
-    detected_within_s: largest allowed time from the fault to the first alarm, s
+    detected_within_s: largest time from the fault to the first alarm, s
     isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    `unanticipated`. A list has exactly one name for each fault, in their order. A name that was
-    withdrawn later counts, a name that was given before its fault does not
+    `unanticipated`. A list has one name for each fault, in their order
     isolated_type: fault type that the diagnosis must name
-    candidate_type: fault type that must be named, or at least must not be excluded
-    isolated_within_s: largest allowed time from the fault to its name, s
-    no_false_alarm: true: no alarm before the first fault. false: an alarm before the first fault is required
-    no_departure: true: the aircraft must not be lost. false: the aircraft must be lost
-    pre_fault_rms_deg_s: largest allowed RMS tracking error before the fault. Without a fault it is computed
-    over the whole flight
-    post_fault_rms_deg_s: largest allowed RMS tracking error after the fault
-    altitude_within_m: largest allowed deviation from the commanded altitude, m
-    airspeed_within_mps: largest allowed deviation from the commanded airspeed, after a first-order lag
-    of 10 s, m/s
-    airspeed_within_limits_mps: as `airspeed_within_mps`, with the commanded airspeed limited to those
-    that the aircraft can hold after the fault, m/s
-    heading_within_deg: largest allowed deviation from the commanded heading. After each change of the
-    command, 30 s do not count, deg
-    stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave
-    this envelope
-    arrives: largest allowed deviations from the commanded flight path at the end of the flight, after a
-    first-order lag of 10 s. A lost aircraft does not meet this condition
+    candidate_type: fault type that must be named or stay possible
+    isolated_within_s: largest time from the fault to its name, s
+    no_false_alarm: whether no alarm may come before the first fault
+    no_departure: whether the aircraft must survive
+    pre_fault_rms_deg_s: largest RMS tracking error before the fault, without a fault of the whole flight
+    post_fault_rms_deg_s: largest RMS tracking error after the fault
+    altitude_within_m: largest deviation from the commanded altitude, m
+    airspeed_within_mps: largest deviation from the commanded airspeed, after a lag of 10 s, m/s
+    airspeed_within_limits_mps: as `airspeed_within_mps`, with a command that the aircraft can hold after the
+    fault, m/s
+    heading_within_deg: largest deviation from the commanded heading, without 30 s after each change, deg
+    stays_in_envelope: whether the flight must stay inside the validated envelope
+    arrives: largest deviations from the flight path at the end, after a lag of 10 s. A lost aircraft does
+    not arrive
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
@@ -401,8 +385,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
 
     name: name of the result folder: letters, digits, - and _
     description: purpose of the flight
-    aircraft: built-in name, jsbsim:NAME of the JSBSim package, or ./FOLDER for an aircraft folder
-    beside this file
+    aircraft: built-in name, jsbsim:NAME, or ./FOLDER beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
     substeps: number of JSBSim steps in each frame

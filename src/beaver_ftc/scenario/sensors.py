@@ -39,11 +39,11 @@ _FINEST_RESOLUTION = 1e-18  # SI; a reading divided by the smallest number that 
 class _Sensor(Section):
     """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one.
 
-    scale_error: relative error of the slope: a reading is multiplied by 1 + scale_error. In declared errors
-    (`fdi.bounds.sensors`, `declared_sensors`) it must be below 1, share of 1
+    scale_error: relative error of the slope: a reading is multiplied by 1 + scale_error. If declared: below
+    1, share of 1
     delay_s: delay of the measurement, s
     bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
-    dropout_share: share of lost samples. A lost sample is replaced by the sample before it, share of 1
+    dropout_share: share of lost samples, each replaced by the one before, share of 1
     """
 
     # Keys of noise, bias and resolution, their unit, and that unit in SI.
@@ -132,7 +132,7 @@ class AttitudeAngle(FlowVane):
     drift_deg_h: Number = number(
         0.0,
         "deg/h",
-        "growth of the error in each hour from the start of the flight",
+        "growth of the error",
         ge=-3600,
         le=3600,
         examples=[10],
@@ -337,9 +337,7 @@ class SensorFault(Section):
     end_s: Number | None = number(
         None, "s", "end of the fault; left out: the fault stays to the end of the flight", gt=0, examples=[20]
     )
-    profile: Literal["abrupt"] = entry(
-        "abrupt", "time course of the fault. This fault type is always abrupt", examples=["abrupt"]
-    )
+    profile: Literal["abrupt"] = entry("abrupt", "time course: always abrupt", examples=["abrupt"])
 
     @model_validator(mode="before")
     @classmethod
@@ -364,7 +362,7 @@ class SensorBias(SensorFault):
     magnitude: Number = number(
         ...,
         "the sensor's unit",
-        "constant error that is added to the reading",
+        "constant error",
         ge=-5000,
         le=5000,
         examples=[2],
@@ -374,7 +372,7 @@ class SensorBias(SensorFault):
 class SensorNoise(SensorFault):
     """The reading has additional noise.
 
-    magnitude: standard deviation of the added noise, the sensor's unit
+    magnitude: its standard deviation, the sensor's unit
     """
 
     type: Literal["noise"]

@@ -150,7 +150,7 @@ class Doublet(Section):
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
-    width_s: Number = number(1.0, "s", "length of each of the two pulses", gt=0, le=_LATEST_S)
+    width_s: Number = number(1.0, "s", "length of each pulse", gt=0, le=_LATEST_S)
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         tau_s = t_s - self.start_s
@@ -171,7 +171,7 @@ class Step(_Window):
 
 
 class Square(_Wave):
-    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. The
+    """A square wave: +amplitude in the first half of each period, then -amplitude. The
     wave always has the same sign as a `sine` with the same amplitude, frequency and phase."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
@@ -205,7 +205,7 @@ class Ramp(_Closed):
 
 
 class Chirp(_Closed):
-    """A sine whose frequency changes linearly from start_frequency_hz to end_frequency_hz."""
+    """A sine with linearly changing frequency."""
 
     amplitude_deg_s: Number = _amplitude()
     start_frequency_hz: Number = _frequency("frequency at start_s")
@@ -227,10 +227,10 @@ class Csv(Section):
     The table is read when the scenario is loaded. The loaded scenario then contains the values of the table
     as `time_s` and `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
 
-    file: CSV file in the scenario's own folder or below it
-    column: name of the column with the rates in deg/s
-    time_s: times of the rows. Usually they are read from the file, s
-    values_deg_s: rates of the rows. Usually they are read from the file, deg/s
+    file: CSV file in the scenario's folder or below
+    column: column with the rates in deg/s
+    time_s: times of the rows, usually read from the file, s
+    values_deg_s: rates of the rows, usually read from the file, deg/s
     """
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
@@ -337,20 +337,14 @@ class Signal(Section):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    sine: Sine | None = entry(
-        None, "amplitude sin(2 pi frequency tau + phase). tau is the time since start_s"
-    )
+    sine: Sine | None = entry(None, "amplitude sin(2 pi frequency tau + phase), tau: time since start_s")
     doublet: Doublet | None = entry(None, "+amplitude for width_s, then -amplitude for width_s")
     step: Step | None = entry(None, "amplitude from start_s to end_s")
-    square: Square | None = entry(
-        None, "+amplitude in the first half of each period, -amplitude in the second half"
-    )
-    ramp: Ramp | None = entry(None, "straight line from 0 at start_s to amplitude at end_s, then constant")
-    chirp: Chirp | None = entry(
-        None, "sine whose frequency changes linearly from start_frequency_hz to end_frequency_hz"
-    )
+    square: Square | None = entry(None, "+amplitude in the first half of each period, then -amplitude")
+    ramp: Ramp | None = entry(None, "line from 0 at start_s to amplitude at end_s, then constant")
+    chirp: Chirp | None = entry(None, "sine with linearly changing frequency")
     csv: Csv | None = entry(
-        None, "table in a CSV file, interpolated linearly, constant before its first and after its last row"
+        None, "table in a CSV file, interpolated, constant before its first and after its last row"
     )
 
     @model_validator(mode="after")
@@ -371,17 +365,16 @@ Signals = tuple[Signal, ...]
 
 
 class Reference(Section):
-    """Commanded body rates. If an axis has several signals, they are added. If an axis has no signal, its
-    command is 0."""
+    """Commanded body rates. The signals of an axis are added."""
 
     p: Signals = entry(
         (),
-        "signals of the roll rate",
+        "roll rate",
         max_length=50,
         examples=[[{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2}}]],
     )
-    q: Signals = entry((), "signals of the pitch rate", max_length=50)
-    r: Signals = entry((), "signals of the yaw rate", max_length=50)
+    q: Signals = entry((), "pitch rate", max_length=50)
+    r: Signals = entry((), "yaw rate", max_length=50)
 
 
 def sample(reference: Reference, t_s: "Samples") -> "Samples":
@@ -418,11 +411,10 @@ MAX_LEGS = 100
 class _Leg(Section):
     """From a time on: a value, or hold what is flown."""
 
-    at_s: Number = number(0.0, "s", "time from which the leg applies", ge=0, le=_LATEST_S, examples=[10])
+    at_s: Number = number(0.0, "s", "start of the leg", ge=0, le=_LATEST_S, examples=[10])
     hold: Flag = entry(
         False,
-        "true: hold the commanded value or, if there is none, the present value of the "
-        "aircraft. Otherwise `value` is required",
+        "true: hold the commanded or, if there is none, the present value. Otherwise `value` is required",
     )
     value: Number | None = None
 
@@ -446,7 +438,7 @@ class AltitudeLeg(_Leg):
         le=6000,
         examples=[1900],
     )
-    climb_mps: Number = number(2.5, "m/s", "rate of climb or descent of the command", gt=0, le=10)
+    climb_mps: Number = number(2.5, "m/s", "rate of climb or descent", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
@@ -503,13 +495,13 @@ class Autopilot(Section):
     true` keeps the present value. A quantity that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
-        "legs of the altitude"
+        "altitude"
     )
     airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
-        "legs of the true airspeed. Engine power holds the airspeed. Without an engine, pitch holds it"
+        "true airspeed. Engine power holds it; without an engine, pitch"
     )
-    heading_deg: tuple[HeadingLeg, ...] = _legs("legs of the true heading")
-    bank_deg: tuple[BankLeg, ...] = _legs("legs of the bank angle")
+    heading_deg: tuple[HeadingLeg, ...] = _legs("true heading")
+    bank_deg: tuple[BankLeg, ...] = _legs("bank angle")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -59,15 +59,14 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 
 class Variation(Section):
-    """How one key varies. The section has exactly one of the kinds `uniform`, `loguniform`, `normal`,
-    `linspace` and `choice`.
+    """How one key varies: exactly one of these kinds.
 
-    uniform: [lowest, highest]: all values between are equally likely
-    loguniform: [lowest, highest]: the logarithms of the values are equally likely
+    uniform: [lowest, highest]: equally likely values
+    loguniform: [lowest, highest]: equally likely logarithms
     normal: [mean, standard deviation] of a normal distribution
-    within: [lowest, highest]: limits for the values of `normal`. Allowed only together with `normal`
+    within: [lowest, highest] of `normal`
     linspace: [first, last, count]: evenly spaced values, flown in this order
-    choice: list of values: all are equally likely
+    choice: equally likely values
     """
 
     uniform: Span | None = number(None, "as the key", range="rising", examples=[[0.2, 0.8]])
@@ -125,13 +124,11 @@ class Variation(Section):
 
 
 class Level(Section):
-    """Without `confidence`, the estimate must meet the limit. With `confidence`, its one-sided
-    confidence bound must meet it: the lower bound for
-    `at_least`, the upper bound for `at_most`.
+    """The estimate must meet the limit, or with `confidence` its one-sided confidence bound.
 
     at_least: smallest allowed value
     at_most: largest allowed value
-    confidence: confidence of the one-sided bound; left out: the estimate itself is compared with the limit
+    confidence: confidence of the one-sided bound
     """
 
     at_least: Number | None = entry(None, range="any", examples=[0.9])
@@ -154,7 +151,7 @@ class QuantileLevel(Level):
 
     at_least: smallest allowed value
     at_most: largest allowed value
-    confidence: confidence of the one-sided bound; left out: the estimate itself is compared with the limit
+    confidence: confidence of the one-sided bound
     """
 
     at_least: Number | None = entry(None, range="any", examples=[0.01])
@@ -166,7 +163,7 @@ class QuantileLevel(Level):
     quantile: Number = number(
         0.95,
         "share of 1",
-        "quantile that is compared with the limit. 0.5 is the median",
+        "quantile that must meet the limit",
         gt=0,
         lt=1,
         needs={"at_most": 1},
@@ -184,17 +181,16 @@ class AxisLevels(Section):
 class SweepExpect(Section):
     """Conditions on the statistics of a sweep. A condition that is left out is not checked.
 
-    detection_rate: share of faults that were detected
-    isolation_rate: share of faults that were named correctly
-    false_alarms_per_hour: number of false alarms in each hour without a fault
-    departure_rate: share of flights in which the aircraft was lost
-    failure_rate: share of flights that could not be flown
-    pass_rate: share of flights that met every expectation of the base scenario
+    detection_rate: share of detected faults
+    isolation_rate: share of rightly named faults
+    false_alarms_per_hour: false alarms in each hour without a fault
+    departure_rate: share of lost aircraft
+    failure_rate: share of flights that failed
+    pass_rate: share of flights that met every expectation
     detection_delay_s: time from the fault to the alarm, infinite for a missed fault
     isolation_delay_s: time from the fault to the correct name, infinite for a missing or wrong name
     post_fault_rms_deg_s: RMS tracking error after the fault, infinite for a lost aircraft
-    tracking_ratio: RMS tracking error after the fault, divided by that before the fault. Infinite for a
-    lost aircraft
+    tracking_ratio: its ratio to that before the fault
     """
 
     detection_rate: Level | None = number(None, "share of 1")
@@ -214,17 +210,12 @@ class SweepFile(Section, title="beaver-ftc sweep"):
 
     name: name of the result folder: letters, digits, - and _
     description: purpose of the sweep
-    base: scenario that is varied: a built-in name, a scenario file beside this file, or the keys of a
-    scenario
-    set: new values of keys of the base, the same in all flights. A key is written with dots;
-    `faults[0].magnitude` is that of the first fault
-    runs: number of flights. Fewer than the points of the grid: only its first points are flown. More: the
-    grid is repeated. Required without `linspace` and `sampling: grid`; left out: one
-    flight for each point of the grid
+    base: scenario that is varied: a built-in name, a file, or its keys
+    set: new values of keys of the base, the same in all flights
+    runs: number of flights, which cuts or repeats a grid; left out: one for each point of the grid
     seed: seed of all random values of the sweep
-    sampling: `random`: each flight independently. `lhs` (Latin hypercube) and `sobol` fill the ranges
-    more evenly. `grid`: all combinations of `linspace` and `choice`. The values of `linspace` are
-    always flown in their order
+    sampling: how values are drawn. `lhs` (Latin hypercube) and `sobol` fill the ranges more evenly. `grid`:
+    all combinations of `linspace` and `choice`
     vary: keys of the base that vary, and how each key varies. A key is written as in `set`
     expect: conditions that the statistics must meet
     """

@@ -445,8 +445,8 @@ class Verify(StudyCommand):
     hours: Number of flight hours without a fault.
     faults: Number of flights with one random fault.
     seed: Seed of all random draws.
-    out: Folder for the flights. An interrupted command continues from this folder.
-    steps: Also fly the schemes between the published and the sharpened scheme, each with one step more.
+    out: Folder for the results.
+    steps: Also fly the schemes between the published and the sharpened scheme.
     """
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0

@@ -52,9 +52,9 @@ def command(arguments: Arguments) -> None:
       beaver-ftc evidence flight-controls
 
     plan: Path of a plan of evidence, or name of a built-in plan.
-    out: Folder for the evidence. Default: a folder in runs/ with the name of the plan.
-    replay: Fly only this flight again, write its result folder as `run` does, and evaluate it.
-    no_report: With --replay: do not write report.html and the figures of the flight.
+    out: Folder for the results. Default: runs/ and the name of the plan.
+    replay: Fly only this flight again, and write its result folder as `run` does.
+    no_report: With --replay: do not write report.html and the figures.
     """
     from beaver_ftc_assurance.evidence.plan import load_plan
 

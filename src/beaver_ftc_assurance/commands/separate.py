@@ -30,7 +30,7 @@ def command(
       beaver-ftc separate flap-stuck
 
     rate_deg_s: Largest allowed body rate, deg/s.
-    out: Folder for separation.json.
+    out: Folder for the results.
     """
     from beaver_ftc.scenario import load_scenario
     from beaver_ftc_assurance import separation

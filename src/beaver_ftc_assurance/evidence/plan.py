@@ -60,46 +60,40 @@ Text = Annotated[str, StringConstraints(max_length=2000)]
 
 
 class OfSweep(SweepExpect):
-    """Conditions that the statistics of a sweep must meet, as in the `expect` of a sweep file."""
+    """Conditions as in `expect` of a sweep file."""
 
     type: Literal["sweep"]
 
 
 class OfHandling(Section):
-    """Required level of handling qualities of MIL-F-8785C: at the end of a flight with a fault,
-    otherwise in trim. Each flight in `over` must meet it."""
+    """Level of handling qualities of MIL-F-8785C: at the end of a flight with a fault, otherwise in trim."""
 
     type: Literal["handling_qualities"]
-    level: Whole = number(1, "1", "worst allowed level. 1 is the best level", ge=1, le=3)
+    level: Whole = number(1, "1", "worst allowed level, 1: best", ge=1, le=3)
 
 
 class OfMargins(Section):
-    """Required stability margins of the loop of each surface, healthy and after each loss for which the
-    default law is designed. The scenario of each flight in `over` must meet them."""
+    """Stability margins of the loop of each surface, healthy and after each loss for which the default law
+    is designed."""
 
     type: Literal["margins"]
-    gain_db: Number = number(
-        6.0, "dB", "smallest allowed gain margin, both for larger and for smaller gains", ge=0, le=100
-    )
-    phase_deg: Number = number(45.0, "deg", "smallest allowed phase margin", ge=0, le=180)
+    gain_db: Number = number(6.0, "dB", "smallest gain margin", ge=0, le=100)
+    phase_deg: Number = number(45.0, "deg", "smallest phase margin", ge=0, le=180)
 
 
 Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
 
 
 class Requirement(Section):
-    """One requirement: its name, its text, its flights and its test. The test is exactly one of `expect`,
-    `formula` and `bar`.
+    """One requirement, with exactly one of `expect`, `formula` and `bar`.
 
     id: name of the requirement: letters, digits, - and _
     text: the requirement in words
-    clause: clause of the regulation or standard from which the requirement comes
-    over: flights that must meet the requirement: names from `flights`, built-in names, or files in the
-    folder of the plan or below it
+    clause: clause of the regulation or standard
+    over: flights that must meet it: names from `flights`, built-in names, or files
     expect: conditions that each flight must meet, as in `expect` of a scenario
-    formula: formula of signal temporal logic over columns of the log. It must be true in each flight.
-    Times are in s: `always[12.5:29](...)`. Operators: `always`, `eventually`,
-    `until`, `once`, `historically`, `not`, `and`, `or`, `implies`
+    formula: formula of signal temporal logic over columns of the log, times in s. Operators: `always`,
+    `eventually`, `until`, `once`, `historically`, `not`, `and`, `or`, `implies`
     bar: limit that the result of a study must meet
     """
 
@@ -125,8 +119,7 @@ class PlanFile(Section, title="beaver-ftc plan of evidence"):
 
     name: name of the plan: letters, digits, - and _
     description: purpose of the plan
-    flights: scenarios and sweeps of this plan, by name. A sweep has at least one of the keys `base`, `vary`
-    and `runs`
+    flights: scenarios and sweeps of this plan, by name
     requirements: list of the requirements
     """
 

@@ -34,12 +34,12 @@ def command(
       beaver-ftc live rudder-stuck
       beaver-ftc live --host 0.0.0.0 --guests 30
 
-    aircraft: Fly this aircraft instead of the scenario's aircraft, without the scenario's uncertainty.
+    aircraft: Fly this aircraft instead of the scenario's, without `uncertainty`.
     port: Port of the page. 0 selects any free port.
-    host: Network address of the page. With 0.0.0.0 other machines can open it, e.g. those of a class.
-    guests: Number of links for guests, who can inject faults if you allow it on the page. Default: 10
-    if other machines can open the page, otherwise 0.
-    out: Folder for flights that you save on the page.
+    host: Network address of the page. With 0.0.0.0 other machines can open it.
+    guests: Number of links for guests, who can inject faults if you allow it. Default: 10 if other
+    machines can open the page, otherwise 0.
+    out: Folder for the results.
     open_browser: Also open the page in a browser.
     """
     from beaver_ftc_live.page.serve import Place, is_loopback, serve

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from beaver_ftc.documents.errors import BadInput, suggestion
 from tools.docs import properties
-from tools.docs.reference import columns, commands, keys, python_names
+from tools.docs.reference import columns, commands, keys
 
 # Name of each page, and what prints it; the order is that of the site.
 PAGES: dict[str, Callable[[], str]] = {
@@ -12,7 +12,6 @@ PAGES: dict[str, Callable[[], str]] = {
     "columns": columns.page,
     "commands": commands.page,
     "properties": properties.as_markdown,
-    "python-names": python_names.page,
 }
 
 

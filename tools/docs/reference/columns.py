@@ -24,8 +24,8 @@ from beaver_ftc.studies.sweep.one_flight import FIXED
 from beaver_ftc_logs import pages
 
 TEXTS = Path(__file__).with_name("columns.yaml")
-NUMBER, TEXT, FLAG = "number", "text", "true or false"
-_KINDS = {"float": NUMBER, "double": NUMBER, "int": "whole number", "int64": "whole number", "text": TEXT,
+NUMBER, TEXT, FLAG = "number", "text", "flag"
+_KINDS = {"float": NUMBER, "double": NUMBER, "int": "count", "int64": "count", "text": TEXT,
           "string": TEXT, "flag": FLAG, "bool": FLAG}  # fmt: skip
 _WORDS = {
     "AXIS": "[pqr]",
@@ -61,13 +61,9 @@ def _power() -> Columns:
 
 
 def _detectability() -> Columns:
-    texts = ("fault", "confused_with", "why")
-    return {name: TEXT if name in texts else NUMBER for name in detectability.COLUMNS}
-
-
-def _isolability() -> Columns:
-    texts = ("fault", "other", "why")
-    return {name: TEXT if name in texts else NUMBER for name in detectability.PAIRS}
+    texts = ("fault", "confused_with", "other", "why")
+    names = (*detectability.COLUMNS, *detectability.PAIRS)
+    return {name: TEXT if name in texts else NUMBER for name in names}
 
 
 def _mismatch() -> Columns:
@@ -88,7 +84,6 @@ TABLES: dict[str, Callable[[], Columns]] = {
     "sweep": _sweep,
     "power": _power,
     "detectability": _detectability,
-    "isolability": _isolability,
     "mismatch": _mismatch,
     "mismatch-frames": _mismatch_frames,
     "diagnosis": _diagnosis,
@@ -96,7 +91,7 @@ TABLES: dict[str, Callable[[], Columns]] = {
 
 
 _SAYS = """Which columns do the log of a flight and the tables of studies have? *Example.* This program prints
-the time at which the residual of the pitch axis first exceeds its threshold, 12.01 s:
+when the residual of the pitch axis first exceeds its threshold, 12.01 s:
 
 ```python
 import beaver_ftc as bf
@@ -106,16 +101,16 @@ ratio = (log.q_alarm_residual_rad_s / log.q_alarm_threshold_rad_s).abs()
 print(log.t_s[ratio > 1].iloc[0])
 ```
 
-The unit `1` is a pure number. The [glossary](reference/glossary.md) explains the terms, and the
-[nomenclature](reference/nomenclature.md) has symbols and signs. In a name, a word in capitals stands for:
+The unit `1` is a pure number, a "flag" is true or false, a "count" a whole number. The
+[glossary](reference/glossary.md) has terms and signs. In a name, a word in capitals stands for:
 
 | word | stands for |
 | --- | --- |
-| AXIS | `p` (roll), `q` (pitch), `r` (yaw) |
+| AXIS | `p`, `q`, `r` |
 | SURFACE | each surface, for example `elevator` |
 | ESTIMATOR | each isolation estimator: a surface, or a surface and a fault type |
 | SIGNAL | each signal that the aircraft file declares, for example `dpt` |
-| END | lower and upper end: `lower`, `upper`, `low`, `high`, `lowest`, `highest`; `from`, `to` |
+| END | `lower`, `upper`, `low`, `high`, `lowest`, `highest`; `from`, `to` |
 | MODE | `adaptive`, `reallocated`, `unanticipated` |
 | QUANTITY | `altitude_m`, `airspeed_mps`, `heading_deg`, `bank_deg` |
 | SOURCE | each source of the mismatch: {sources} |
@@ -139,7 +134,7 @@ def _said() -> str:
 
 
 def _table(name: str, text: Mapping[str, str]) -> str:
-    rows = markdown_table(("column", "type", "unit", "what it is"), list(_rows(name, text["columns"])))
+    rows = markdown_table(("column", "unit or type", "meaning"), list(_rows(name, text["columns"])))
     return f"## {text['title']}\n\n{text['says']}\n\n{rows}"
 
 
@@ -157,7 +152,7 @@ def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
         pattern = pattern_of(name, meanings)
         if pattern not in done:
             done.add(pattern)
-            yield f"`{pattern}`", kind, _unit(pattern, name) if kind == NUMBER else "", meanings[pattern]
+            yield f"`{pattern}`", _unit(pattern, name) if kind == NUMBER else kind, meanings[pattern]
 
 
 def pattern_of(name: str, patterns: Iterable[str]) -> str:

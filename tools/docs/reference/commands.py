@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import typer
@@ -11,69 +11,35 @@ from beaver_ftc.cli.main import app, every_command
 from beaver_ftc.documents import errors
 from beaver_ftc.studies.present.tables import markdown_table
 
-_HEAD = ("option", "what it is")
+_HEAD = ("option", "meaning")
 PARSER: Any = typer.main.get_command(app)
 
 
 _SAYS = """Which options does each command have, and which exit status? If you do not know the command, begin
 with [which command answers my question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND
---help` prints more about one command: its usage, examples, what it computes, and which files it writes.
-
-A word in capitals stands for a value that you give. `...` follows what can be given several times. In
-brackets: the default, the allowed range such as `[1<=x<=60]`, or `[required]`.
-[Columns](reference/columns.md) lists the columns of the tables that commands write."""
+--help` prints usage, examples, what the command computes, and which files it writes. `...` follows what can
+be given several times. In brackets: the default, the allowed range, or `[required]`."""
 _NEXT = """## Next
 
 [Assert in CI](how-to/evidence.md#in-ci) uses the exit statuses."""
 _KINDS = re.compile(r" <(?:str|int|path|(?:int|float) range|list\[\w+\])>")  # the text or the range says it
-_SHARED = 3  # so many commands with the same option share its row
-_SHARED_SAYS = "## Options of several commands\n\nEach command lists which of these options it has."
-
-# Purpose -> commands. A command that is not here is listed under "other".
-_PURPOSES = {
-    "fly": ("run", "live", "sitl"),
-    "prepare": ("list", "show", "new", "validate", "schema", "trim", "linearise"),
-    "fly many": ("sweep", "compare", "matrix"),
-    "measure the diagnosis": (
-        "detectability", "smallest", "power", "decay", "mechanisms", "mismatch", "reproduce", "bench",
-    ),
-    "prove": ("verify", "check", "separate", "evidence"),
-    "recorded flights": ("identify", "diagnose"),
-    "other aircraft": ("derive", "import gtm"),
-    "teach": ("challenge new", "challenge submit", "challenge grade"),
-}  # fmt: skip
+_SHARED = 2  # so many commands with the same option share its row
+_SHARED_SAYS = "## Options of several commands"
 
 
 def page() -> str:
     """Every command."""
     known = every_command()
-    purposes = _with_others(known)
-    rows = {name: _options(command, f"beaver-ftc {name}") for name, command in known.items()}
+    rows = {name: _options(command, f"beaver-ftc {name}") for name, command in sorted(known.items())}
     counted = Counter(row for of in rows.values() for row in of)
-    shared = [row for row, count in counted.items() if count >= _SHARED]
-    parts = ["# Commands", _SAYS, _contents(purposes), _SHARED_SAYS, markdown_table(_HEAD, shared)]
+    common = [row for row, count in reversed(counted.most_common()) if count >= _SHARED]
+    shared = list(reversed({row[0]: row for row in common}.values()))  # of each option, the commonest row
+    contents = ", ".join(f"[{name}](#{name.replace(' ', '-')})" for name in rows)
+    parts = ["# Commands", _SAYS, f"Contents: {contents}.", _SHARED_SAYS, markdown_table(_HEAD, shared)]
     parts += ["## beaver-ftc", *_described(PARSER, _options(PARSER, "beaver-ftc"), [])]
-    for commands in purposes.values():
-        for name in commands:
-            parts += [f"## {name}", *_described(known[name], rows[name], shared)]
+    for name, of in rows.items():
+        parts += [f"## {name}", *_described(known[name], of, shared)]
     return "\n\n".join([*parts, statuses(), _NEXT]) + "\n"
-
-
-def _with_others(known: Mapping[str, Any]) -> dict[str, list[str]]:
-    """The purposes, with the installed commands alone, and those that have none at the end."""
-    listed = {purpose: [name for name in of if name in known] for purpose, of in _PURPOSES.items()}
-    named = {name for of in listed.values() for name in of}
-    others = [name for name in known if name not in named]
-    return listed | ({"other": others} if others else {})
-
-
-def _contents(purposes: Mapping[str, list[str]]) -> str:
-    """A line for each purpose, with links to the sections of its commands."""
-    links = {
-        purpose: ", ".join(f"[{name}](#{name.replace(' ', '-')})" for name in commands)
-        for purpose, commands in purposes.items()
-    }
-    return "## Contents\n\n" + "\n".join(f"- {purpose}: {of}" for purpose, of in links.items())
 
 
 def _options(command: Any, called: str) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.plugins import DETECTORS, LAWS, options_of, registered
 from beaver_ftc.scenario import airframe, sensors
@@ -24,15 +25,16 @@ _NAMED = {  # sections that stand in many places: heading, part
     "Level": ("LIMIT", "a rate"),
     "QuantileLevel": ("LIMIT", "a time or an error"),
 }
-_HEAD = ("in", "key", "what it is", "value", "default")
+_SURFACES = load().surfaces
+_FEW = 6  # words of a key that shares its row
+_HEAD = ("in", "key", "meaning", "value", "default")
 _WORDS = {"string": "text", "boolean": "flag", "integer": "whole number", "number": "number"}
 
 
 class Kind(NamedTuple):
-    """A kind of file: the schema of what loads it, what to say first, what else stands in it."""
+    """A kind of file: the schema of what loads it, what else is said of it."""
 
     schema: Callable[[], Node]
-    says: str
     more: Callable[[], Iterator[str]] = lambda: iter(())
     links: Mapping[str, str] = {}  # heading of a section -> link to the page that explains it
 
@@ -61,7 +63,7 @@ def _kind(name: str, shown: dict[str, str]) -> Iterator[str]:
     """The example, a table for each key at the top of the file, and what else is to be said."""
     kind, what = KINDS[name], name.removesuffix("-keys")
     example = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
-    yield f"## {what.capitalize()} file\n\n{kind.says}\n\n```yaml\n{example}```"
+    yield f"## {what.capitalize()} file\n\n```yaml\n{example}```"
     sections = Sections(kind.schema())
     groups: dict[str, list[Section]] = {}
     for section in sections:
@@ -116,7 +118,8 @@ def _below(path: Path) -> str:
     while path and path[-1] in (ITEM, NAME):
         path = path[:-1]
     marks = [i for i, part in enumerate(path) if part in (ITEM, NAME)]
-    return dotted(path[marks[-1] + 1 if marks else 0 :])
+    names = ("SURFACE" if part in _SURFACES else part for part in path[marks[-1] + 1 if marks else 0 :])
+    return dotted(tuple(names))
 
 
 def _table(rows: list[Row]) -> str:
@@ -131,7 +134,19 @@ def _table(rows: list[Row]) -> str:
             Row(*rest[:column], _all_of(names, every) if column == 0 else ", ".join(names), *rest[column:])
             for rest, names in alike.items()
         ]
-    return markdown_table(_HEAD[first:], [row[first:] for row in rows])
+    return markdown_table(_HEAD[first:], [row[first:] for row in _in_few_words(rows)])
+
+
+def _in_few_words(rows: list[Row]) -> list[Row]:
+    """The rows; keys of the same value that a few words describe are one row."""
+    alike: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        few = row.says and row.value and len(row.says.split()) <= _FEW and "," not in row.key + row.says
+        alike.setdefault((row.part, row.value, row.default) if few else row, []).append(row)
+    return [
+        of[0]._replace(key=", ".join(row.key for row in of), says=", ".join(row.says for row in of))
+        for of in alike.values()
+    ]
 
 
 def _all_of(names: list[str], every: list[str]) -> str:
@@ -292,13 +307,13 @@ def _of_scenarios() -> Iterator[str]:
     for group, what, where in ((DETECTORS, "scheme", "fdi"), (LAWS, "law", "control")):
         yield f"## {what.capitalize()}s, and their `{where}.options`"
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
-        yield markdown_table((what, "what it is"), [(f"`{one.name}`", one.description()) for one in entries])
+        yield markdown_table((what, "meaning"), [(f"`{one.name}`", one.description()) for one in entries])
         rows = [
             (f"`{one.name}`", f"`{name}`", of["says"], _option_range(of), f"`{of['default']:g}`")
             for one in entries
             for name, of in options_of(group, one.name).items()
         ]
-        yield markdown_table((what, "option", "what it is", "value", "default"), rows)
+        yield markdown_table((what, "option", "meaning", "value", "default"), rows)
     for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
         yield f"## Presets of `{what}`"
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
@@ -336,7 +351,7 @@ _LINKS = {
 }
 _AIRCRAFT_LINKS = {
     "`surfaces.NAME`": "[properties of the Beaver](reference/properties.md), "
-    "[signs](reference/nomenclature.md#axes-and-signs)",
+    "[signs](reference/glossary.md#axes-and-signs)",
     "`moments`": "[terms of the Beaver](reference/properties.md#aerodynamic-terms), "
     f"[fit of the terms]({_DERIVED}#3-fit)",
     "`model_error_rad_s2`": f"[meaning of the bound]({_DERIVED}#what-the-bound-means)",
@@ -346,36 +361,14 @@ _AIRCRAFT_LINKS = {
     "`damage.NAME`": "[damage on the GTM](results/aircraft.md#damage-on-nasas-gtm)",
 }
 KINDS = {
-    "scenario-keys": Kind(
-        json_schema,
-        "In this flight, the elevator loses 40 % of its effectiveness at 12 s. One aerodynamic coefficient "
-        "of the simulated aircraft is 5 % too large, and the diagnosis allows for errors of 5 %.",
-        _of_scenarios,
-        _LINKS,
-    ),
-    "sweep-keys": Kind(
-        sweep_json_schema,
-        "This sweep flies 50 losses of the elevator. The size of the loss and the airspeed are random. At "
-        "least 90 % of the losses must be detected, and half of the losses must be detected within 0.2 s.",
-    ),
+    "scenario-keys": Kind(json_schema, _of_scenarios, _LINKS),
+    "sweep-keys": Kind(sweep_json_schema),
     "plan-keys": Kind(
         plan_json_schema,
-        "A plan lists requirements, and the flights that test them. Here, "
-        "JAM-1 has expectations, RATE-1 has a formula, and STAT-1 has a limit for the result of a study.",
         links={"`requirements[]`": "[its tests](how-to/evidence.md#what-a-requirement-tests)"},
     ),
-    "aircraft-keys": Kind(
-        AircraftFile.model_json_schema,
-        "This file has the required sections and a few terms of the Beaver. The names after `command`, "
-        "`position` and `effective` are properties of the JSBSim model.",
-        links=_AIRCRAFT_LINKS,
-    ),
-    "vehicle-keys": Kind(
-        Vehicle.model_json_schema,
-        "The log of a small flying wing is a table with the columns `time_ms`, `gyro_x`, `gyro_y`, `gyro_z`, "
-        "`roll_cmd`, `pitch_cmd`, `roll_deg`, `pitch_deg`, `airspeed_kmh` and `altitude_m`. The wing has two "
-        "elevons, `right` and `left`.",
-    ),
+    "aircraft-keys": Kind(AircraftFile.model_json_schema, links=_AIRCRAFT_LINKS),
+    "vehicle-keys": Kind(Vehicle.model_json_schema),
 }
 PAGES: dict[str, tuple[str, str, tuple[str, ...], str]] = {  # title, first words, kinds of files, next page
     "scenario-keys": (
@@ -396,18 +389,13 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...], str]] = {  # title, first word
         "[Results of a sweep](how-to/sweeps.md#what-a-sweep-writes) has the files and statistics of a sweep.",
     ),
     "aircraft-keys": (
-        "Aircraft file keys",
-        "Which keys can the file `aircraft.yaml` have? The file describes an aircraft for the diagnosis and "
-        "the laws. The command `derive` writes it ([your own aircraft](tutorials/own-aircraft.md)).",
-        ("aircraft-keys",),
-        "[Derived aircraft](explanation/derived-aircraft.md) explains how `derive` finds the terms and the "
-        "errors.",
-    ),
-    "vehicle-keys": (
-        "Vehicle file keys",
-        "Which keys can a vehicle file have? The file states which column of a flight log contains which "
-        "quantity ([prepare a log](how-to/flight-logs.md)). `identify --check` proposes a first version.",
-        ("vehicle-keys",),
-        "[Diagnose a flight log](tutorials/flight-log.md) uses such a file.",
+        "Aircraft and vehicle keys",
+        "Which keys can an aircraft file and a vehicle file have? The file `aircraft.yaml` describes an "
+        "aircraft for the diagnosis and the laws; `derive` writes it "
+        "([your own aircraft](tutorials/own-aircraft.md)). A vehicle file states which column of a log "
+        "contains which quantity; `identify --check` proposes it ([prepare a log](how-to/flight-logs.md)).",
+        ("aircraft-keys", "vehicle-keys"),
+        "[Derived aircraft](explanation/derived-aircraft.md) explains how `derive` finds the terms. "
+        "[Diagnose a flight log](tutorials/flight-log.md) uses a vehicle file.",
     ),
 }

@@ -1,4 +1,4 @@
-"""Table of the constants, in docs/reference/nomenclature.md."""
+"""Table of the constants, in docs/reference/glossary.md."""
 
 import numpy as np
 

@@ -29,9 +29,7 @@ Properties = dict[str, float]  # failure properties of one surface
 InWords = Mapping[str, Callable[[Any], str]]  # of each parameter, its value in words
 
 
-SURFACE_SAYS = (
-    "surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the Beaver"
-)
+SURFACE_SAYS = "surface that fails. Of the Beaver: `aileron`, `elevator`, `rudder` or `flap`"
 
 
 class Button(NamedTuple):
@@ -117,9 +115,7 @@ class SurfaceFault(Section):
 class Switched(SurfaceFault):
     """A fault that is either there or not: a jam does not grow."""
 
-    profile: Literal["abrupt"] = entry(
-        "abrupt", "time course of the fault. This fault type is always abrupt", examples=["abrupt"]
-    )
+    profile: Literal["abrupt"] = entry("abrupt", "time course: always abrupt", examples=["abrupt"])
 
 
 class Gradual(SurfaceFault):
@@ -127,15 +123,14 @@ class Gradual(SurfaceFault):
 
     profile: Literal["abrupt", "incipient"] = entry(
         "abrupt",
-        "time course. `abrupt`: the full size at once. `incipient`: growth as 1 - "
-        "exp(-kappa (t - at_s)), kappa is `kappa_per_s`",
+        "time course. `incipient`: growth as 1 - exp(-kappa (t - at_s))",
         needs={"kappa_per_s": 2},
         examples=["incipient"],
     )
     kappa_per_s: Number | None = number(
         None,
         "1/s",
-        "growth rate kappa of an incipient fault",
+        "kappa of an incipient fault",
         gt=0,
         le=1000,
         needs={"profile": "incipient"},
@@ -175,10 +170,9 @@ def _wrong(case: str) -> str | None:
 
 
 class Damage(Switched):
-    """A case of structural damage that the file of the aircraft declares. The damage changes the aerodynamics
-    and the mass, and removes surfaces.
+    """A case of damage that the aircraft file declares.
 
-    case: name of the case in the file of the aircraft
+    case: name of the case
     """
 
     adds = False
@@ -192,11 +186,10 @@ class Damage(Switched):
 
 
 class LossOfEffectiveness(Gradual):
-    """The moment of the surface is (1 - magnitude) times its healthy moment.
+    """The surface gives (1 - magnitude) times its healthy moment.
 
-    actuator: surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the
-    Beaver
-    magnitude: lost share of the effectiveness, from 0 (healthy) to 1 (no moment), share of 1
+    actuator: surface that fails. Of the Beaver: `aileron`, `elevator`, `rudder` or `flap`
+    magnitude: lost share of the effectiveness, share of 1
     """
 
     properties = (("effectiveness", 1.0),)
@@ -225,10 +218,8 @@ class LossOfEffectiveness(Gradual):
 class Stuck(Switched):
     """The surface jams.
 
-    actuator: surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the
-    Beaver
-    position_deg: position at which the surface jams, between its stops; left out: the position at the start
-    of the fault, deg
+    actuator: surface that fails. Of the Beaver: `aileron`, `elevator`, `rudder` or `flap`
+    position_deg: position of the jam; left out: the position at the start of the fault, deg
     """
 
     properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"
@@ -270,9 +261,7 @@ class Hardover(Switched):
 
     type: Literal["hardover"]
     actuator: Actuator = entry(..., SURFACE_SAYS)
-    direction: Literal[1, -1] = entry(
-        1, "stop to which the surface runs. 1: upper stop, the largest positive deflection. -1: lower stop"
-    )
+    direction: Literal[1, -1] = entry(1, "stop to which the surface runs. 1: upper. -1: lower")
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["hardover"] = float(self.direction)
@@ -294,7 +283,7 @@ class Float(Switched):
 
 
 class Bias(Gradual):
-    """The position of the surface differs from its command by a constant."""
+    """A constant is added to the position of the surface."""
 
     properties = (("bias-rad", 0.0),)
     truth, size = "bias-rad", ("of", "deg")
@@ -304,16 +293,14 @@ class Bias(Gradual):
 
     type: Literal["bias"]
     actuator: Actuator = entry(..., SURFACE_SAYS)
-    bias_deg: Number = number(
-        ..., "deg", "angle added to the position of the actuator", ge=-90, le=90, examples=[2]
-    )
+    bias_deg: Number = number(..., "deg", "this constant", ge=-90, le=90, examples=[2])
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["bias-rad"] += share * radians(self.bias_deg)
 
 
 class RateLimit(Gradual):
-    """The surface moves more slowly: its rate limit is multiplied by `scale`."""
+    """The rate limit is multiplied by `scale`."""
 
     properties = (("rate-scale", 1.0),)
     in_words = growing(scale=lambda value: f"{100 * value:g} % of its rate")
@@ -331,7 +318,7 @@ class RateLimit(Gradual):
 
 
 class Oscillatory(Gradual):
-    """The surface oscillates about the position that its command requires."""
+    """The surface oscillates about its commanded position."""
 
     properties = (("oscillation-amplitude-rad", 0.0), ("oscillation-frequency-rad_sec", 0.0))
     truth, size = "oscillation-amplitude-rad", ("by", "deg")
@@ -358,16 +345,14 @@ class Oscillatory(Gradual):
 
 
 class Unanticipated(Gradual):
-    """A fault outside every fault class: an extra pitching moment that grows with the cube of alpha
+    """An extra pitching moment that grows with the cube of alpha, outside every fault class
     [Zhang2005]."""
 
     properties = (("Cm-alpha3", 0.0),)
     in_words = growing(Cm_alpha3="Cm_alpha3 {:g}".format)
 
     type: Literal["unanticipated"]
-    Cm_alpha3: Number = number(
-        10.0, "1/rad^3", "coefficient of alpha^3 in Cm. The published study has 10", ge=-1000, le=1000
-    )
+    Cm_alpha3: Number = number(10.0, "1/rad^3", "coefficient of alpha^3 in Cm", ge=-1000, le=1000)
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["Cm-alpha3"] += share * self.Cm_alpha3

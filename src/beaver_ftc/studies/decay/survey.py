@@ -185,9 +185,9 @@ class Decay(StudyCommand):
     Examples:
       beaver-ftc decay elevator-loss-in-turbulence
 
-    flights: Number of flights for each row of the table, i.e. for each error and size.
+    flights: Number of flights for each error and size.
     seed: Seed of all random draws.
-    out: Folder of the result folder SCENARIO-decay.
+    out: Folder for the results.
     """
 
     scenario: ScenarioArgument

@@ -35,14 +35,13 @@ class Matrix(StudyCommand):
       beaver-ftc matrix --airspeed 45
       beaver-ftc matrix --declared --turbulence light --airspeed 45
 
-    out: Folder of the result folder `fault-matrix` or `pitch-lost`.
-    airspeed: Airspeed, m/s. Default: 38, 45 and 52 for the Beaver, otherwise shares of the airspeed at
-    the start.
+    out: Folder for the results.
+    airspeed: Airspeed, m/s. Default: 38, 45 and 52 for the Beaver.
     pitch_lost: Instead, fail elevator and flap together, with and without control by engine power.
-    declared: Simulate and declare tactical-grade sensors, servos and, if the model allows it, errors of
-    5 % of the moment coefficients.
+    declared: Simulate and declare tactical-grade sensors, servos and, if possible, coefficient errors of
+    5 %.
     turbulence: With --declared: severity of the turbulence, simulated and declared.
-    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER. Default: beaver.
     """
 
     out: Path = Path("runs")

@@ -56,9 +56,9 @@ class Mechanisms(StudyCommand):
     Examples:
       beaver-ftc mechanisms --draws 1
 
-    draws: Number of random flights for each combination of fault, bandwidth, error and instruments.
+    draws: Number of random flights for each combination.
     seed: Seed of all random draws.
-    out: Folder of the result folder `mechanisms`.
+    out: Folder for the results.
     """
 
     draws: Annotated[int, typer.Option(min=1, max=1000)] = DRAWS

@@ -356,15 +356,14 @@ class Power(StudyCommand):
       beaver-ftc power --surface elevator --sensors tactical-grade --turbulence none
 
     grid: Number of variations: `quick` takes about 1 min of processor time, `full` about 10 min.
-    schemes: Names of schemes to compare with the default scheme, separated by commas. Default: all registered
-    schemes.
+    schemes: Names of schemes to compare, separated by commas. Default: all registered schemes.
     sensors: Fly only these sensors. Default: all sensors of the grid.
     turbulence: Fly only this severity of turbulence. Default: all severities of the grid.
-    airspeed: Airspeed, m/s. Default: the airspeed at the start of a scenario without this key.
-    altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
-    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
-    surface: Fly only losses of this surface, with one line for each loss.
-    out: Folder of the result folder `power`.
+    airspeed: Airspeed, m/s. Default: that of a scenario without this key.
+    altitude: Altitude above sea level, m. Default: that of a scenario without this key.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER. Default: beaver.
+    surface: Fly only losses of this surface.
+    out: Folder for the results.
     """
 
     grid: GridName = GridName.quick

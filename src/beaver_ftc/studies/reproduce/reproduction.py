@@ -314,7 +314,7 @@ class Reproduce(StudyCommand):
     Examples:
       beaver-ftc reproduce --out runs
 
-    out: Folder of the result folder `reproduction`.
+    out: Folder for the results.
     """
 
     out: Path = Path("runs")

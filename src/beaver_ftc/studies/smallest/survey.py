@@ -274,7 +274,7 @@ class Smallest(StudyCommand):
     surface: The surface that loses effectiveness.
     within: Longest time from the loss to the alarm, s.
     seed: Seed of all random draws.
-    out: Folder of the result folder SCENARIO-smallest-SURFACE.
+    out: Folder for the results.
     """
 
     scenario: ScenarioArgument

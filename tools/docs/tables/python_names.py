@@ -1,25 +1,14 @@
-"""The public Python names: which there are, in the order of the page, and what each docstring says."""
+"""The public Python names, in docs/reference/python.md: their order, and what each docstring says."""
 
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
-
-HEAD = """# Python names
-
-Which names does `import beaver_ftc as bf` give, and what does each take and return? This page has the first
-sentence of each entry, for names after `beaver_ftc.`. Arguments after `*` must be given by name. The whole
-text, with types, defaults, shapes, units and errors, is in the docstring: the web site shows it on this page,
-and Python prints it by `help(bf.fly)`. [Python](reference/python.md) shows programs, and the
-[glossary](reference/glossary.md) explains the terms."""
-NEXT = """## Next
-
-[Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
 
 RECORDS = "results.model"
 Names = Mapping[str, tuple[str, ...]]
@@ -53,31 +42,30 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Errors": {"BadInput": (), "SimulationFailed": ()},
 }  # fmt: skip
 SAYS = {
-    "Records of a flight": "The attributes of a `Flight` are records, with the fields of `metrics.json`. "
-    "[Columns](reference/columns.md) has their units.",
+    "Records of a flight": "The attributes of a `Flight` are records, with the fields of `metrics.json`.",
     "Aircraft, trim and linear models": "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives "
-    "an aircraft `jsbsim:NAME` at the first use, and checks an aircraft `./FOLDER` against its JSBSim model.",
-    "Errors": "Both errors have an `exit_code` for a script: 2 for `BadInput`, 3 for `SimulationFailed`. "
-    "`ScenarioError`, `UnknownAircraft` and its subclass `NotDerived` are subclasses of `BadInput`.",
+    "`jsbsim:NAME` at the first use, and checks `./FOLDER` against its JSBSim model.",
+    "Errors": "Subclasses of `BadInput` are `ScenarioError`, `UnknownAircraft` and `NotDerived`.",
 }
+FIRST = 2  # number of the first of these tables on the page
 
 
-def page() -> str:
-    """The page for a terminal or a reader of Markdown: signatures, and the first words of each docstring."""
-    return _joined(lambda names: [markdown_table(("name", "what it is"), list(_described(names)))])
+def python_names() -> str:
+    """For a reader of Markdown: a table for each heading, with signatures and first sentences."""
+    parts = []
+    for number, (heading, names) in enumerate(NAMES.items(), FIRST):
+        caption = " ".join(filter(None, [f"Table {number}. {heading}.", SAYS.get(heading)]))
+        parts += [f"*{caption}*", markdown_table(("name", "meaning"), list(_described(names)))]
+    return "\n\n".join(parts) + "\n"
 
 
 def directives() -> str:
-    """The page for a generator that reads docstrings by itself: a directive a name."""
-    return _joined(lambda names: [_directive(name, members) for name, members in names.items()])
-
-
-def _joined(described: Callable[[Names], list[str]]) -> str:
-    parts = [HEAD]
+    """For a generator that reads docstrings by itself: a directive a name."""
+    parts = []
     for heading, names in NAMES.items():
-        parts += [f"## {heading}", *filter(None, [SAYS.get(heading)])]
-        parts += described(names)
-    return "\n\n".join([*parts, NEXT]) + "\n"
+        parts += [f"### {heading}", *filter(None, [SAYS.get(heading)])]
+        parts += [_directive(name, members) for name, members in names.items()]
+    return "\n\n".join(parts)
 
 
 def _directive(name: str, members: tuple[str, ...]) -> str:

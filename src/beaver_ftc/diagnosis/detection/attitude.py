@@ -107,7 +107,7 @@ def restart(att):
 
 @kernel
 def forget_losses(att):
-    """Begin the correlations with losses anew."""
+    """Begin the correlations with losses again."""
     att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0
 
 

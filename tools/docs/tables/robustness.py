@@ -20,7 +20,7 @@ from beaver_ftc.studies.power.shown import run_power, who_is_better
 from beaver_ftc.studies.power.survey import GRIDS, contenders
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.one_flight import fly_one
-from beaver_ftc.studies.sweep.sampling import Plan
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from tools.docs.tables import moved
 
 Document = dict[str, Any]
@@ -73,7 +73,7 @@ def _of_losses(rows: Rows) -> Iterator[str]:
 
 
 DOUBT_HEAD = (
-    "surface",
+    "part",
     "sensors",
     "detected",
     "rightly named",
@@ -81,25 +81,39 @@ DOUBT_HEAD = (
     "median time to the name, s",
 )
 DOUBTED, OF_DOUBT = ("elevator", "rudder", "aileron"), {"sound": "never", "in doubt": "always"}
+BIASED = {"gyro, bias of 0.5 deg/s": ("pqr", 0.5), "vane, bias of 2 deg": (("alpha", "beta"), 2.0)}
 
 
 def robustness_doubt() -> str:
-    """Losses with all errors together: sensors assumed sound, and sensors in doubt."""
+    """Losses with all errors together, sensors assumed sound and in doubt; then biased instruments."""
     rows = [_of_doubt(surface, sensors, 60) for surface in DOUBTED for sensors in OF_DOUBT]
+    rows += [_of_doubt(part, "in doubt", 60) for part in BIASED]
     return markdown_table(DOUBT_HEAD, rows)
 
 
-def _of_doubt(surface: str, sensors: str, count: int) -> tuple[str, ...]:
-    sweep, more = load_sweep("robust-elevator-all"), {"fdi.sensor_monitor": OF_DOUBT[sensors]}
-    more |= {"faults[0].actuator": surface, "duration_s": 20.0}
-    drawn = Plan(sweep).assignments(range(count))
-    rows = fly_all(partial(fly_one, sweep), [one._replace(values=one.values | more) for one in drawn], 2)
+def _of_doubt(part: str, sensors: str, count: int) -> tuple[str, ...]:
+    sweep = load_sweep("robust-elevator-all")
+    drawn = [
+        one._replace(values=_with_fault(one, part) | {"fdi.sensor_monitor": OF_DOUBT[sensors]})
+        for one in Plan(sweep).assignments(range(count))
+    ]
+    rows = fly_all(partial(fly_one, sweep), drawn, 2)
     right = [row for row in rows if row["isolation.correct"]]
     named = [row for row in rows if row["isolation.isolated"]]
     median_s = f"{np.median([row['isolation.delay_s'] for row in right]):.2f}" if right else "-"
     found = sum(row["detection.delay_s"] is not None for row in rows)
     counts = (found, len(right), len(named) - len(right))
-    return (surface, sensors, *(f"{count_of} of {count}" for count_of in counts), median_s)
+    return (part, sensors, *(f"{count_of} of {count}" for count_of in counts), median_s)
+
+
+def _with_fault(one: Assignment, part: str) -> Document:
+    """What varies in a flight of 20 s, with the loss on another surface, or a biased instrument instead."""
+    if part in DOUBTED:
+        return {**one.values, "faults[0].actuator": part, "duration_s": 20.0}
+    (sensors, size), at_s = BIASED[part], one.values["faults[0].at_s"]
+    fault = {"sensor": sensors[one.run % len(sensors)], "type": "bias", "magnitude": size, "at_s": at_s}
+    kept = {key: value for key, value in one.values.items() if not key.startswith("faults")}
+    return kept | {"faults": [fault], "duration_s": 20.0}
 
 
 def _closely(name: str, count: int) -> str:

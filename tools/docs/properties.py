@@ -42,7 +42,7 @@ Names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of
 - A name ends with its unit: `rad_sec` is rad/s, `mps` is m/s, `lbs` is pound-force, `lbsft` is pound-force
   times foot. Otherwise it is dimensionless.
 - The body axes are X forward, Y to the right and Z down. A force is its coefficient (CX, CY, CZ) times the
-  dynamic pressure times the wing area S; a moment (Cl, Cm, Cn) also times the span b (pitch: the chord c).
+  dynamic pressure times the wing area S; a moment (Cl, Cm, Cn) also times the span b, in pitch the chord c.
 - p, q, r: body rates. V: airspeed. rho: air density. Ix, Iy, Iz, Jxz:
   [moments of inertia](results/validation.md#data-sheet-of-the-beaver). n: engine speed, rpm. pz: manifold
   pressure, inHg. P: shaft power, kW. [TM88]: [source](../REFERENCES.md).

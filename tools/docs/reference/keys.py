@@ -123,30 +123,26 @@ def _below(path: Path) -> str:
 
 
 def _table(rows: list[Row]) -> str:
-    """The rows; those that differ in the section, or the key, alone are one."""
+    """The rows; those that differ in section, in key, or in key and a few words alone are one."""
     first = 0 if any(row.part for row in rows) else 1
     every = list(dict.fromkeys(row.part for row in rows if row.part and row.value))
-    for column in (0, 1):
-        alike: dict[tuple[str, ...], list[str]] = {}
+    for differ in (("part",), ("key",), ("key", "says")):
+        alike: dict[Row, list[Row]] = {}
         for row in rows:
-            alike.setdefault((*row[:column], *row[column + 1 :]), []).append(row[column])
-        rows = [
-            Row(*rest[:column], _all_of(names, every) if column == 0 else ", ".join(names), *rest[column:])
-            for rest, names in alike.items()
-        ]
-    return markdown_table(_HEAD[first:], [row[first:] for row in _in_few_words(rows)])
+            same = row._replace(**dict.fromkeys(differ, ""))
+            alike.setdefault(same if len(differ) == 1 or _is_short(row) else row, []).append(row)
+        rows = [_joined(of, every) for of in alike.values()]
+    return markdown_table(_HEAD[first:], [row[first:] for row in rows])
 
 
-def _in_few_words(rows: list[Row]) -> list[Row]:
-    """The rows; keys of the same value that a few words describe are one row."""
-    alike: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        few = row.says and row.value and len(row.says.split()) <= _FEW and "," not in row.key + row.says
-        alike.setdefault((row.part, row.value, row.default) if few else row, []).append(row)
-    return [
-        of[0]._replace(key=", ".join(row.key for row in of), says=", ".join(row.says for row in of))
-        for of in alike.values()
-    ]
+def _is_short(row: Row) -> bool:
+    """Whether a few words describe one key."""
+    return "" not in (row.value, row.says) and len(row.says.split()) <= _FEW and "," not in row.key + row.says
+
+
+def _joined(rows: list[Row], every: list[str]) -> Row:
+    parts, keys, says = (list(dict.fromkeys(cells)) for cells in list(zip(*rows, strict=True))[:3])
+    return rows[0]._replace(part=_all_of(parts, every), key=", ".join(keys), says=", ".join(says))
 
 
 def _all_of(names: list[str], every: list[str]) -> str:

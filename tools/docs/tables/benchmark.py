@@ -69,14 +69,13 @@ def benchmark_gains() -> str:
     finds other values, as the record of the searches has it."""
     rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
     found = [(row, again) for row in rows for again in row["again"] if again.get("gain")]
-    last = [row["again"][-1] for row in rows]
-    kept = sum(again.get("gain") == 0.0 for again in last)
-    none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
-    other = len(rows) - kept - len(none)
+    last = {f"`{row['name']}` on `{row['grade']}`": row["again"][-1] for row in rows if row["again"]}
+    kept = sum(again.get("gain") == 0.0 for again in last.values())
+    none = [pair for pair, again in last.items() if "gain" not in again]
     says = (
-        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
-        f"grade, the last search found no better values for {kept}, no admissible values for "
-        f"{', '.join(none)}, and values that were not adopted for {other}."
+        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and grade, "
+        f"{len(last)} were tuned again. The last search found no better values for {kept}, no admissible "
+        f"values for {', '.join(none)}, and values that were not adopted for {len(last) - kept - len(none)}."
     )
     table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"

@@ -73,9 +73,10 @@ def benchmark_gains() -> str:
     kept = sum(again.get("gain") == 0.0 for again in last.values())
     none = [pair for pair, again in last.items() if "gain" not in again]
     says = (
-        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and grade, "
-        f"{len(last)} were tuned again. The last search found no better values for {kept}, no admissible "
-        f"values for {', '.join(none)}, and values that were not adopted for {len(last) - kept - len(none)}."
+        f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
+        f"grade, {len(last)} were tuned again. The last search found no better values for {kept}, no "
+        f"admissible values for {', '.join(none)}, and values that were not adopted for "
+        f"{len(last) - kept - len(none)}."
     )
     table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"

@@ -59,14 +59,6 @@ def test_flights_that_differ_count_for_less():
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
 
 
-def test_too_little_flight_says_what_is_missing():
-    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 0.5))
-    assert extremes.missing_healthy_minutes(found, 1.0) == pytest.approx(180.0 - 30.0)
-    assert extremes.missing_healthy_minutes(found, 10.0) == 0.0
-    assert extremes.fit_peak_tail([(np.ones(5), 0.1)]) is None
-    assert extremes.fit_peak_tail([]) is None
-
-
 def test_peaks_are_of_stretches_above_zero():
     values = np.array([0.0, 1.0, 3.0, 0.0, 0.0, 2.0, 0.0, 4.0, 5.0])
     assert extremes.peaks_between_zeros(values).tolist() == [3.0, 2.0, 5.0]

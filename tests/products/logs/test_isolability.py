@@ -16,33 +16,12 @@ from products.logs import synthetic
 SLAVED = synthetic.VEHICLE.replace("pitch_command: 0.5}, left", "pitch_command: 0.0}, left").replace(
     "pitch_command: -0.5", "pitch_command: 0.0"
 )
-FLIGHTS = 6
 
 
 def sampled(wing, folder, name, **flown):
     return load_flights_for_fit([synthetic.write_csv(folder / f"{name}.csv", synthetic.fly(**flown))], wing)[
         0
     ]
-
-
-def shares_found(wing, folder, model, loss):
-    """Share of drawn flights in which a loss of the left elevon is found within 60 s of its begin."""
-    found = []
-    for seed in range(FLIGHTS):
-        part = (100, 160, 1.0, 1.0 - loss)
-        samples = sampled(wing, folder, "drawn", duration_s=160.0, parts=(part,), seed=50 + seed)
-        rows = diagnose(samples, model)
-        found.append(bool((rows.faulty[(rows.t_s > 102) & (rows.t_s < 160)]).mean() > 0.1))
-    return np.mean(found)
-
-
-def test_the_smallest_loss_is_where_flights_begin_to_show_it(wing, wing_folder, wing_model):
-    healthy = sampled(wing, wing_folder, "said", duration_s=160.0, seed=49)
-    said = {tuple(one["surfaces"]): one for one in isolability_document(healthy, wing_model)["groups"]}
-    smallest = said[("left",)]["smallest_loss"]["60"]
-    assert 0.02 < smallest < 0.4
-    assert shares_found(wing, wing_folder, wing_model, min(3.0 * smallest, 1.0)) > 0.8
-    assert shares_found(wing, wing_folder, wing_model, smallest / 4.0) < 0.3
 
 
 def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder):

@@ -1,7 +1,5 @@
 """Regressors and least squares, by closed forms and by another road."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -114,17 +112,6 @@ def test_a_spectrum_holds_the_variance():
     assert len(regression.spectral_density(white[:100], 0.05)[0]) == 51
     shifted = regression.spectral_density(white + 7.0, 0.05)[1]
     np.testing.assert_allclose(shifted, density, rtol=1e-6)
-
-
-def test_what_a_model_predicts_does_not_depend_on_later_samples():
-    samples = small.flight(WING, 60)
-    short = replace(
-        samples,
-        **{k: getattr(samples, k)[:40] for k in ("rates", "commands", "signals", "labels", "stretch_number")},
-    )
-    whole, cut = (regression.unexplained_rates(one, WING) for one in (samples, short))
-    for one, other in zip(whole, cut, strict=True):
-        np.testing.assert_array_equal(one[:40], other)
 
 
 def test_a_flight_is_split_where_its_shortest_part_is_long_enough():

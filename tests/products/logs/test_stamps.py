@@ -1,7 +1,5 @@
 """A log whose clock jumps: a gap costs nothing, and what is left out is said."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -71,32 +69,6 @@ def test_a_time_in_another_unit_is_told(wing, tmp_path):
     columns["t_s"] = columns["t_s"] * 1e-9
     with pytest.raises(BadInput, match=r"logged at 5e\+10 Hz, allowed: up to 100000 Hz, time in seconds"):
         load_flights_for_fit([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
-
-
-DAMAGED = 51  # the row, counted from 1, whose stamp is off
-
-
-def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
-    """As a file, as text and on the page; and in the account of an identification."""
-    pytest.importorskip("pyulog")
-    from typer.testing import CliRunner
-
-    from beaver_ftc.cli.main import app
-
-    (tmp_path / "px4.yaml").write_text(synthetic.vehicle("vehicle_rates"))
-    columns = synthetic.fly(60.0, seed=8)
-    columns["t_s"][DAMAGED - 1] += JUMP_S
-    log = synthetic.write_ulog(tmp_path / "flight.ulg", columns)
-    commands = (
-        ["identify", log, "--vehicle", tmp_path / "px4.yaml", "--out", tmp_path / "px4.json"],
-        ["diagnose", log, "--model", tmp_path / "px4.json", "--out", tmp_path / "out"],
-    )
-    said = "vehicle_rates: row 51: its stamp is out of order"
-    for command in commands:
-        done = CliRunner().invoke(app, list(map(str, command)), catch_exceptions=False)
-        assert said in done.stdout
-    assert said in str(json.loads((tmp_path / "out" / "flight" / "verdict.json").read_text())["notes"])
-    assert said in (tmp_path / "out" / "flight" / "report.html").read_text()
 
 
 def test_no_row_more_than_needed_is_left_out():

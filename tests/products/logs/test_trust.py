@@ -37,13 +37,6 @@ def silent(rows):
     )
 
 
-def test_a_flight_like_those_fitted_is_credible(model):
-    rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
-    assert rows.credible.mean() == 1.0
-    assert rows.doubtful_rows == {}
-    assert "left" in set(rows.isolated_surfaces[450:])
-
-
 @pytest.mark.parametrize(("change", "says"), [
     (lambda f: f.commands.__setitem__((slice(300, None), 0), f.commands[300:, 0] * 8.0),
      "command of right is outside"),
@@ -95,19 +88,6 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
     still[300:320] = 0.1 * np.arange(20)
     flown = small.flight(model, n=600, seed=4, unchanged_s={"q_rad_s": still})
     assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
-
-
-def test_rows_use_nothing_later(model):
-    flown = small.flight(model, n=600, seed=4)
-    flown.rates[300:] += 5.0
-    whole = diagnose(flown, model)
-    part = {
-        name: getattr(flown, name)[:350]
-        for name in ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
-    }
-    cut = diagnose(small.flight(model, n=600, seed=4, **part), model)
-    np.testing.assert_array_equal(cut.credible, whole.credible[:350])
-    np.testing.assert_array_equal(cut.effectiveness_low, whole.effectiveness_low[:350])
 
 
 @pytest.mark.parametrize(("factor", "says"), [

@@ -7,31 +7,7 @@ import pytest
 from beaver_ftc.aircraft import aircraft as loading
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_aircraft.derive import derivation, outline
-from beaver_ftc_aircraft.derive.derivation import Source, source_of
-
-from .known import TRAINER
-
-
-def test_an_aircraft_is_found_by_its_name_its_folder_or_its_model(tmp_path, monkeypatch):
-    stranger = source_of("jsbsim:c172p")
-    assert (stranger.name, stranger.folder, stranger.says) == ("c172p", None, "jsbsim:c172p")
-    assert stranger.target == loading.derived_folder("c172p")
-    beaver = source_of("beaver")
-    assert (beaver.name, beaver.folder, beaver.target, beaver.says) == (
-        "beaver", loading.load("beaver").folder, None, "beaver"
-    )  # fmt: skip
-    trainer = source_of(str(TRAINER))
-    assert (trainer.name, trainer.model, trainer.folder) == ("trainer", TRAINER / "trainer.xml", TRAINER)
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    (folder / "mine.xml").write_text((TRAINER / "trainer.xml").read_text())
-    (folder / "other.txt").write_text("")
-    for reference in (folder, folder / "mine.xml"):
-        assert source_of(str(reference)) == Source("mine", folder / "mine.xml")
-    (folder / "mine.xml").rename(folder / "yours.xml")
-    for wrong in (folder, folder / "mine.xml", folder / "other.txt", "x" * 90):
-        with pytest.raises(BadInput, match="cannot be derived, allowed: jsbsim:NAME, a built-in name"):
-            source_of(str(wrong))
+from beaver_ftc_aircraft.derive.derivation import Source
 
 
 def test_only_what_was_derived_is_written_over(tmp_path):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from beaver_ftc_aircraft.derive import fit
-from beaver_ftc_aircraft.derive.sample import REACHES
 
 from .known import aircraft, moving, states
 
@@ -30,18 +29,3 @@ def test_coefficients_follow_from_the_accelerations_and_errors_from_the_coeffici
     one = fit._accelerations(samples, trainer)
     size = samples.y[:, 3].mean() * 15.1
     assert one == pytest.approx([size * 10.4 / 1310.0, size * 1.48 / 1890.0, size * 10.4 / 2870.0])
-
-
-def test_the_error_map(trainer, samples, changed):
-    first = moving(trainer, samples, [0.001, 0.002, 0.003])
-    second = moving(trainer, states(trainer, seed=2), [0.002, 0.001, 0.0])
-    flown = states(trainer, n=50, seed=3)
-    flown.y[:10, 2] = 90.0  # in no box
-    flown = moving(trainer, flown, [0.003, 0.0, 0.004])
-    told, worst = fit.map_of(trainer, (first, second), flown)
-    assert len(told["boxes"]) == len(REACHES)
-    errors = [fit.errors_of(trainer, of)[of.age == 0].max(axis=0) for of in (first, second)]
-    assert worst[:2] == pytest.approx(np.array(errors))
-    outermost = [told["boxes"][-1][f"error_{axis}_rad_s2"][0][-1] for axis in "pqr"]
-    assert outermost == pytest.approx(1.3 * worst.max(axis=0) + 1e-7, rel=1e-4)
-    assert not changed({"map": told, "worst": worst})

@@ -12,7 +12,7 @@ from beaver_ftc.plant.instrumented import usual_view
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc_aircraft.derive import derivation
 from beaver_ftc_aircraft.derive.derivation import Source
-from beaver_ftc_aircraft.derive.surfaces import differences, find_surfaces, view_of
+from beaver_ftc_aircraft.derive.surfaces import differences, find_surfaces
 
 from . import foreign
 from .foreign import LEFT, RIGHT
@@ -129,15 +129,6 @@ def test_one_property_by_two_commands_is_no_surface(tmp_path):
         BadInput, match="aileron and elevator commands both move fcs/elevon, allowed: one surface"
     ):
         find_surfaces(path, own, {})
-
-
-def test_two_values_of_one_deflection_are_no_function():
-    """One goes on where the other stands at its stop."""
-    command = np.linspace(-1.0, 1.0, 41)
-    assert view_of(np.clip(command, -0.5, 0.5), command, 1.0) is None
-    assert view_of(command, np.clip(command, -0.5, 0.5), 1.0) == pytest.approx(
-        np.array([(-1.0, -0.5), (-0.5, -0.5), (0.5, 0.5), (1.0, 0.5)])
-    )
 
 
 @pytest.mark.parametrize(("name", "off"), [("787-8", 0.0), ("X15", 0.0), ("T38", 0.0), ("f16", 0.5)])

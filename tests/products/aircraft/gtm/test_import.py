@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.io import savemat
-from tools.gtm.specification import DATABASE
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import UnknownAircraft
@@ -42,16 +41,6 @@ def test_other_bytes_are_refused_in_a_line(tmp_path, content, says):
     assert says in str(wrong.value)
     assert "\n" not in str(wrong.value)
     assert "allowed: the data base of github.com/nasa" in str(wrong.value)
-
-
-def test_no_file_and_a_folder_are_refused(tmp_path):
-    for path, says in (
-        (tmp_path / "none.mat", "cannot be read (No such file or directory)"),
-        (tmp_path, "is no file of this kind"),
-    ):
-        with pytest.raises(BadInput) as wrong:
-            read(path)
-        assert str(wrong.value) == f"{path}: {says}, allowed: {ALLOWED}"
 
 
 VERSION = "Polynominal Fit, with damage"
@@ -119,22 +108,6 @@ def test_one_wrong_number_is_refused_by_the_name_of_its_table(tmp_path, table, o
         read(tmp_path / "x.mat")
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
-def test_half_the_data_base_is_refused(data, tmp_path, share):
-    whole = (data / DATABASE).read_bytes()
-    (tmp_path / "half.mat").write_bytes(whole[: int(share * len(whole))])
-    with pytest.raises(BadInput, match=r"is no whole MATLAB file|has no"):
-        read(tmp_path / "half.mat")
-
-
-def test_another_folder_in_the_way_is_left_alone(tmp_path):
-    (tmp_path / "gtm").mkdir()
-    (tmp_path / "gtm" / "mine.txt").write_text("mine")
-    with pytest.raises(BadInput, match="was not imported, allowed: another folder"):
-        conversion.convert(tmp_path / "x.mat", tmp_path)
-    assert (tmp_path / "gtm" / "mine.txt").read_text() == "mine"
-
-
 def test_every_surface_and_engine_has_all_failures(bench):
     effectors = [*parameters()["surfaces"], "left_engine", "right_engine"]
     assert len(effectors) == 19
@@ -164,15 +137,6 @@ def test_a_lost_surface_has_no_effect_and_a_case_takes_what_it_says(bench, numbe
         bench.fdm[f"fcs/{surface}-cmd-rad"] = 0.0
     assert {surface for surface, rad in still.items() if rad == 0.0} == set(of["takes"]), name
     assert set(stand.values()) == {0.05}
-
-
-def test_the_first_of_two_cases_is_in_force(bench):
-    bench.damage(5)
-    bench.fdm["failures/damage/fin-off"] = 1.0
-    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
-    number = bench.fdm["failures/damage-case"]
-    bench.damage(0)
-    assert number == 2
 
 
 def test_what_was_imported_before_is_replaced_and_nothing_else(tmp_path, monkeypatch):

@@ -16,7 +16,6 @@ from tools.drawn.certificates import altered, places
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
-from beaver_ftc.results.writer import run
 from beaver_ftc_assurance.certificates import check_certificate
 from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import failures
@@ -141,23 +140,9 @@ def test_the_checker_accepts_a_flights_certificate(name):
     left_out = {said["column"] for said in certificate["without"]} - {None}
     assert stated | left_out == set_at_end(log)
     assert all(said["column"] for said in certificate["statements"])
+    assert left_out == set() or name in ("gyros", *CHANCE)  # with exact gyros all of a surface is certified
     assert bool(stated) == bool(log["detected"].any())
     assert len(as_text(certificate)) <= 200_000
-
-
-@pytest.mark.parametrize("name", [name for name in FLIGHTS if name not in ("no fault", "gyros", *CHANCE)])
-def test_with_exact_gyros_every_alarm_and_exclusion_of_a_surface_is_certified(name):
-    certificate, log = flown(name)
-    assert {said["column"] for said in certificate["statements"]} - {None} == set_at_end(log)
-
-
-@pytest.mark.parametrize("name", CHANCE)
-def test_an_alarm_of_chance_is_certified_with_level_statistic_and_variances(name):
-    certificate, log = flown(name)
-    alarm = next(said for said in certificate["statements"] if said["what"] is None)
-    (value, _), (limit, _) = alarm["sides"]
-    assert value / limit <= log[alarm["likelihood"]][alarm["frame"]] * (1.0 + 1e-5)
-    assert {"level", "R", "P", "frames"} <= set(alarm)
 
 
 def test_chance_excludes_what_moves_nothing_where_it_raised_the_alarm():
@@ -191,20 +176,6 @@ def test_an_alarm_of_instruments_is_that_of_the_log():
         assert refusals(name, with_digest(renamed))
 
 
-def test_that_a_reading_is_missing_is_what_the_log_says():
-    """Of the fourth instrument, from its fault on; of no other, and in no other row."""
-    certificate, log = flown("no vane")
-    (said,) = certificate["statements"]
-    assert (said["frame"], said["missing"]) == (100, [3])
-    assert np.isnan(log["watch_missing"][:100]).all()
-    assert (log["watch_missing"][100:] == 3.0).all()
-    assert np.isnan(flown("an altimeter")[1]["watch_missing"]).all()
-    other = log | {"watch_missing": np.full(len(log["t_s"]), 4.0)}
-    assert refusals("no vane", certificate, other) == [
-        "alarm: the log says that another reading is missing, or none"
-    ]
-
-
 def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
     (tmp_path / "text.json").write_text("no certificate")
     (tmp_path / "list.json").write_text("[1, 2]")
@@ -236,14 +207,6 @@ def test_a_parameter_that_varies_is_not_held_to_be_one_number():
     assert refused == [
         "aileron loss_of_effectiveness that varies excluded: theta of this type is not one number"
     ]
-
-
-def test_a_jam_excludes_every_type_that_moves_otherwise():
-    """One statement each; the true type has none, whatever it is compared with."""
-    certificate, _ = flown("any type")
-    courses = {said["what"] for said in certificate["statements"] if said.get("theta") == "course"}
-    assert {f"aileron hardover {way}" for way in ("up", "down")} <= courses
-    assert {"aileron bias", "aileron rate_limit"} <= courses
 
 
 ALTERED = [
@@ -441,14 +404,6 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
         main()
     assert ended.value.code == 2
     assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
-
-
-def test_a_run_writes_the_certificate_of_its_flight(tmp_path):
-    scenario = bf.load(
-        {"name": "test", "duration_s": 3.0, "reference": SINES, "faults": [STUCK]} | {"fdi": SOUND}
-    )
-    run(scenario, tmp_path, report=False, certified=True)
-    assert (tmp_path / "test/certificate.json").read_text() == as_text(bf.fly(scenario).certificate())
 
 
 @pytest.mark.parametrize("kind", range(N_TYPES))

@@ -112,12 +112,6 @@ class Clock:
         return self.now_is
 
 
-def test_the_worker_count_changes_nothing(tmp_path):
-    plan = plan_of(tmp_path, **SMALL)
-    one, two = (run_plan(plan, tmp_path / f"{n}", n) for n in (1, 2))
-    assert {**one, "date": 0} == {**two, "date": 0}
-
-
 def test_a_flight_that_cannot_be_flown_shows_nothing(tmp_path, monkeypatch):
     def broken(*_):
         raise RuntimeError("out of order")
@@ -172,11 +166,3 @@ def test_the_plan_of_a_stranger_is_text_in_page_and_paper(tmp_path):
     assert "<script>" not in made["evidence.html"]
     assert "&lt;script&gt;" in made["evidence.html"]
     assert made["evidence.pdf"].startswith(b"%PDF")
-
-
-def test_without_what_writes_pdf_nothing_flies(tmp_path, monkeypatch):
-    plan = plan_of(tmp_path, **SMALL)
-    monkeypatch.setattr(shown, "find_spec", lambda name: None)
-    with pytest.raises(BadInput, match=r"allowed: pip install 'beaver-ftc\[evidence\]'"):
-        run_plan(plan, tmp_path / "out")
-    assert not (tmp_path / "out").exists()

@@ -25,12 +25,6 @@ def test_the_name_is_registered_in_either_order_of_imports(imports):
     assert shown.stdout.split() == [f"{ours}Env", f"{ours}VectorEnv"]
 
 
-def test_without_gymnasium_nothing_is_imported_for_it():
-    script = "import sys, beaver_ftc; print([m for m in sys.modules if m.startswith('gymnasium')])"
-    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert shown.stdout.strip() == "[]"
-
-
 def test_it_is_made_by_its_name_once_the_package_is_imported(tmp_path):
     script = (
         "import beaver_ftc, gymnasium, numpy as np\n"

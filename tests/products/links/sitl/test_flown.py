@@ -104,20 +104,6 @@ def test_the_example_finds_its_fault_under_the_small_autopilot():
     assert flight.passed, flight
 
 
-@pytest.mark.parametrize("packets_hz", [10, 5000])
-def test_rates_that_cannot_be_flown(packets_hz):
-    with pytest.raises(BadInput, match=f"at {packets_hz} Hz, allowed: 20 to 4000 Hz, or --rate"):
-        at_rate(scenario(), packets_hz)
-
-
-def test_a_flight_begun_anew_is_the_first_one_again():
-    packets, _ = recorded(60, 100)
-    vehicle = Vehicle(scenario(), pulses=True)
-    first = flown_by(vehicle, packets)
-    second = flown_by(vehicle, packets)
-    assert np.array_equal(first.to_numpy(), second.to_numpy(), equal_nan=True)
-
-
 def test_the_throttle_moves_the_engine():
     given = {}
     for pulse in (1000, 2000):

@@ -114,12 +114,6 @@ def test_a_flight_that_is_over_answers_nothing(ardupilot):
     assert ardupilot.take(1) is None
 
 
-def test_silence_waits(ardupilot):
-    assert [ardupilot.take(k, now_s=t) for k, t in enumerate((0.0, 0.1, 7.3))] == [0.0025, 0.005, 0.0075]
-    assert ardupilot.counts["silences"] == 1
-    assert ardupilot.link.document()["longest_silence_s"] == 7.2
-
-
 @pytest.fixture
 def px4():
     body, link, mavlink = Stub(250.0), Link(), Mavlink()

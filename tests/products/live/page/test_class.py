@@ -63,16 +63,6 @@ def test_taken_back_it_is_refused_from_the_next_request_on(site):
     assert answers(told) == []
 
 
-def test_a_message_of_the_server_is_not_a_guests_to_send(site):
-    """What it says to the flight goes as page 0, of which no page has the number."""
-    for text in ("called 1 Ada", "end", "joined 2", '{"do":"end"}', '{"do":"let","on":true,"by":"x"}'):
-        assert [ok for ok, _ in answers(as_guest(site, {"type": "websocket.receive", "text": text}))] == [
-            False
-        ]
-    assert {page for page, _ in site.asked} == {0}
-    assert not any(text == "end" or "Ada" in text for _, text in site.asked)
-
-
 @pytest.mark.parametrize(
     ("name", "taken"),
     [

@@ -64,10 +64,6 @@ def answer(link, **request):
     return until(link, "ack")
 
 
-def test_the_address_works_once(cockpit, cookie):
-    assert status(cockpit.address) == 403
-
-
 def test_without_the_cookie_nothing_is_served(cockpit, cookie):
     assert status(cockpit.home) == 403
     assert status(f"{cockpit.home}static/js/main.js") == 403
@@ -170,11 +166,6 @@ def test_it_ends_cleanly_with_a_page_open(tmp_path):
         ["ps", "-o", "pid=", "--ppid", str(cockpit.process.pid)], capture_output=True, text=True, check=False
     )
     assert children.stdout.split() == []
-
-
-def test_a_scenario_that_is_not_there_is_said_in_a_line(tmp_path):
-    with pytest.raises(AssertionError, match="did you mean"):
-        started(tmp_path, "fault-fre")
 
 
 def test_a_flight_that_cannot_be_trimmed_ends_it_in_a_line(tmp_path):

@@ -183,15 +183,6 @@ def test_a_log_too_slow_or_uneven_is_refused(log):
         diagnose_aircraft(uneven, vehicle, BEAVER)
 
 
-def test_turbulence_wants_the_attitude(log, tmp_path):
-    recording, vehicle = log
-    (tmp_path / "rough.yaml").write_text("name: rough\nfdi: {bounds: {turbulence: light}}\n")
-    rough = load_diagnosed("beaver", str(tmp_path / "rough.yaml"))
-    level = without(vehicle, attitude={"roll": "roll_rad", "pitch": "pitch_rad"})
-    with pytest.raises(BadInput, match=r"attitude.yaw: is missing, allowed: its column, where fdi.bounds"):
-        diagnose_aircraft(recording, level, rough)
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -256,9 +247,3 @@ def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
     innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
     least, greatest = stepped._explaining_losses(innovation, bound[None, :, None], expected)
     assert least[0, 0] <= theta <= greatest[0, 0]
-
-
-@given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
-def test_the_latest_greatest_looks_back_only(values, reach):
-    found = stepped._sliding_maximum(np.array(values)[:, None], reach)[:, 0]
-    assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]

@@ -40,13 +40,6 @@ def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
-def test_a_gap_ends_what_is_known():
-    run = (T_S >= 10.0).astype(int)
-    climb = energy.energy_climb_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
-    assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
-    np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
-
-
 def test_an_alarm_while_energy_falls_names_an_engine_after_three_seconds_and_no_surface():
     """It stays named while nothing rises."""
     faulty = ((T_S >= 5.0) & (T_S < 15.0)).astype(int)
@@ -58,17 +51,16 @@ def test_an_alarm_while_energy_falls_names_an_engine_after_three_seconds_and_no_
     assert set(named[(T_S < 4.95) | (T_S > 15.05)]) == {""}
 
 
-@given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
-def test_a_name_uses_nothing_later(rows, data):
-    faulty = np.array([int(one) for one, _ in rows])
-    climb = np.array([-2.0 if falls else 0.5 for _, falls in rows])
+@given(st.lists(st.tuples(st.integers(0, 1), st.booleans()), min_size=2, max_size=60), st.integers(1, 60))
+def test_a_name_uses_nothing_later(rows, cut):
+    faulty, falls = np.array(rows).T
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
-    cut = data.draw(st.integers(1, len(rows)))
-    since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.withdraw_surfaces(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.withdraw_surfaces(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut])
+    given = t_s, faulty, names, np.where(falls, -2.0, 0.5), np.maximum(t_s - 2.0, 0.0)
+    whole, short = (
+        energy.withdraw_surfaces(*of[:4], -1.0, of[4]) for of in (given, [one[:cut] for one in given])
+    )
     assert whole[:cut].tolist() == short.tolist()
-    assert all((name == "") == (flag == 0) for name, flag in zip(whole, faulty, strict=True))
+    assert ((whole == "") == (faulty == 0)).all()
 
 
 def recording(**columns):

@@ -10,7 +10,7 @@ from beaver_ftc_logs.identification import (
     fit_output_error,
     scale_if_better,
 )
-from beaver_ftc_logs.samples import Samples, scale_by_airspeed
+from beaver_ftc_logs.samples import Samples
 from products.logs import small
 
 MODEL = small.model()
@@ -33,17 +33,6 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
         assert scale_if_better(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
     assert scale_if_better([pressed(flight)], told)[1] == told
-
-
-def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
-    flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
-    found = scale_by_airspeed(flight, 20.0)
-    assert found.commands[:50] == pytest.approx(flight.commands[:50])
-    assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
-    stopped = scale_by_airspeed(replace(flight, airspeed=np.zeros(100)), 20.0)
-    assert stopped.commands == pytest.approx(0.1 * flight.commands)
-    assert (found.signals[:50] == 0.0).all()
-    assert found.signals[50:] == pytest.approx(-0.5 * flight.rates[50:])
 
 
 def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
+from beaver_ftc_logs import fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.samples import whiten_samples
@@ -77,23 +77,6 @@ def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
     short = bank_posterior(samples.first_samples(new, 600), moving, bank)
     for part, cut in zip(both, short, strict=True):
         np.testing.assert_array_equal(part[:600], cut)
-
-
-def test_bounds_lean_on_no_prior_where_laws_differ():
-    """With nothing known but how rare faults are, each of eleven levels is as likely: 90 % are ten."""
-    model = small.model(small.WING | {"other_laws": True})
-    bank, samples = build_bank(model), small.flight(model, 50)
-    nothing = np.tile(bank.prior_probability, (50, 1))
-    rows = diagnose.rows_of_posterior(samples, model, bank, nothing)
-    assert (rows.effectiveness_high - rows.effectiveness_low >= 0.9).all()
-    plain = small.model()
-    rows = diagnose.rows_of_posterior(
-        samples,
-        plain,
-        build_bank(plain),
-        np.tile(build_bank(plain).prior_probability, (50, 1)),
-    )
-    assert (rows.effectiveness_low > 0.9).all()
 
 
 @pytest.mark.parametrize("colour", [AVERAGE, (1.0,)])

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.diagnose import _withdraw_contradicted, diagnose, healthy_residual
-from beaver_ftc_logs.regression import unexplained_rates
+from beaver_ftc_logs.diagnose import _withdraw_contradicted, diagnose
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
@@ -42,15 +41,3 @@ def test_the_other_surface_is_taken_back_and_its_bounds_with_it(biased, wing_mod
 def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
     assert (named(biased, wing_model, "left").isolated_surfaces == "left").all()
     assert (named(biased, wing_model, "right+left").isolated_surfaces == "right+left").mean() < 1.0
-
-
-def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):
-    rest, late = (
-        healthy_residual(wing_model, *unexplained_rates(biased, wing_model)),
-        biased.t_s > FROM_S + 1.0,
-    )
-    assert rest[~late][10:590].std(axis=0) == pytest.approx(1.0, abs=0.15)
-    whiten = np.linalg.inv(np.linalg.cholesky(np.diag(synthetic.NOISE**2)))
-    expected = whiten @ (BIAS * synthetic.LEFT.sum(axis=0))
-    mean = rest[late].mean(axis=0)
-    assert mean @ expected / np.linalg.norm(mean) / np.linalg.norm(expected) > 0.98

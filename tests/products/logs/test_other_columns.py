@@ -37,18 +37,6 @@ def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
     assert rows.credible[rows.t_s > 90.0].mean() < 0.1
 
 
-def test_one_rate_in_another_unit_is_refused(flown, wing_model):
-    with pytest.raises(BadInput, match="columns, signs and units as in the flights of the model"):
-        diagnose(replace(flown, rates=flown.rates * np.array([57.3, 1.0, 1.0])), wing_model)
-
-
-def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder, wing_model):
-    columns = synthetic.fly(120.0, parts=((0, 120, 1.0, 0.0),), seed=42)
-    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "lost.csv", columns)], wing)[0]
-    rows = diagnose(samples, wing_model)
-    assert rows.faulty[rows.t_s > 30.0].mean() > 0.9
-
-
 @pytest.fixture(scope="module")
 def n_signal_lags():
     """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""

@@ -30,27 +30,17 @@ def as_guest(site, *said, **more):
 ENTERED = [(0, "joined 1"), (0, "called 1 guest 1")]
 
 
+@pytest.mark.parametrize("invited", [False, True])
 @pytest.mark.parametrize("do", sorted(set(EVERYTHING) - {"name"}))
-def test_a_guest_who_looks_on_has_no_say(site, do):
-    told = as_guest(site, says(do=do, n=7, **EVERYTHING[do]), says(do=do, n=7, **EVERYTHING[do]))
-    assert site.asked == [*ENTERED, (0, "left 1")]
-    acknowledged = [json.loads(each["text"]) for each in told if '"ack"' in each.get("text", "")]
-    assert [each["n"] for each in acknowledged] == [7, 7]
-    for ok, words in answers(told):
-        assert not ok
-        assert words.startswith(f"{do}: ")
-    assert not any(seat.is_invited for seat in site.gate.guests)
-    assert site.said == []
-
-
-@pytest.mark.parametrize("do", sorted(set(EVERYTHING) - {"name"}))
-def test_a_guest_who_is_invited_breaks_and_does_nothing_else(site, do):
-    site.gate.invite(1, on=True)
-    told = as_guest(site, says(do=do, **EVERYTHING[do]))
+def test_a_guest_who_is_invited_breaks_and_has_no_other_say(site, do, invited):
+    site.gate.invite(1, on=invited)
+    told = as_guest(site, says(do=do, n=7, **EVERYTHING[do]))
     reached = [text for page, text in site.asked if page]
-    assert (len(reached) == 1) == (do in ("break", "repair", "blow"))
-    assert len(answers(told)) + len(reached) == 1
-    assert not site.gate.guests[1].is_invited
+    assert len(reached) == (invited and do in ("break", "repair", "blow"))
+    assert [ok for ok, _ in answers(told)] == [False] * (1 - len(reached))
+    assert all(words.startswith(f"{do}: ") for _, words in answers(told)) or invited
+    assert [each for each in site.asked if not each[0]] == [*ENTERED, (0, "left 1")]
+    assert (site.said, site.gate.guests[1].is_invited) == ([], False)
 
 
 def test_taken_back_it_is_refused_from_the_next_request_on(site):

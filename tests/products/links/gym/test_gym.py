@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.loop import fly
-from flying import Memory, scenario
+from flying import scenario
 
 gymnasium = pytest.importorskip("gymnasium")
 
@@ -22,40 +21,8 @@ def test_it_keeps_gymnasiums_rules():
     check_env(gymnasium.make(ID, scenario="fault-free").unwrapped, skip_render_check=True)
 
 
-class _Wave:
-    """A law that does what the actions of the test do."""
-
-    def reset(self, context):
-        self.context, self.k = context, 0
-
-    def step(self, measured, reference, verdict):
-        self.k += 1
-        low, high = self.context.travel_rad
-        share, trim = _action(self.k)[1], self.context.trim_rad.copy()
-        trim[1] += share * (trim[1] - low[1] if share < 0 else high[1] - trim[1])
-        return trim
-
-
 def _action(k):
     return np.array([0.0, 0.02 * np.sin(0.05 * k), 0.0, 0.0])
-
-
-def test_an_episode_is_a_flight():
-    flown = scenario(duration_s=2, faults=[FAULT])
-    log = Memory()
-    fly(flown, log, law=_Wave())
-    env = BeaverEnv(flown)
-    seen, _ = env.reset()
-    rows = [seen]
-    over = False
-    while not over:
-        seen, _, departed, over, info = env.step(_action(len(rows)))
-        rows.append(seen)
-    assert not departed
-    assert len(rows) == 200
-    assert np.array(rows)[:, 1] * 0.1 == pytest.approx(log["q_rad_s"], abs=1e-12)
-    assert info["metrics"]["frames"] == 200
-    assert info["metrics"]["fault"]["actuator"] == "elevator"
 
 
 def test_an_action_held_over_frames_is_the_same_given_frame_by_frame():

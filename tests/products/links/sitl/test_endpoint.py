@@ -61,18 +61,6 @@ def served(protocol, flown=None, **options):
     at.flight = came[0]
 
 
-def test_a_flight_over_udp():
-    with served("ardupilot") as at:
-        autopilot = peers.Ardupilot(Small().outputs, 100)
-        autopilot.fly(at.address, 500)
-    link = at.flight.metrics["link"]
-    assert (autopilot.count, link["frames"], link["repeated"]) == (99, 99, 0)
-    assert at.flight.metrics["frames"] == 100
-    assert at.flight.metrics["flight"]["law"] == "ArduPilot"
-    assert 0 < link["latency_ms"]["median"] <= link["latency_ms"]["p99"] <= link["latency_ms"]["largest"]
-    assert link["interval_ms"]["mean"] > 0
-
-
 def test_a_flight_over_tcp_with_a_second_caller_and_a_ground_station():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.bind(("127.0.0.1", 0))

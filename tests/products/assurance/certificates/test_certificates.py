@@ -30,6 +30,15 @@ LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.
 STUCK = {"type": "stuck", "actuator": "aileron", "position_deg": 5, "at_s": 0.5}
 SOUND = {"fault_class": "all", "sensor_monitor": "never"}
 DOUBTED = {"sensor_monitor": "always"}
+
+
+def chance(surface, **bounds):
+    """A flight whose verdict is that of the statistical test."""
+    fdi = {"statistical": {}, "authority": "statistical", "bounds": {"sensors": GYROS, **bounds}}
+    fault = LOSS | {"actuator": surface, "magnitude": 0.9, "at_s": 1.0}
+    return {"faults": [fault], "sensors": GYROS, "fdi": fdi}
+
+
 FLIGHTS = {
     "loss": {"faults": [LOSS]},
     "loss with release": {"faults": [LOSS | {"end_s": 0.8}]},
@@ -60,34 +69,10 @@ FLIGHTS = {
         "initial": {"airspeed_mps": 50},
         "faults": [LOSS],
     },
-    "chance": {
-        "faults": [{**LOSS, "actuator": "rudder", "magnitude": 0.9, "at_s": 1.0}],
-        "sensors": GYROS,
-        "fdi": {
-            "statistical": {},
-            "authority": "statistical",
-            "bounds": {"sensors": GYROS, "coefficients": 0.03},
-        },
-    },
-    "chance, a step": {
-        "faults": [{**LOSS, "actuator": "aileron", "magnitude": 0.9, "at_s": 1.0}],
-        "sensors": GYROS,
-        "fdi": {
-            "statistical": {},
-            "authority": "statistical",
-            "bounds": {"sensors": GYROS, "coefficients": 0.03},
-        },
-    },
-    "chance, in moving air": {
-        "faults": [{**LOSS, "actuator": "aileron", "magnitude": 0.9, "at_s": 1.0}],
-        "sensors": GYROS,
-        "environment": {"turbulence": "dryden", "severity": "light"},
-        "fdi": {
-            "statistical": {},
-            "authority": "statistical",
-            "bounds": {"sensors": GYROS, "turbulence": "light"},
-        },
-    },
+    "chance": chance("rudder", coefficients=0.03),
+    "chance, a step": chance("aileron", coefficients=0.03),
+    "chance, in moving air": chance("aileron", turbulence="light")
+    | {"environment": {"turbulence": "dryden", "severity": "light"}},
     "an altimeter": {
         "faults": [{"sensor": "altitude", "type": "bias", "magnitude": 3, "at_s": 1.0}],
         "fdi": DOUBTED,
@@ -176,15 +161,20 @@ def test_an_alarm_of_instruments_is_that_of_the_log():
         assert refusals(name, with_digest(renamed))
 
 
+def check(*arguments):
+    """Exit status of the checker by itself, what it prints, and what it says on standard error."""
+    command = [sys.executable, CHECKER, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
 def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
     (tmp_path / "text.json").write_text("no certificate")
     (tmp_path / "list.json").write_text("[1, 2]")
     for name in ("nothing", "text.json", "list.json", "."):
-        command = [sys.executable, CHECKER, name, "log.parquet"]
-        checked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert checked.returncode == 1
-        assert checked.stderr.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")
-        assert checked.stderr.count("\n") == 1
+        status, _, says = check(tmp_path / name, "log.parquet")
+        assert (status, says.count("\n")) == (1, 1)
+        assert says.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")
 
 
 def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
@@ -367,43 +357,28 @@ def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
 
 
 def test_by_the_command_line(tmp_path, monkeypatch, capsys):
+    def beaver(*arguments):
+        monkeypatch.setattr(sys, "argv", ["beaver-ftc", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code or 0, *capsys.readouterr()
+
     monkeypatch.chdir(tmp_path)
     scenario = {"name": "mine", "duration_s": 1.0, "reference": SINES, "faults": [LOSS]}
     Path("mine.yaml").write_text(json.dumps(scenario))
-    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
-    checked = subprocess.run(
-        [sys.executable, CHECKER, "runs/mine"], capture_output=True, text=True, check=False
-    )
-    assert (checked.returncode, checked.stdout.splitlines()[-1]) == (0, "3 statements hold")
-    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "check", "runs/mine"])
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
-    assert capsys.readouterr().out == checked.stdout
+    fly = "run", "mine.yaml", "--certificate", "--no-report"
+    assert beaver(*fly)[0] == 0
+    found = status, printed, _ = check("runs/mine")
+    assert (status, printed.splitlines()[-1]) == (0, "3 statements hold")
+    assert beaver("check", "runs/mine")[:2] == found[:2]
     written = Path("runs/mine/certificate.json")
     written.write_text(written.read_text().replace('"frame":51', '"frame":52', 1))
-    checked = subprocess.run(
-        [sys.executable, CHECKER, "runs/mine/certificate.json", "runs/mine/log.parquet"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert checked.returncode == 1
-    assert checked.stderr == "SHA-256 does not match: the file was edited, or belongs to another log\n"
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 1
-    capsys.readouterr()
-    monkeypatch.setattr(sys, "argv", ["beaver-ftc", "run", "mine.yaml", "--certificate", "--no-report"])
+    status, _, says = check(written, "runs/mine/log.parquet")
+    assert (status, beaver("check", "runs/mine")[0]) == (1, 1)
+    assert says == "SHA-256 does not match: the file was edited, or belongs to another log\n"
     Path("mine.yaml").write_text(json.dumps(scenario | {"fdi": {"scheme": "zhang2005"}}))
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    assert "mine: fdi.scheme: 'zhang2005'" in capsys.readouterr().err
+    status, _, says = beaver(*fly)
+    assert (status, "mine: fdi.scheme: 'zhang2005'" in says) == (2, True)
 
 
 @pytest.mark.parametrize("kind", range(N_TYPES))

@@ -4,24 +4,22 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 PARTS = ((60, 120, 1.0, 0.5), (160, 220, 0.4, 1.0))
 
 
 @pytest.fixture(scope="module")
-def flown(wing, wing_folder):
-    columns = synthetic.fly(280.0, parts=PARTS, seed=11, trim=(0.12, -0.22), gain=0.95)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "flown.csv", columns)], wing)[0]
+def flown():
+    return synthetic.fly(280.0, parts=PARTS, seed=11, trim=(0.12, -0.22), gain=0.95)
 
 
 @pytest.fixture(scope="module")
-def rows(flown, wing_model):
-    return diagnose(flown, wing_model)
+def rows(flown, sampled, wing_model):
+    return diagnose(sampled(columns=flown), wing_model)
 
 
-def test_faults_are_named_and_measured(flown, rows):
+def test_faults_are_named_and_measured(rows):
     for begin, end, surface, level in ((65, 120, 1, 0.5), (165, 220, 0, 0.4)):
         within = (rows.t_s > begin) & (rows.t_s < end)
         assert np.median(rows.effectiveness[within, surface]) == pytest.approx(level, abs=0.101)
@@ -31,10 +29,8 @@ def test_faults_are_named_and_measured(flown, rows):
 
 
 @pytest.mark.parametrize("cut", [400, 650])
-def test_cutting_the_flight_short_changes_no_earlier_row(wing, wing_folder, wing_model, rows, cut):
-    columns = synthetic.fly(280.0, parts=PARTS, seed=11, trim=(0.12, -0.22), gain=0.95)
-    path = synthetic.write_csv(wing_folder / f"cut-{cut}.csv", columns, slice(0, cut))
-    short = diagnose(load_flights_for_fit([path], wing)[0], wing_model)
+def test_cutting_the_flight_short_changes_no_earlier_row(flown, sampled, wing_model, rows, cut):
+    short = diagnose(sampled(columns={name: of[:cut] for name, of in flown.items()}), wing_model)
     for field in ("t_s", "faulty", "isolated_surfaces", "effectiveness", "fault_probability", "credible"):
         assert np.array_equal(getattr(short, field), getattr(rows, field)[:cut]), field
 
@@ -44,14 +40,3 @@ def test_bounds_are_in_order_and_hold_the_estimate(rows):
     assert (rows.effectiveness_high <= 1).all()
     assert (rows.effectiveness_low <= rows.effectiveness).all()
     assert (rows.effectiveness <= rows.effectiveness_high).all()
-
-
-def test_events_are_as_few_as_the_faults(rows, wing):
-    from beaver_ftc_logs.findings import events_to_show, fault_events
-
-    events = events_to_show(fault_events(rows, list(wing.surfaces)))
-    named = [event["named"] for event in events if event["to_s"] - event["from_s"] > 20]
-    assert named == ["left", "right"]
-    assert len(events) <= 5
-    for event, begins in zip([e for e in events if e["to_s"] - e["from_s"] > 20], (60, 160), strict=True):
-        assert begins <= event["from_s"] < begins + 5

@@ -40,11 +40,6 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
     assert np.mean(rates) < 2.5 * asked
 
 
-def test_more_flight_gives_the_threshold_of_the_closed_form():
-    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 100.0))
-    assert extremes.threshold_for_rate(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
-
-
 def test_flights_that_differ_count_for_less():
     """One flight with all the high peaks: they are one thing that happened, not many."""
     rng = np.random.default_rng(1)

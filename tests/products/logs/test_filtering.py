@@ -15,14 +15,11 @@ from beaver_ftc_logs.filtering import (
     _with_command_delay,
     bank_posterior,
 )
-from beaver_ftc_logs.samples import load_flights_for_fit
-from products.logs import synthetic
 
 
 @pytest.fixture(scope="module")
-def healthy(wing, wing_folder):
-    columns = synthetic.fly(200.0, seed=31)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "healthy.csv", columns)], wing)[0]
+def healthy(sampled):
+    return sampled(200.0, seed=31)
 
 
 def delays_of(samples, model):
@@ -75,11 +72,9 @@ def test_gains_return_in_their_time(wing_model):
     )
 
 
-def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
+def test_a_fault_from_the_start_is_not_learnt_away(sampled, wing_model):
     """Weak from the first sample on, for five minutes: neither gain nor trim takes it over."""
-    columns = synthetic.fly(300.0, parts=((0, 300, 1.0, 0.5),), seed=33)
-    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "weak.csv", columns)], wing)[0]
-    rows = diagnose(samples, wing_model)
+    rows = diagnose(sampled(300.0, parts=((0, 300, 1.0, 0.5),), seed=33), wing_model)
     late = rows.t_s > 60.0
     assert rows.faulty[late].mean() > 0.95
     assert np.median(rows.effectiveness[late, 1]) == pytest.approx(0.5, abs=0.101)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs.diagnose import _withdraw_contradicted, diagnose
-from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 BIAS, FROM_S = 0.4, 60.0
 
 
 @pytest.fixture(scope="module")
-def biased(wing, wing_folder):
+def biased(sampled):
     """A flight whose left elevon is off by a share of its travel: the linear wing's answer to that, added."""
     columns = synthetic.fly(120.0, seed=31)
     more, names = np.zeros((len(columns["t_s"]), 3)), ["p_rad_s", "q_rad_s", "r_rad_s"]
@@ -21,7 +20,7 @@ def biased(wing, wing_folder):
     for k in range(3, len(more)):
         more[k] = more[k - 1] @ synthetic.PAST + offset[k - 3 : k] @ synthetic.LEFT[::-1]
     columns |= {name: columns[name] + of for name, of in zip(names, more.T, strict=True)}
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "biased.csv", columns)], wing)[0]
+    return sampled(columns=columns)
 
 
 def named(biased, wing_model, name):

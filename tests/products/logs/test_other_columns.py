@@ -8,15 +8,13 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
-from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.trust import central_ranges, refuse_columns
-from products.logs import small, synthetic
+from products.logs import small
 
 
 @pytest.fixture(scope="module")
-def flown(wing, wing_folder):
-    columns = synthetic.fly(120.0, seed=41)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "columns.csv", columns)], wing)[0]
+def flown(sampled):
+    return sampled(120.0, seed=41)
 
 
 def other_commands(samples, signs):

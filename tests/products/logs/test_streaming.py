@@ -6,14 +6,11 @@ import pytest
 from beaver_ftc_logs.detectors import (
     loop_detector_inputs,
 )
-from beaver_ftc_logs.samples import load_flights_for_fit
-from products.logs import synthetic
 
 
 @pytest.fixture(scope="module")
-def flown(wing, wing_folder):
-    columns = synthetic.fly(120.0, parts=((60, 120, 1.0, 0.3),), seed=21)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "streamed.csv", columns)], wing)[0]
+def flown(sampled):
+    return sampled(120.0, parts=((60, 120, 1.0, 0.3),), seed=21)
 
 
 def by_hand(samples, model, k):

@@ -43,16 +43,6 @@ def test_a_guest_who_is_invited_breaks_and_has_no_other_say(site, do, invited):
     assert (site.said, site.gate.guests[1].is_invited) == ([], False)
 
 
-def test_taken_back_it_is_refused_from_the_next_request_on(site):
-    site.gate.invite(None, on=True)
-    jam = says(do="break", **EVERYTHING["break"])
-    told = as_guest(site, jam, jam, then=None)
-    assert [text for page, text in site.asked if page] == [jam["text"]] * 2
-    site.gate.invite(None, on=False)
-    assert [ok for ok, _ in answers(as_guest(site, jam))] == [False]
-    assert answers(told) == []
-
-
 @pytest.mark.parametrize(
     ("name", "taken"),
     [

@@ -113,26 +113,19 @@ def test_what_the_law_ties_together_is_not_claimed(model):
 
 
 def test_a_model_that_explains_less_than_the_mean_is_refused():
-    tests = [
-        {"samples": 100, "explained": {"p": -71.0, "q": 0.5, "r": 0.1}},
-        {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
-    ]
+    """By the mean over its tests, each with its samples; with what was noted of the rates."""
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
-    usable_flights = fitting.fit_parts([frozen])
-    with pytest.raises(BadInput) as error:
-        identification.check_explained(tests, usable_flights, small.model())
-    said = str(error.value)
-    assert "explains less of p than the mean does (p -17.375)" in said
-    assert said.endswith("follows; q_rad_s: stands still for 600 s")
-    assert "more than these 1.9 min" in said
-    two = [tests[0], tests[1] | {"explained": {"p": 0.5, "q": -0.1, "r": -0.5}}]
-    with pytest.raises(BadInput, match=r"less of p, r than the mean does \(p -17\.375, r -0\.350\)"):
-        identification.check_explained(two, usable_flights, small.model())
-    identification.check_explained(
-        tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3,
-        usable_flights,
-        small.model(),
+    flights, model = fitting.fit_parts([frozen]), small.model()
+
+    def tests(*of):
+        return [{"samples": n, "explained": dict(zip("pqr", shares, strict=True))} for n, *shares in of]
+
+    says = (
+        r"explains less of p, r than the mean does \(p -17\.375, r -0\.350\).* than these 1\.9 min.*follows; "
     )
+    with pytest.raises(BadInput, match=says + "q_rad_s: stands still for 600 s$"):
+        identification.check_explained(tests((100, -71, 0.5, 0.1), (300, 0.5, -0.1, -0.5)), flights, model)
+    identification.check_explained(tests((300, 0.5, -0.1, 0.1), *[(300, 0.5, 0.2, 0.1)] * 3), flights, model)
 
 
 def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):

@@ -28,15 +28,17 @@ def test_only_what_was_derived_is_written_over(tmp_path):
 
 
 def test_where_to_sample_is_read_from_a_file(tmp_path):
-    (tmp_path / "envelope.yaml").write_text("airspeed_mps: [42, 58]\n")
-    read = outline.read_envelope(tmp_path / "envelope.yaml")
-    assert (read.airspeed_mps, read.alpha_deg) == ((42.0, 58.0), None)
+    path = tmp_path / "envelope.yaml"
+
+    def read(text):
+        path.write_text(text)
+        return outline.read_envelope(path)
+
+    found = read("airspeed_mps: [42, 58]\n")
+    assert (found.airspeed_mps, found.alpha_deg) == ((42.0, 58.0), None)
     assert outline.read_envelope(None) == outline.EnvelopeFile()
-    for key, ends in (("altitude_m", (0, 15000)), ("sideslip_deg", (0.1, 45))):
-        for value in ends:
-            (tmp_path / "envelope.yaml").write_text(f"{key}: {value}\n")
-            assert getattr(outline.read_envelope(tmp_path / "envelope.yaml"), key) == value
-        for value in (-0.1 if key == "altitude_m" else 0, ends[1] + 0.1):
-            (tmp_path / "envelope.yaml").write_text(f"{key}: {value}\n")
+    for key, least, most, below in (("altitude_m", 0, 15000, -0.1), ("sideslip_deg", 0.1, 45, 0)):
+        assert [getattr(read(f"{key}: {value}\n"), key) for value in (least, most)] == [least, most]
+        for value in (below, most + 0.1):
             with pytest.raises(BadInput, match=key):
-                outline.read_envelope(tmp_path / "envelope.yaml")
+                read(f"{key}: {value}\n")

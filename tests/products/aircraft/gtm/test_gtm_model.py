@@ -1,7 +1,7 @@
 """The converted model against the specification: coefficients, masses, trim, modes, flights."""
 
 import csv
-from math import cos, degrees, exp, radians, sin
+from math import cos, exp, radians, sin
 
 import numpy as np
 import pytest
@@ -98,17 +98,6 @@ def test_trim_at_the_check_point(where, bench, specified):
 def heavy(where, bench, specified):
     """The specification with what JSBSim's Earth leaves of gravity."""
     return Specification(where, flights.gravity_of(bench, specified))
-
-
-def test_the_spin_of_the_source(bench, heavy):
-    """Its published state is a steady spin of the specification, and JSBSim stays in it."""
-    spin = flights.spin(heavy)
-    left = heavy.rates_of_change(spin.start.array(), spin.plan(0.0), 0)[:6]
-    assert np.abs(left).max() < 0.01
-    spin = flights.Manoeuvre("spin", spin.start, spin.plan, 1.0)
-    one, other = spin.by_specification(heavy), spin.by_jsbsim(bench, FINE_S, ADAMS_BASHFORTH)
-    assert (flights.largest(one, other)[MOTION] < 0.02).all()
-    assert degrees(other[-1, 3]) == pytest.approx(-363, abs=3)
 
 
 @pytest.mark.parametrize("case", range(1, 7))

@@ -174,27 +174,3 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
     written = json.loads(Path("runs/open-separation/separation.json").read_text())
     assert answered == written | {"folder": "runs/open-separation"}
     assert "aileron" in as_text(written)
-
-
-@settings(max_examples=samples(15), deadline=None)
-@given(
-    st.sampled_from([1, 2, 3]), st.floats(0.05, 1.0), st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=6)
-)
-def test_what_a_surface_has_left_of_its_way(instants, approach, commands):
-    """Instant by instant, against what the linear programme takes of a frame."""
-    from beaver_ftc_assurance.separation import _left_behind
-
-    at = replace(PLAIN, instants=instants, approach=np.full(4, approach))
-    left, mean_left = _left_behind(at, 0)
-    p = end = 0.0
-    for command in commands:
-        seen = []
-        for _ in range(instants):
-            if instants == 1:
-                p += approach * (command - p)
-            seen.append(p)
-            if instants > 1:
-                p += approach * (command - p)
-        assert (1 - mean_left) * command + mean_left * end == pytest.approx(np.mean(seen), abs=1e-12)
-        end = (1 - left) * command + left * end
-        assert end == pytest.approx(p, abs=1e-12)

@@ -45,7 +45,17 @@ def wing(wing_folder):
 
 
 @pytest.fixture(scope="session")
-def wing_model(wing, wing_folder):
-    flown = synthetic.fly(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)
-    path = synthetic.write_csv(wing_folder / "training.csv", flown)
-    return identify(load_flights_for_fit([path], wing), wing)
+def sampled(wing, wing_folder):
+    """Makes samples of a flight of the wing, or of columns changed, as `identify` and `diagnose` get them."""
+
+    def samples(*duration_s, columns=None, of=wing, **flown):
+        path = wing_folder / "flight.csv"
+        synthetic.write_csv(path, columns or synthetic.fly(*duration_s, **flown))
+        return load_flights_for_fit([path], of)[0]
+
+    return samples
+
+
+@pytest.fixture(scope="session")
+def wing_model(sampled, wing):
+    return identify([sampled(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)], wing)

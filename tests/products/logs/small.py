@@ -4,7 +4,6 @@ import numpy as np
 
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import LoggedFailure
 from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
@@ -92,10 +91,3 @@ def rows(parts, surfaces=2, step_s=0.5):
     t_s = 10.0 + step_s * np.arange(len(named))
     probability = np.where(faulty, 0.9, 0.1) + 0.001 * np.arange(len(named))
     return LogRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
-
-
-FAILURE = (
-    LoggedFailure(12.0, "left_aileron"),
-    LoggedFailure(13.9, "elevator"),
-    LoggedFailure(14.1, "rudder"),
-)

@@ -10,6 +10,10 @@ RIGHT = np.array([[0.05, -0.02, 0.01], [0.5, 0.25, 0.06], [0.2, 0.10, 0.02]])
 LEFT = RIGHT * np.array([1.0, -1.0, 1.0])
 TRIM = np.array([-0.03, 0.04, 0.0])
 NOISE = np.array([0.05, 0.04, 0.02])
+COLUMNS = (
+    "t_s", "p_rad_s", "q_rad_s", "r_rad_s", "roll_command", "pitch_command", "right_effectiveness",
+    "left_effectiveness",
+)  # fmt: skip
 SHORT = {"p_rad_s": "p", "q_rad_s": "q", "r_rad_s": "r", "roll_command": "roll", "pitch_command": "pitch"}
 VEHICLE = """\
 name: wing
@@ -36,7 +40,7 @@ def fly(duration_s=240.0, parts=(), seed=1, trim=(0.1, -0.2), gain=1.0):
     effectiveness = np.ones((n, 2))
     for begin, end, *values in parts:
         effectiveness[(t_s >= begin) & (t_s < end)] = values
-    commands = np.array(trim) + _wander(rng, n, 0.06) - np.array([0.0, 0.0])
+    commands = np.array(trim) + _wander(rng, n, 0.06)
     surfaces = np.column_stack([commands.sum(axis=1) / 2, (commands[:, 0] - commands[:, 1]) / 2])
     rates = np.zeros((n, 3))
     for k in range(3, n):
@@ -46,16 +50,7 @@ def fly(duration_s=240.0, parts=(), seed=1, trim=(0.1, -0.2), gain=1.0):
             for j in range(3)
         )
         rates[k] = TRIM + rates[k - 1] @ PAST + driven + NOISE * rng.standard_normal(3)
-    return {
-        "t_s": t_s,
-        "p_rad_s": rates[:, 0],
-        "q_rad_s": rates[:, 1],
-        "r_rad_s": rates[:, 2],
-        "roll_command": commands[:, 0],
-        "pitch_command": commands[:, 1],
-        "right_effectiveness": effectiveness[:, 0],
-        "left_effectiveness": effectiveness[:, 1],
-    }
+    return dict(zip(COLUMNS, np.column_stack([t_s, rates, commands, effectiveness]).T, strict=True))
 
 
 def _wander(rng, n, sd):

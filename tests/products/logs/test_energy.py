@@ -40,37 +40,27 @@ def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
-def test_a_gap_ends_what_is_known():
-    run = (T_S >= 10.0).astype(int)
-    climb = energy.energy_climb_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
-    assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
-    np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
-
-
-def named_of(faulty, falls, since_s=0.0):
-    names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.withdraw_surfaces(T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s)
-
-
-def test_an_alarm_while_energy_falls_names_no_surface():
+def test_an_alarm_while_energy_falls_names_an_engine_after_three_seconds_and_no_surface():
+    """It stays named while nothing rises."""
     faulty = ((T_S >= 5.0) & (T_S < 15.0)).astype(int)
-    named = named_of(faulty, T_S >= 4.0)
+    names = np.where(faulty == 1, "left", "").astype(object)
+    climb = np.where(T_S < 4.0, 0.5, np.where(T_S < 9.0, -2.0, -0.5))
+    named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S)
     assert set(named[(T_S >= 5.0) & (T_S < 7.9)]) == {"unknown"}
     assert set(named[(T_S > 8.05) & (T_S < 14.95)]) == {"engine"}
     assert set(named[(T_S < 4.95) | (T_S > 15.05)]) == {""}
 
 
-@given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
-def test_a_name_uses_nothing_later(rows, data):
-    faulty = np.array([int(one) for one, _ in rows])
-    climb = np.array([-2.0 if falls else 0.5 for _, falls in rows])
+@given(st.lists(st.tuples(st.integers(0, 1), st.booleans()), min_size=2, max_size=60), st.integers(1, 60))
+def test_a_name_uses_nothing_later(rows, cut):
+    faulty, falls = np.array(rows).T
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
-    cut = data.draw(st.integers(1, len(rows)))
-    since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.withdraw_surfaces(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.withdraw_surfaces(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut])
+    given = t_s, faulty, names, np.where(falls, -2.0, 0.5), np.maximum(t_s - 2.0, 0.0)
+    whole, short = (
+        energy.withdraw_surfaces(*of[:4], -1.0, of[4]) for of in (given, [one[:cut] for one in given])
+    )
     assert whole[:cut].tolist() == short.tolist()
-    assert all((name == "") == (flag == 0) for name, flag in zip(whole, faulty, strict=True))
+    assert ((whole == "") == (faulty == 0)).all()
 
 
 def recording(**columns):
@@ -96,30 +86,17 @@ def test_a_unit_of_another_kind_is_refused(tmp_path):
 
 
 def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
-    stamps, wind = np.array([1.0, 2.0, 3.0]), np.array([0.5, 2.5])
+    """Where a topic is missing, or no row of it is left, there is none."""
+    stamps, wind_s, none = np.array([1.0, 2.0, 3.0]), np.array([0.5, 2.5]), np.empty(0)
     columns = {
-        "ground_north_m_s": Column(stamps, np.array([3.0, 6.0, 9.0])),
-        "ground_east_m_s": Column(stamps, np.array([4.0, 8.0, 12.0])),
-        "wind_north_m_s": Column(wind, np.array([0.0, 4.0])),
-        "wind_east_m_s": Column(wind, np.array([0.0, 12.0])),
-    }
-    alfa._add_airspeed_from_wind(columns)
-    assert columns["airspeed_by_wind_m_s"].values.tolist() == [5.0, 10.0, 5.0]
+        "ground_north_m_s": Column(stamps, 3.0 * stamps), "ground_east_m_s": Column(stamps, 4.0 * stamps),
+        "wind_north_m_s": Column(wind_s, np.array([0.0, 4.0])),
+        "wind_east_m_s": Column(wind_s, np.array([0.0, 12.0])),
+    }  # fmt: skip
+    calm = columns | {"wind_east_m_s": Column(none, none)}
     still = {name: one for name, one in columns.items() if name.startswith("ground")}
-    alfa._add_airspeed_from_wind(still)
-    assert "airspeed_by_wind_m_s" not in still
-    for name in ("wind_north_m_s", "wind_east_m_s"):
-        calm = columns | {name: Column(np.empty(0), np.empty(0))}
-        del calm["airspeed_by_wind_m_s"]
-        alfa._add_airspeed_from_wind(calm)  # a topic of which no row is left
-        assert "airspeed_by_wind_m_s" not in calm
-
-
-def test_an_engine_is_named_three_seconds_after_the_alarm_and_stays_named_while_nothing_rises():
-    """The evidence began two seconds before the alarm; the fall ends at 9 s, and no energy comes back."""
-    faulty = ((T_S >= 5.0) & (T_S < 18.0)).astype(int)
-    climb = np.where((T_S >= 3.0) & (T_S < 9.0), -2.0, np.where(T_S < 3.0, 0.5, -0.5))
-    names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.withdraw_surfaces(T_S, faulty, names, climb, -1.0, T_S - 2.0)
-    assert set(named[(T_S > 4.95) & (T_S < 7.95)]) == {"unknown"}
-    assert set(named[(T_S > 8.05) & (T_S < 17.95)]) == {"engine"}
+    for of, found in ((columns, [5.0, 10.0, 5.0]), (calm, None), (still, None)):
+        alfa._add_airspeed_from_wind(of)
+        assert (
+            of["airspeed_by_wind_m_s"].values.tolist() if found else of.get("airspeed_by_wind_m_s")
+        ) == found

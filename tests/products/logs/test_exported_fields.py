@@ -3,7 +3,6 @@
 In the log of these tests no two columns are alike, so that one taken for another shows.
 """
 
-import csv
 import math
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_csv, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_recording
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc_logs.readers import read_flight
@@ -44,13 +43,6 @@ def path(tmp_path_factory):
 def columns(path):
     table = parquet.read_table(path)
     return {name: table[name].to_numpy() for name in table.column_names}
-
-
-def test_every_column_of_the_csv(path, columns, tmp_path):
-    write_csv(path, tmp_path / "log.csv")
-    header, *rows = csv.reader((tmp_path / "log.csv").read_text().splitlines())
-    assert header == list(columns)
-    np.testing.assert_array_equal(np.array(rows, dtype=float), np.column_stack(list(columns.values())))
 
 
 # Property of ACMI 2.2: column of the log, and what it is multiplied by.

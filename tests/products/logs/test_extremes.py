@@ -40,11 +40,6 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
     assert np.mean(rates) < 2.5 * asked
 
 
-def test_more_flight_gives_the_threshold_of_the_closed_form():
-    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 100.0))
-    assert extremes.threshold_for_rate(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
-
-
 def test_flights_that_differ_count_for_less():
     """One flight with all the high peaks: they are one thing that happened, not many."""
     rng = np.random.default_rng(1)
@@ -57,14 +52,6 @@ def test_flights_that_differ_count_for_less():
         for d in (1.0, wild.overdispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
-
-
-def test_too_little_flight_says_what_is_missing():
-    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 0.5))
-    assert extremes.missing_healthy_minutes(found, 1.0) == pytest.approx(180.0 - 30.0)
-    assert extremes.missing_healthy_minutes(found, 10.0) == 0.0
-    assert extremes.fit_peak_tail([(np.ones(5), 0.1)]) is None
-    assert extremes.fit_peak_tail([]) is None
 
 
 def test_peaks_are_of_stretches_above_zero():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting, regression
+from beaver_ftc_logs import fitting
 from beaver_ftc_logs.fitting import FitPart
 from beaver_ftc_logs.recording import LoggedFailure
 from beaver_ftc_logs.samples import Samples
@@ -56,13 +56,6 @@ def test_what_follows_a_failure_is_not_fitted():
     assert np.flatnonzero(fitting.usable_mask(samples)).tolist() == list(range(8))
 
 
-def score(usable_flights, vehicle, order):
-    """The Bayesian information criterion of an order, of its own fit."""
-    x, y, _ = fitting.stack_data(usable_flights, vehicle, *order)
-    rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-    return len(y) * np.linalg.slogdet(rest.T @ rest / len(y))[1] + 3 * x.shape[1] * np.log(len(y))
-
-
 def test_a_fit_wants_ten_samples_a_coefficient():
     """13 coefficients an axis: 130 samples will do, 129 will not."""
     samples = small.flight(MODEL, 146)
@@ -75,27 +68,6 @@ def test_a_fit_wants_ten_samples_a_coefficient():
         fitting.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3)
 
 
-@pytest.mark.parametrize(("size", "moves"), [(0.9e-6, False), (1.1e-6, True)])
-def test_a_rate_that_stands_still_is_refused(size, moves):
-    samples = small.flight(MODEL, 200)
-    rates = samples.rates.copy()
-    rates[6:, 1] = 0.3 + size * np.where(np.arange(194) % 2, 1.0, -1.0)
-    usable_flights = [FitPart(changed(samples, rates=rates), np.ones(200, dtype=bool))]
-    if moves:
-        assert fitting.fit_order(usable_flights, MODEL.vehicle, 2, 3) is not None
-        return
-    with pytest.raises(BadInput, match="rate q does not move, allowed: flights in which every rate does"):
-        fitting.fit_order(usable_flights, MODEL.vehicle, 2, 3)
-
-
-def test_standard_errors_hold_for_colour_of_two_seconds():
-    usable_flights = fitting.fit_parts([small.flight(MODEL, 400)])
-    x, y, run = fitting.stack_data(usable_flights, MODEL.vehicle, 2, 3)
-    found = fitting.fit_order(usable_flights, MODEL.vehicle, 2, 3)
-    expected = regression.fit_ols(x, y, run, 20)
-    np.testing.assert_array_equal(found.standard_errors, expected.standard_errors)
-
-
 @pytest.fixture(scope="module")
 def usable_flights():
     return fitting.fit_parts([small.flight(MODEL, 1000, lost=LOST)])
@@ -104,17 +76,6 @@ def usable_flights():
 @pytest.fixture(scope="module")
 def fitted(usable_flights):
     return fitting.fit_model(usable_flights, MODEL.vehicle)
-
-
-def test_several_flights_are_left_out_in_turn():
-    one, two, three = usable_flights = fitting.fit_parts(
-        [small.flight(MODEL, 60, name=name) for name in ("a", "b", "c")]
-    )
-    assert fitting.validation_folds(usable_flights) == [
-        ([two, three], one, "a"),
-        ([one, three], two, "b"),
-        ([one, two], three, "c"),
-    ]
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
 from beaver_ftc_logs.regression import unexplained_rates
@@ -57,13 +56,6 @@ def test_least_squares_by_one_batch(name):
             bool(named),
         )
     assert rows.isolated_surfaces[399] == "left"
-
-
-LOSS = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
-
-
-def left(share):
-    return LOSS._replace(effectiveness=np.array([0.9, share, 0.2, 0.1]))
 
 
 def test_detectors_of_flights_come_first_and_others_are_refused():

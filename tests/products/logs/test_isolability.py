@@ -9,55 +9,25 @@ from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import isolability_document, isolability_sentences
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
 SLAVED = synthetic.VEHICLE.replace("pitch_command: 0.5}, left", "pitch_command: 0.0}, left").replace(
     "pitch_command: -0.5", "pitch_command: 0.0"
 )
-FLIGHTS = 6
 
 
-def sampled(wing, folder, name, **flown):
-    return load_flights_for_fit([synthetic.write_csv(folder / f"{name}.csv", synthetic.fly(**flown))], wing)[
-        0
-    ]
-
-
-def shares_found(wing, folder, model, loss):
-    """Share of drawn flights in which a loss of the left elevon is found within 60 s of its begin."""
-    found = []
-    for seed in range(FLIGHTS):
-        part = (100, 160, 1.0, 1.0 - loss)
-        samples = sampled(wing, folder, "drawn", duration_s=160.0, parts=(part,), seed=50 + seed)
-        rows = diagnose(samples, model)
-        found.append(bool((rows.faulty[(rows.t_s > 102) & (rows.t_s < 160)]).mean() > 0.1))
-    return np.mean(found)
-
-
-def test_the_smallest_loss_is_where_flights_begin_to_show_it(wing, wing_folder, wing_model):
-    healthy = sampled(wing, wing_folder, "said", duration_s=160.0, seed=49)
-    said = {tuple(one["surfaces"]): one for one in isolability_document(healthy, wing_model)["groups"]}
-    smallest = said[("left",)]["smallest_loss"]["60"]
-    assert 0.02 < smallest < 0.4
-    assert shares_found(wing, wing_folder, wing_model, min(3.0 * smallest, 1.0)) > 0.8
-    assert shares_found(wing, wing_folder, wing_model, smallest / 4.0) < 0.3
-
-
-def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder):
+def test_surfaces_that_move_together_are_said_to_and_named_together(sampled, wing_folder):
     """Two surfaces on one command: a loss in either gives the same rates, so both are named."""
     (wing_folder / "slaved.yaml").write_text(SLAVED + "\nother_laws: false\nmoving_air: false\n")
     slaved = load_vehicle(wing_folder / "slaved.yaml")
     healthy = synthetic.fly(300.0, seed=61)
     del healthy["right_effectiveness"], healthy["left_effectiveness"]
-    model = identify(
-        load_flights_for_fit([synthetic.write_csv(wing_folder / "slaved.csv", healthy)], slaved), slaved
-    )
+    model = identify([sampled(columns=healthy, of=slaved)], slaved)
     assert model.groups == [["right", "left"]]
     named = []
     for part in ((80, 160, 0.2, 1.0), (80, 160, 1.0, 0.2)):
-        samples = sampled(slaved, wing_folder, "one", duration_s=160.0, parts=(part,), seed=62)
+        samples = sampled(160.0, of=slaved, parts=(part,), seed=62)
         assert isolability_document(samples, model)["together"][0]["surfaces"] == ["right", "left"]
         rows = diagnose(samples, model)
         named.append(set(rows.isolated_surfaces[rows.faulty == 1]) - {"unknown"})
@@ -67,9 +37,9 @@ def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder)
 
 
 @pytest.mark.parametrize(("sign", "named"), [(1.0, "1.00"), (-1.0, "-1.00")])
-def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, wing_model, sign, named):
+def test_groups_that_act_alike_or_opposed_are_not_separable(sampled, wing_model, sign, named):
     """The left elevon's response made that of the right one, or its opposite, under the same commands."""
-    samples = sampled(wing, wing_folder, "opposed", duration_s=40.0, seed=47)
+    samples = sampled(40.0, seed=47)
     right = np.array(wing_model.command_response[0])
     model = wing_model.model_copy(update={"command_response": [right.tolist(), (sign * right).tolist()]})
     moved = replace(samples, commands=samples.commands[:, [0, 0]])
@@ -84,10 +54,10 @@ def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, w
     assert isolability_document(samples, wing_model)["alike"][0]["separable"] is True
 
 
-def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
+def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
     samples taken for half as long each carry twice as much a second."""
-    samples = sampled(wing, wing_folder, "closed", duration_s=40.0, seed=46)
+    samples = sampled(40.0, seed=46)
     inverse = np.linalg.inv(np.array(wing_model.residual_covariance))
     response, lags = np.array(wing_model.command_response), wing_model.n_command_lags
     first = max(lags, wing_model.n_rate_lags)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
+from beaver_ftc_logs import fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.samples import whiten_samples
@@ -36,71 +36,47 @@ VEHICLE = small.vehicle(
 )
 
 
-def first_response(flights):
-    """Of the roll rate to its own command, by the order that the criterion takes."""
-    model = fitting.fit_model(fitting.fit_parts(flights), VEHICLE)
-    return model.command_response[0][0][0]
-
-
-def test_a_fit_finds_the_colours_that_a_law_answers():
-    """The response is 0.5. A fit that takes coloured noise for white is farther off."""
-    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.1 * i, 4000, i) for i in range(4)]
-    white = identification.whiten_flights(flights, VEHICLE)
-    colours = [one.noise_ma_coefficients for one in white]
-    assert colours == colours[:2] * 2
-    assert len(set(colours)) == 2
-    assert abs(first_response(white) - 0.5) < 0.5 * abs(first_response(flights) - 0.5)
-
-
-def test_air_that_stands_still_is_left_alone():
-    flights = [flown((1.0,), 0.5, 200, 1)]
-    assert identification.whiten_flights(flights, VEHICLE.model_copy(update={"moving_air": False})) == flights
-
-
-def test_a_model_of_two_colours_takes_the_likelier():
-    """Each flight through the noise it has, picked at once, is as if the other had never been seen."""
-    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5, 3000, i) for i in range(4)]
-    white = identification.whiten_flights(flights, VEHICLE)
-    model = fitting.fit_model(fitting.fit_parts(white), VEHICLE)
-    assert len(model.noise_models) == 2
-    assert all(one.covariance_inflation >= 1.0 for one in model.noise_models)
-    for i in (0, 1):
-        new = flown(AVERAGE if i else (1.0,), 0.5, 1500, 9 + i)
-        own = [
-            one for one in model.noise_models if tuple(one.ma_coefficients) == white[i].noise_ma_coefficients
-        ]
-        alone = model.model_copy(update={"noise_models": own})
-        both = bank_posterior(new, model, build_bank(model))[0][300:]
-        np.testing.assert_allclose(
-            both,
-            bank_posterior(new, alone, build_bank(model))[0][300:],
-            atol=1e-6,
-        )
-
-
-def test_bounds_lean_on_no_prior_where_laws_differ():
-    """With nothing known but how rare faults are, each of eleven levels is as likely: 90 % are ten."""
-    model = small.model(small.WING | {"other_laws": True})
-    bank, samples = build_bank(model), small.flight(model, 50)
-    nothing = np.tile(bank.prior_probability, (50, 1))
-    rows = diagnose.rows_of_posterior(samples, model, bank, nothing)
-    assert (rows.effectiveness_high - rows.effectiveness_low >= 0.9).all()
-    plain = small.model()
-    rows = diagnose.rows_of_posterior(
-        samples,
-        plain,
-        build_bank(plain),
-        np.tile(build_bank(plain).prior_probability, (50, 1)),
-    )
-    assert (rows.effectiveness_low > 0.9).all()
+def fitted(flights):
+    return fitting.fit_model(fitting.fit_parts(flights), VEHICLE)
 
 
 @pytest.fixture(scope="module")
-def moving():
-    """A model of two colours, identified from flights of a law that answers rates."""
-    flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
-    white = identification.whiten_flights(flights, VEHICLE)
-    return fitting.fit_model(fitting.fit_parts(white), VEHICLE)
+def flights():
+    """Flights of two colours in turn, as a law answers rates, and the same whitened."""
+    colours = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
+    return colours, identification.whiten_flights(colours, VEHICLE)
+
+
+@pytest.fixture(scope="module")
+def moving(flights):
+    return fitted(flights[1])
+
+
+def test_a_fit_finds_the_colours_that_a_law_answers(flights, moving):
+    """The response is 0.5. A fit that takes coloured noise for white is farther off."""
+    given, white = flights
+    colours = [one.noise_ma_coefficients for one in white]
+    assert colours == colours[:2] * 2
+    assert len(set(colours)) == len(moving.noise_models) == 2
+    assert all(one.covariance_inflation >= 1.0 for one in moving.noise_models)
+    off, off_without = (abs(one.command_response[0][0][0] - 0.5) for one in (moving, fitted(given)))
+    assert off < 0.5 * off_without
+
+
+@pytest.mark.parametrize("colour", [0, 1])
+def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
+    """A flight through the noise it has, picked at once, is as if the other had never been seen; and no row
+    depends on a later sample by which noise is likely."""
+    new = flown(AVERAGE if colour else (1.0,), 0.5, 1500, 9 + colour)
+    its = flights[1][colour].noise_ma_coefficients
+    own = [one for one in moving.noise_models if tuple(one.ma_coefficients) == its]
+    bank = build_bank(moving)
+    both = bank_posterior(new, moving, bank)
+    alone = bank_posterior(new, moving.model_copy(update={"noise_models": own}), bank)
+    np.testing.assert_allclose(both[0][300:], alone[0][300:], atol=1e-6)
+    short = bank_posterior(samples.first_samples(new, 600), moving, bank)
+    for part, cut in zip(both, short, strict=True):
+        np.testing.assert_array_equal(part[:600], cut)
 
 
 @pytest.mark.parametrize("colour", [AVERAGE, (1.0,)])
@@ -135,12 +111,3 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     for j in (1, 2, 5):
         expected = -((-g1 / innovation) ** j)
         np.testing.assert_allclose(before.reshape(-1, 3, 3)[j - 1], np.diag(expected), atol=1e-6)
-
-
-def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):
-    """A colour is filtered up to where it counts last: which that is, the whole flight says."""
-    new = flown(AVERAGE, 0.5, 1500, 9)
-    whole = bank_posterior(new, moving, build_bank(moving))
-    short = bank_posterior(samples.first_samples(new, 600), moving, build_bank(moving))
-    for part, cut in zip(whole, short, strict=True):
-        np.testing.assert_array_equal(part[:600], cut)

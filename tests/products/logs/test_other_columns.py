@@ -8,15 +8,13 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
-from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.trust import central_ranges, refuse_columns
-from products.logs import small, synthetic
+from products.logs import small
 
 
 @pytest.fixture(scope="module")
-def flown(wing, wing_folder):
-    columns = synthetic.fly(120.0, seed=41)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "columns.csv", columns)], wing)[0]
+def flown(sampled):
+    return sampled(120.0, seed=41)
 
 
 def other_commands(samples, signs):
@@ -35,18 +33,6 @@ def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
     rows = diagnose(replace(flown, commands=flown.commands * signs), wing_model)
     assert rows.credible[rows.t_s < 60.0].mean() > 0.9
     assert rows.credible[rows.t_s > 90.0].mean() < 0.1
-
-
-def test_one_rate_in_another_unit_is_refused(flown, wing_model):
-    with pytest.raises(BadInput, match="columns, signs and units as in the flights of the model"):
-        diagnose(replace(flown, rates=flown.rates * np.array([57.3, 1.0, 1.0])), wing_model)
-
-
-def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder, wing_model):
-    columns = synthetic.fly(120.0, parts=((0, 120, 1.0, 0.0),), seed=42)
-    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "lost.csv", columns)], wing)[0]
-    rows = diagnose(samples, wing_model)
-    assert rows.faulty[rows.t_s > 30.0].mean() > 0.9
 
 
 @pytest.fixture(scope="module")

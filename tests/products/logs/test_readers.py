@@ -44,12 +44,6 @@ def test_every_unusable_log_is_named(tmp_path, wing):
     assert len(str(error.value).splitlines()) == 2
 
 
-def test_rates_logged_too_slowly(tmp_path, wing):
-    columns = {name: values[::5] for name, values in synthetic.fly(60.0).items()}
-    with pytest.raises(BadInput, match="rates are logged at 2 Hz, allowed: at least 4 Hz"):
-        load_flights_for_fit([synthetic.write_csv(tmp_path / "slow.csv", columns)], wing)
-
-
 def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
     t_s = np.arange(0.0, 30.0, 0.01)
     columns = {name: np.sin(t_s) for name in synthetic.fly(5.0)} | {"t_s": t_s}

@@ -43,20 +43,6 @@ def test_halves_of_a_flying_wing(enac):
         assert found["mean_error"] < 0.04
 
 
-def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
-    vehicle, samples = enac
-    model = fit_model(fit_parts([samples]), vehicle)
-    whole = diagnose(samples, model)
-    for n in (2873, 9071):
-        fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
-        cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
-        still_s = {name: still[:n] for name, still in samples.unchanged_s.items()}
-        short = diagnose(replace(samples, unchanged_s=still_s, **cut), model)
-        assert np.array_equal(short.credible, whole.credible[:n])
-        assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
-        assert np.array_equal(short.fault_probability, whole.fault_probability[:n])
-
-
 def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     vehicle = load_vehicle("alfa")
     folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())

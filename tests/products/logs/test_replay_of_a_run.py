@@ -15,20 +15,23 @@ DECLARED = {"rate_hz": 50, "actuators": "servo", "fdi": {"sharpen": "none"}}
 WITHDRAWN = {"design_model": {"linearised": True}, "fdi": {"bounds": {"coefficients": 0.05}}}
 
 
-@pytest.fixture(scope="module", params=[{}, DECLARED, WITHDRAWN], ids=["as usual", "declared", "withdrawn"])
-def run(request, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("runs")
-    flight = bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0, **request.param}))
+def flown(folder, changes):
+    flight = bf.fly(bf.load("elevator-partial-loss").with_({"duration_s": 16.0, **changes}))
     flight.save(folder, report=False)
     return folder / "elevator-partial-loss", flight
 
 
-def test_detection_and_isolation_are_those_of_the_flight(run):
-    folder, flight = run
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return flown(tmp_path_factory.mktemp("runs"), {})
+
+
+@pytest.mark.parametrize("changes", [{}, DECLARED, WITHDRAWN], ids=["as usual", "declared", "withdrawn"])
+def test_detection_and_isolation_are_those_of_the_flight(changes, tmp_path):
+    folder, flight = flown(tmp_path, changes)
     columns, verdict = replay_run_log(folder / "log.parquet")
-    assert verdict["as_flown"] is True
-    assert verdict["rows_that_differ"] == 0
-    assert verdict["left_out"] == []
+    told = [verdict[key] for key in ("as_flown", "rows_that_differ", "left_out")]
+    assert told == [True, 0, []]
     assert verdict["detection_s"] == pytest.approx(flight.detection.time_s)
     assert columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
 

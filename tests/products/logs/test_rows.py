@@ -24,17 +24,6 @@ def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
         diagnose.check_log_fits_model(samples, model)
 
 
-@pytest.mark.parametrize(("hold_s", "stands"), [
-    (0.0, [0, 1, 1, 1, 1, 0, 1, 0]), (0.1, [0, 0, 1, 1, 1, 0, 0, 0]), (0.2, [0, 0, 0, 1, 1, 0, 0, 0]),
-    (0.26, [0, 0, 0, 0, 1, 0, 0, 0]), (0.4, [0, 0, 0, 0, 0, 0, 0, 0]),
-])  # fmt: skip
-def test_a_condition_stands_once_it_has_held(hold_s, stands):
-    model = small.model(settings={"hold_s": hold_s})
-    raised = np.array([0, 1, 1, 1, 1, 0, 1, 0], dtype=bool)
-    assert diagnose._held_long_enough(raised, model).astype(int).tolist() == stands
-    assert diagnose._held_long_enough(raised[1:], model).astype(int).tolist() == stands[1:]
-
-
 LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
 
 

@@ -1,7 +1,5 @@
 """A log whose clock jumps: a gap costs nothing, and what is left out is said."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.recording import rows_with_increasing_time
-from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import limited, synthetic
 
 JUMP_S = 1e6
@@ -47,12 +44,11 @@ def test_a_jump_of_the_clock_costs_no_memory(tmp_path):
     assert statuses == [0] * 8, said
 
 
-def test_a_gap_is_a_gap_however_long(wing, wing_model, tmp_path):
+def test_a_gap_is_a_gap_however_long(sampled, wing_model):
     """The same flight with 10 s and with 10,000 missing: the same samples, and the same of each said."""
     rows = []
-    for number, jump_s in enumerate((10.0, 1e4)):
-        path = synthetic.write_csv(tmp_path / f"{number}.csv", fast(jump_s))
-        samples = load_flights_for_fit([path], wing)[0]
+    for jump_s in (10.0, 1e4):
+        samples = sampled(columns=fast(jump_s))
         model = wing_model.model_copy(update={"rate_hz": 20.0})
         rows.append((samples, diagnose(samples, model)))
         text = as_text(verdict_document(samples, model, rows[-1][1]))
@@ -65,38 +61,12 @@ def test_a_gap_is_a_gap_however_long(wing, wing_model, tmp_path):
     np.testing.assert_allclose(said.fault_probability, said_too.fault_probability, atol=1e-9)
 
 
-def test_a_time_in_another_unit_is_told(wing, tmp_path):
+def test_a_time_in_another_unit_is_told(sampled):
     """In units of 1e9 s the flight lasts no time at all."""
     columns = fast(0.0)
     columns["t_s"] = columns["t_s"] * 1e-9
     with pytest.raises(BadInput, match=r"logged at 5e\+10 Hz, allowed: up to 100000 Hz, time in seconds"):
-        load_flights_for_fit([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
-
-
-DAMAGED = 51  # the row, counted from 1, whose stamp is off
-
-
-def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
-    """As a file, as text and on the page; and in the account of an identification."""
-    pytest.importorskip("pyulog")
-    from typer.testing import CliRunner
-
-    from beaver_ftc.cli.main import app
-
-    (tmp_path / "px4.yaml").write_text(synthetic.vehicle("vehicle_rates"))
-    columns = synthetic.fly(60.0, seed=8)
-    columns["t_s"][DAMAGED - 1] += JUMP_S
-    log = synthetic.write_ulog(tmp_path / "flight.ulg", columns)
-    commands = (
-        ["identify", log, "--vehicle", tmp_path / "px4.yaml", "--out", tmp_path / "px4.json"],
-        ["diagnose", log, "--model", tmp_path / "px4.json", "--out", tmp_path / "out"],
-    )
-    said = "vehicle_rates: row 51: its stamp is out of order"
-    for command in commands:
-        done = CliRunner().invoke(app, list(map(str, command)), catch_exceptions=False)
-        assert said in done.stdout
-    assert said in str(json.loads((tmp_path / "out" / "flight" / "verdict.json").read_text())["notes"])
-    assert said in (tmp_path / "out" / "flight" / "report.html").read_text()
+        sampled(columns=columns)
 
 
 def test_no_row_more_than_needed_is_left_out():

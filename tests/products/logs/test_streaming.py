@@ -3,20 +3,14 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
-    diagnose_with_detector,
-    loop_detector_context,
     loop_detector_inputs,
 )
-from beaver_ftc_logs.samples import load_flights_for_fit
-from products.logs import synthetic
 
 
 @pytest.fixture(scope="module")
-def flown(wing, wing_folder):
-    columns = synthetic.fly(120.0, parts=((60, 120, 1.0, 0.3),), seed=21)
-    return load_flights_for_fit([synthetic.write_csv(wing_folder / "streamed.csv", columns)], wing)[0]
+def flown(sampled):
+    return sampled(120.0, parts=((60, 120, 1.0, 0.3),), seed=21)
 
 
 def by_hand(samples, model, k):
@@ -43,21 +37,3 @@ def test_the_innovation_is_the_residual_of_the_model(flown, wing_model):
         np.testing.assert_allclose(now.x - before.x - dt_s * now.acceleration, residual, atol=1e-12)
         for place, answer in enumerate(answers):
             np.testing.assert_allclose(dt_s * now.contribution[:, place], answer, atol=1e-12)
-
-
-def test_where_the_model_is_silent_there_is_no_innovation(flown, wing_model):
-    now, before = loop_detector_inputs(flown, wing_model)[2][0], loop_detector_inputs(flown, wing_model)[1][0]
-    np.testing.assert_allclose(now.x - before.x, now.acceleration / wing_model.rate_hz, atol=1e-15)
-
-
-def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
-    """A step of one rate changes the next sample by that column of the fit."""
-    context = loop_detector_context(wing_model)
-    step = np.array([0.0, 0.3, 0.0])
-    changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
-    np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past_coefficients)[1], atol=1e-12)
-
-
-def test_an_unknown_detector(flown, wing_model):
-    with pytest.raises(BadInput, match="--detector ekf: is not known"):
-        diagnose_with_detector("ekf", flown, wing_model)

@@ -4,21 +4,8 @@ import pytest
 import yaml
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.regression import group_surfaces
-from beaver_ftc_logs.samples import mixer_matrix
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
-
-
-def test_the_mixer_is_what_the_file_says(wing):
-    assert mixer_matrix(wing).tolist() == [[0.5, 0.5], [0.5, -0.5]]
-    assert group_surfaces(wing) == [[0], [1]]
-
-
-def test_slaved_surfaces_form_one_group():
-    alfa = load_vehicle("alfa")
-    assert list(alfa.surfaces) == ["left_aileron", "right_aileron", "elevator", "rudder"]
-    assert group_surfaces(alfa) == [[0, 1, 3], [2]]
 
 
 @pytest.mark.parametrize(

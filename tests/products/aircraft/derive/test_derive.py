@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 from tools.autopilots import peers
 from tools.autopilots.small import Small
-from typer.testing import CliRunner
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import derived_folder, first_line, read
-from beaver_ftc.cli.main import app
 from beaver_ftc.design.model import DesignFunctions, design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.files import data_root
@@ -30,7 +28,7 @@ from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive import derivation, first_use
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out
-from beaver_ftc_aircraft.derive.fit import Columns, errors_of, pursue
+from beaver_ftc_aircraft.derive.fit import errors_of
 from beaver_ftc_aircraft.derive.outline import not_affine, usual_start
 from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, sample
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
@@ -167,12 +165,6 @@ def under_an_autopilot(folder, name):
     return vehicle.flight.land()
 
 
-def test_what_leaves_the_envelope_raises_no_alarm(derived):
-    """A steep dive at a rate the map does not have: nothing is known there, so nothing is said."""
-    wild = {"reference.q": [{"step": {"amplitude_deg_s": -30, "start_s": 3, "end_s": 4.5}}], "duration_s": 8}
-    assert flight(derived, **wild).detection_time_s is None
-
-
 def test_an_aircraft_whose_coefficients_are_known_is_found_again(tmp_path, quick):
     """The trainer's own file is what its model was written from: the fit has to find it."""
     found = derive(str(TRAINER), tmp_path).aircraft
@@ -217,15 +209,6 @@ def test_a_scenario_derives_its_aircraft_at_first_use_and_the_source_is_untouche
     assert f"Derived in {made.took_s:.1f} s." in page
     assert set(made.further) == {"fcs/flap-pos-norm", "fcs/speedbrake-pos-norm"}
     assert all(f"| `{name}` | 0 |" in page for name in made.further)
-
-
-def test_pursuit_finds_the_terms_that_made_the_data():
-    rng = np.random.default_rng(3)
-    A = rng.normal(size=(400, 12))
-    A[:, 7] = 0.0
-    b = 2.0 * A[:, 3] - 0.5 * A[:, 9] + 0.1 * A[:, 0]
-    taken, values = pursue(Columns(A), b)
-    assert dict(zip(taken, values, strict=True)) == pytest.approx({3: 2.0, 9: -0.5, 0: 0.1})
 
 
 def test_other_stops_leave_a_deflection_its_moment(tmp_path):
@@ -279,12 +262,6 @@ def test_what_jsbsim_cannot_fly_is_said_in_a_line(tmp_path):
     with pytest.raises(SimulationFailed, match=says):
         derive(str(tmp_path / "navion.xml"), tmp_path / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["navion.xml"]
-
-
-def test_the_list_names_them():
-    said = CliRunner().invoke(app, ["list", "aircraft"]).output
-    assert "beaver " in said
-    assert "jsbsim:c172p" in said
 
 
 def test_a_surface_off_a_straight_line_is_said(derived):

@@ -69,11 +69,6 @@ def test_thrust_at_full_power_is_within_the_map(stranger):
     assert least < plant.read(found.aircraft.signals["thrust"].property) < largest
 
 
-def test_what_is_derived_of_a_model(stranger, changed):
-    for part, said in parts_of(stranger).items():
-        assert not changed(said, part=part)
-
-
 def test_what_is_derived_of_an_aircraft_with_a_file_over_an_envelope_of_its_own(filed, changed):
     for part, said in parts_of(filed).items():
         assert not changed(said, part=part)

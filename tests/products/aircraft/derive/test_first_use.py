@@ -50,18 +50,6 @@ def test_another_inertia_of_the_model_is_said(trainer):
     assert "q" in [line[0] for line in first_use.kept_or_compared(read(trainer))]
 
 
-@pytest.mark.parametrize("left", [b"", b'["of', b"\xff"])
-def test_of_a_cache_that_was_cut_off_it_is_compared_again(trainer, monkeypatch, left):
-    asked = []
-    monkeypatch.setattr(first_use, "compared", lambda aircraft: asked.append(aircraft) or ["off"])
-    aircraft = read(trainer)
-    first_use.kept_or_compared(aircraft)
-    (kept,) = trainer.parent.rglob("compared/*.json")
-    kept.write_bytes(left)
-    assert [first_use.kept_or_compared(aircraft) for _ in range(2)] == [["off"]] * 2
-    assert len(asked) == 2
-
-
 def test_what_cannot_be_trimmed_is_said_not_to_be_compared(trainer):
     change(trainer / "aircraft.yaml", "airspeed_mps: [35, 65]", "airspeed_mps: [5, 8]")
     (line,) = first_use.kept_or_compared(read(trainer))

@@ -38,11 +38,3 @@ def test_the_envelope_is_built_about_level_flight_at_this_lift(found):
     assert found["envelope"]["airspeed_mps"] == pytest.approx([0.8 * speed_mps, 1.25 * speed_mps], rel=1e-5)
     assert found["envelope"]["alpha_deg"] == [-5, 15]
     assert found["start"] == {"altitude_m": 1500.0}
-
-
-def test_surfaces_go_where_their_own_flight_control_takes_them(found):
-    assert {name: tuple(of["travel_rad"]) for name, of in found["surfaces"].items()} == TRAVEL
-    assert found["groups"] == {"pitch": ["elevator"], "lateral": ["aileron", "rudder"]}
-    throttle = found["engine"]["settings"]["throttle"]
-    assert (throttle["default"], throttle["range"]) == (0.6, [0.0, 1.0])
-    assert outline.outline("172x", Path("172x.xml"), TRAVEL, 0.5)["name"] == "a172x"

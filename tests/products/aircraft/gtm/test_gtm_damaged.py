@@ -59,6 +59,7 @@ def test_the_regions_hold_the_envelope():
     speeds = [of.airspeed_mps for of in regions]
     assert [speeds[0][0], speeds[-1][1]] == whole["airspeed_mps"]
     assert all(before[1] >= after[0] for before, after in pairwise(speeds))
+    assert folder.aircraft_file()["start"]["altitude_m"] == 243.84  # 800 ft
     assert {(of.beta_rad, of.altitude_m, of.of_region) for of in regions} == {(0.2, (0.0, 1500.0), True)}
     alphas = np.degrees([of.alpha_rad for of in regions])
     assert [alphas.min(), alphas.max()] == pytest.approx(whole["alpha_deg"])

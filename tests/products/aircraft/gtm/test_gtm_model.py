@@ -1,7 +1,7 @@
 """The converted model against the specification: coefficients, masses, trim, modes, flights."""
 
 import csv
-from math import cos, degrees, exp, radians, sin
+from math import cos, exp, radians, sin
 
 import numpy as np
 import pytest
@@ -94,49 +94,10 @@ def test_trim_at_the_check_point(where, bench, specified):
     assert here.throttle_percent == pytest.approx(39.84, abs=0.06)
 
 
-WANTED = [
-    *(Condition(eas_kt=float(v)) for v in (46, 60, 90, 130)),
-    *(Condition(alpha_deg=float(a)) for a in (2.5, 9, 16)),
-]
-
-
 @pytest.fixture(scope="module")
 def heavy(where, bench, specified):
     """The specification with what JSBSim's Earth leaves of gravity."""
     return Specification(where, flights.gravity_of(bench, specified))
-
-
-@pytest.mark.parametrize("wanted", WANTED, ids=lambda c: f"{c.eas_kt or ''}{c.alpha_deg or ''}")
-def test_trim_over_speed_and_angle_of_attack(bench, heavy, wanted):
-    here = bench.steady(wanted)
-    there = flights.specified_trim(heavy, wanted, here)
-    for name in ("elevator_deg", "aileron_deg", "rudder_deg", "alpha_deg"):
-        assert getattr(here, name) == pytest.approx(getattr(there, name), abs=0.02)
-    assert here.throttle_percent == pytest.approx(there.throttle_percent, abs=0.1)
-    assert here.eas_kt == pytest.approx(there.eas_kt, abs=0.05)
-
-
-@pytest.mark.parametrize("alpha_deg", [3.0, 7.0, 11.5])
-def test_linear_modes_off_the_breakpoints(bench, heavy, alpha_deg):
-    here = bench.steady(Condition(alpha_deg=alpha_deg))
-    there = flights.specified_trim(heavy, Condition(alpha_deg=alpha_deg), here)
-    found = flights.modes(flights.linear_jsbsim(bench, here))
-    wanted = flights.modes(flights.linear_specified(heavy, there))
-    assert found.keys() == wanted.keys() == {"short period", "phugoid", "Dutch roll"}
-    for name, (frequency, damping) in wanted.items():
-        assert found[name][0] == pytest.approx(frequency, rel=2e-3), name
-        assert found[name][1] == pytest.approx(damping, abs=1e-3), name
-
-
-def test_the_spin_of_the_source(bench, heavy):
-    """Its published state is a steady spin of the specification, and JSBSim stays in it."""
-    spin = flights.spin(heavy)
-    left = heavy.rates_of_change(spin.start.array(), spin.plan(0.0), 0)[:6]
-    assert np.abs(left).max() < 0.01
-    spin = flights.Manoeuvre("spin", spin.start, spin.plan, 1.0)
-    one, other = spin.by_specification(heavy), spin.by_jsbsim(bench, FINE_S, ADAMS_BASHFORTH)
-    assert (flights.largest(one, other)[MOTION] < 0.02).all()
-    assert degrees(other[-1, 3]) == pytest.approx(-363, abs=3)
 
 
 @pytest.mark.parametrize("case", range(1, 7))

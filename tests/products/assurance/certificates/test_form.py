@@ -2,14 +2,14 @@
 
 import copy
 import csv
-from math import radians
+from math import pi, radians
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beaver_ftc_assurance.certificates import chance, check_certificate
+from beaver_ftc_assurance.certificates import chance, check_certificate, courses
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form
 from telling import numbers
 
@@ -146,3 +146,17 @@ def test_the_page_lists_the_fields_that_the_checker_accepts():
     listed = {row["field"] for row in rows if row["object"] != "log"}
     accepted = [value for name, value in vars(check_certificate).items() if name.endswith("_FIELDS")]
     assert listed == set().union(*accepted)
+
+
+def test_an_oscillation_is_excluded_once_one_side_lasts_longer_than_half_of_its_period():
+    """Half a period of 0.3 s is 3 frames: beyond the command by 0.05 rad and more from the third frame on."""
+    lower = np.where(np.arange(10) >= 3, 0.12 + 0.01 * np.arange(10), 0.0)
+    bounds = SimpleNamespace(
+        lower=np.column_stack([lower, np.zeros(10)]), command=np.full(10, 0.1),
+        slowest_oscillation_rad_s=pi / 0.3, is_unexplained=np.ones(10, bool),
+    )  # fmt: skip
+    config = SimpleNamespace(half_blocks=3, dt_s=0.1)
+    (found,) = courses.RULES["swing"](bounds, None, config)
+    assert list(found.lower_frames) == [3, 4, 5, 6, 7]
+    beyond = [0.05, 0.06, 0.07, 0.08, 0.09]
+    assert np.array(found.pairs) == pytest.approx(np.array([(4, 3.0), (0.05, 0.0), (sum(beyond), 0.0)]))

@@ -93,18 +93,6 @@ def test_a_mistake_is_a_line_with_its_place(mistake, write):
     assert f"plan.yaml:{line}" in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("most", "says"), [(6, ""), (5, "plan.yaml:7: requirements: 6 flights, allowed: at most 5")]
-)
-def test_a_plan_has_as_many_flights_as_are_allowed(write, monkeypatch, most, says):
-    monkeypatch.setattr("beaver_ftc_assurance.evidence.plan.MOST_FLIGHTS", most)
-    if says:
-        with pytest.raises(BadInput, match=says):
-            load_plan(write(GOOD))
-    else:
-        assert len(load_plan(write(GOOD)).cases) == 6
-
-
 def test_a_mistake_in_a_file_that_is_named_is_in_that_file(write, tmp_path):
     (tmp_path / "deeper" / "also.yaml").write_text("name: also\nduration: 3\n")
     with pytest.raises(BadInput, match=r"^.*deeper/also.yaml:2: duration: unknown key"):

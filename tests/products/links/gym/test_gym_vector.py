@@ -64,12 +64,6 @@ def test_actions_of_another_shape_are_said_and_it_goes_on(three):
     three.step(np.zeros((3, 4)))
 
 
-@pytest.mark.parametrize("given", [{"num_envs": 0}, {"workers": 0}, {"frames_per_step": 0}])
-def test_counts_that_are_none_are_said(given):
-    with pytest.raises(BadInput, match=f"{next(iter(given))}: 0 is out of range"):
-        BeaverVectorEnv(**given)
-
-
 def test_a_process_that_dies_is_said():
     two = BeaverVectorEnv(2, scenario=scenario(**FLOWN), workers=2)
     two.reset()

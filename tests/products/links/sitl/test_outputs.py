@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import OutputSection
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_links.sitl.outputs import Outputs, channels_of, power_range, share_of_pulse
+from beaver_ftc_links.sitl.outputs import Outputs, power_range, share_of_pulse
 from trainer import trainer
 
 BEAVER = load()
@@ -30,11 +30,6 @@ def test_more_output_rolls_right_pitches_up_and_yaws_right():
     p, q, r = G @ (full - [0, 0, 0, 0.3])
     assert min(p, q, r) > 0
     assert np.allclose(outputs().deflections([1000, 1000, 1500, 1000]), [0.52, 0.49, 0.44, 0.3])
-
-
-def test_a_derived_aircraft_of_other_signs_needs_no_reversal():
-    channels = channels_of(BEAVER, -G)
-    assert not any(output.reversed for mix in channels.surfaces.values() for output in mix)
 
 
 def test_no_pulse_leaves_the_trim_and_the_engine():

@@ -8,8 +8,6 @@ from pymavlink.dialects.v20 import common
 from tools.autopilots.small import Small, Told
 
 import beaver_ftc as bf
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.link import Times
 from beaver_ftc_links.sitl.mavlink import Mavlink
@@ -46,10 +44,6 @@ def test_an_alarm_a_name_and_a_size_are_said_once():
     assert teller.kept == said
     teller.begin()
     assert teller.kept == []
-
-
-def test_healthy_flight_says_nothing():
-    assert fly(vehicle(), 3.0, Teller()) == []
 
 
 @pytest.mark.parametrize(
@@ -125,18 +119,3 @@ def test_quantiles_to_four_percent(times_s, share):
     assert times.quantile(share) <= exact * 1.04
     assert times.mean == pytest.approx(np.mean(times_s))
     assert times.spread == pytest.approx(np.std(times_s), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("given", "found"),
-    [
-        (None, None), ("host:14550", ("host", 14550)), ("[::1]:1", ("[::1]", 1)), ("h:65535", ("h", 65535)),
-        *((wrong, BadInput) for wrong in ("h:65536", "h:0", "h:-1", "h:x", ":14550", "host", "")),
-    ],
-)  # fmt: skip
-def test_an_address_is_a_host_and_a_port(given, found):
-    if found is BadInput:
-        with pytest.raises(BadInput, match=r"^--mavlink: .* is no address, allowed: HOST:PORT"):
-            address(given)
-    else:
-        assert address(given) == found

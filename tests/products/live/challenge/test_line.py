@@ -65,12 +65,6 @@ def test_a_law_is_shown_what_is_measured_the_reference_and_the_verdict():
         code.step(MEASURED, REFERENCE, said)
 
 
-def test_an_answer_has_as_many_numbers_as_its_kind():
-    """A command one a surface; a verdict seven, and an effectiveness of each surface."""
-    code, _ = submitted(line.SubmittedCode)
-    assert [code._length(kind) for kind in (pilot.COMMAND, pilot.VERDICT)] == [8 * 4, 8 * (7 + 4)]
-
-
 def asking(times=1):
     """The design model as a submission has it; what it asks goes to the grader's end at once."""
     code, _ = submitted(line.SubmittedCode)

@@ -83,35 +83,6 @@ def test_what_computing_takes_is_let_through():
     assert told == []
 
 
-def test_a_submission_may_read_python_and_packages_but_those_that_are_hidden(monkeypatch, tmp_path):
-    """By the beginning of a name, in any letters; a link by what it leads to; nothing that is not there."""
-    hidden = confine.HIDDEN[0]
-    names = {
-        "site": ("numpy", f"{hidden}-1.0.dist-info", f"{hidden.upper()}.py", f"my_{hidden}.py"),
-        "own": ("scipy",), "lib": ("json", "site-packages", "os.py"), "core": (),
-    }  # fmt: skip
-    for folder, entries in names.items():
-        (tmp_path / folder).mkdir()
-        for entry in entries:
-            (tmp_path / folder / entry).touch()
-    (tmp_path / "lib" / "linked").symlink_to(tmp_path / "own")
-    places = {"purelib": "site", "platlib": "own", "stdlib": "lib", "data": "site"}
-    paths = {kind: str(tmp_path / folder) for kind, folder in places.items()}
-    monkeypatch.setattr(confine.sysconfig, "get_paths", lambda: paths)
-    monkeypatch.setattr(confine, "LIBRARIES", (str(tmp_path / "none"),))
-    monkeypatch.setattr(confine, "_sources", lambda: [str(tmp_path / "core")])
-    shown = [f"site/my_{hidden}.py", "site/numpy", "own/scipy", "lib/json", "own", "lib/os.py", "core"]
-    assert confine.readable() == [str((tmp_path / place).resolve()) for place in shown]
-
-
-def test_a_submission_has_a_gigabyte_a_minute_and_no_file_to_write(monkeypatch):
-    resource, given = pytest.importorskip("resource"), {}
-    monkeypatch.setattr(resource, "setrlimit", lambda what, most: given.update({what: most}))
-    assert confine._limit()
-    limits = {"AS": 2**30, "CPU": 60, "FSIZE": 0, "NPROC": 0, "CORE": 0, "NOFILE": 64}
-    assert given == {getattr(resource, f"RLIMIT_{name}"): (most, most) for name, most in limits.items()}
-
-
 def answered(code, machine, number):
     """What a filter of the kernel answers to a call: an interpreter of its four instructions."""
     at = value = 0
@@ -162,7 +133,3 @@ def test_the_kernel_lets_through_the_calls_of_computing_alone(monkeypatch, machi
     assert {answered(code, own, number) for number in forbidden} == {FORBIDDEN}
     assert answered(code, own, 0x40000000 + allowed[0]) == FORBIDDEN  # the same by another way of calling
     assert {answered(code, other, number) for other in (0, own + 1) for number in allowed} == {KILLED}
-    let_through = [number for number in range(500) if answered(code, own, number) == ALLOWED]
-    rows = [row.split() for row in confine._CALLS.split(",")]
-    column = 1 if machine == "x86_64" else 2
-    assert let_through == sorted(int(row[column]) for row in rows if row[column] != "0" or row[0] == "read")

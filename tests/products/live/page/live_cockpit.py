@@ -1,14 +1,19 @@
 """A live cockpit as a user has it: the command, its address, and a browser's cookie."""
 
 import contextlib
+import json
 import signal
 import subprocess
 import sys
+import time
+import urllib.error
 import urllib.request
 from dataclasses import dataclass
 from http.cookiejar import CookieJar
 from pathlib import Path
 from urllib.parse import urlsplit
+
+from websockets.sync.client import connect
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import serve
@@ -51,10 +56,40 @@ def ended(cockpit, number=signal.SIGINT):
     return cockpit.process.returncode, "\n".join(lines)
 
 
-def browser():
-    """An opener that keeps cookies and follows redirects, as a browser does; and its jar."""
-    jar = CookieJar()
-    return urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar)), jar
+class Seat:
+    """What an address has yielded to a browser that follows redirects: its cookie, and websockets of it."""
+
+    def __init__(self, link):
+        jar = CookieJar()
+        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar))
+        self.home, self.page = link.partition("?")[0], opener.open(link)
+        assert (self.page.status, self.page.geturl()) == (200, self.home)  # the token is gone
+        (self.jar,) = jar
+        self.cookie = f"{self.jar.name}={self.jar.value}"
+
+    def open(self, **more):
+        origin = self.home.rpartition("/")[0].rpartition("/")[0]
+        place = self.home.replace("http", "ws", 1) + "socket"
+        more = {"origin": origin, "max_size": None, "max_queue": None} | more
+        return connect(place, additional_headers={"Cookie": self.cookie}, **more)
+
+
+def status(address, **headers):
+    """The HTTP status of a GET."""
+    try:
+        return urllib.request.urlopen(urllib.request.Request(address, headers=headers)).status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def until(link, kind, having=lambda told: True, timeout_s=600.0):
+    """The next message of a kind with that; a machine on which nothing has flown yet compiles first."""
+    end_s = time.monotonic() + timeout_s
+    while time.monotonic() < end_s:
+        told = json.loads(link.recv(timeout=timeout_s))
+        if told["k"] == kind and having(told):
+            return told
+    raise AssertionError(f"no {kind}")
 
 
 def own_address():

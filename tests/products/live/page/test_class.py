@@ -30,47 +30,17 @@ def as_guest(site, *said, **more):
 ENTERED = [(0, "joined 1"), (0, "called 1 guest 1")]
 
 
+@pytest.mark.parametrize("invited", [False, True])
 @pytest.mark.parametrize("do", sorted(set(EVERYTHING) - {"name"}))
-def test_a_guest_who_looks_on_has_no_say(site, do):
-    told = as_guest(site, says(do=do, n=7, **EVERYTHING[do]), says(do=do, n=7, **EVERYTHING[do]))
-    assert site.asked == [*ENTERED, (0, "left 1")]
-    acknowledged = [json.loads(each["text"]) for each in told if '"ack"' in each.get("text", "")]
-    assert [each["n"] for each in acknowledged] == [7, 7]
-    for ok, words in answers(told):
-        assert not ok
-        assert words.startswith(f"{do}: ")
-    assert not any(seat.is_invited for seat in site.gate.guests)
-    assert site.said == []
-
-
-@pytest.mark.parametrize("do", sorted(set(EVERYTHING) - {"name"}))
-def test_a_guest_who_is_invited_breaks_and_does_nothing_else(site, do):
-    site.gate.invite(1, on=True)
-    told = as_guest(site, says(do=do, **EVERYTHING[do]))
+def test_a_guest_who_is_invited_breaks_and_has_no_other_say(site, do, invited):
+    site.gate.invite(1, on=invited)
+    told = as_guest(site, says(do=do, n=7, **EVERYTHING[do]))
     reached = [text for page, text in site.asked if page]
-    assert (len(reached) == 1) == (do in ("break", "repair", "blow"))
-    assert len(answers(told)) + len(reached) == 1
-    assert not site.gate.guests[1].is_invited
-
-
-def test_taken_back_it_is_refused_from_the_next_request_on(site):
-    site.gate.invite(None, on=True)
-    jam = says(do="break", **EVERYTHING["break"])
-    told = as_guest(site, jam, jam, then=None)
-    assert [text for page, text in site.asked if page] == [jam["text"]] * 2
-    site.gate.invite(None, on=False)
-    assert [ok for ok, _ in answers(as_guest(site, jam))] == [False]
-    assert answers(told) == []
-
-
-def test_a_message_of_the_server_is_not_a_guests_to_send(site):
-    """What it says to the flight goes as page 0, of which no page has the number."""
-    for text in ("called 1 Ada", "end", "joined 2", '{"do":"end"}', '{"do":"let","on":true,"by":"x"}'):
-        assert [ok for ok, _ in answers(as_guest(site, {"type": "websocket.receive", "text": text}))] == [
-            False
-        ]
-    assert {page for page, _ in site.asked} == {0}
-    assert not any(text == "end" or "Ada" in text for _, text in site.asked)
+    assert len(reached) == (invited and do in ("break", "repair", "blow"))
+    assert [ok for ok, _ in answers(told)] == [False] * (1 - len(reached))
+    assert all(words.startswith(f"{do}: ") for _, words in answers(told)) or invited
+    assert [each for each in site.asked if not each[0]] == [*ENTERED, (0, "left 1")]
+    assert (site.said, site.gate.guests[1].is_invited) == ([], False)
 
 
 @pytest.mark.parametrize(

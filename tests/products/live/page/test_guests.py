@@ -1,37 +1,16 @@
 """A class from outside: its links, who breaks what, who comes back, who is slow, and at which address."""
 
 import contextlib
-import json
 import socket
 import time
-import urllib.request
 
 import pytest
-from live_cockpit import browser, ended, own_address, started
+from live_cockpit import Seat, ended, own_address, started, status, until
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import serve
 from beaver_ftc_live.page.serve import Place
-
-
-class Seat:
-    """What a link has yielded to a browser: its cookie, and websockets of it."""
-
-    def __init__(self, link):
-        opener, jar = browser()
-        self.home, self.page = link.partition("?")[0], opener.open(link)
-        assert (self.page.status, self.page.geturl()) == (200, self.home)
-        (only,) = jar
-        self.cookie = f"{only.name}={only.value}"
-
-    def open(self, **more):
-        origin = self.home.rpartition("/")[0].rpartition("/")[0]
-        headers = {"Cookie": self.cookie}
-        place = self.home.replace("http", "ws", 1) + "socket"
-        more = {"origin": origin, "max_queue": None} | more
-        return connect(place, additional_headers=headers, **more)
 
 
 @pytest.fixture(scope="module")
@@ -42,16 +21,6 @@ def cockpit(tmp_path_factory):
     running.seat = Seat(running.address)
     yield running
     assert ended(running) == (0, "")
-
-
-def until(link, *kinds, having=lambda told: True, timeout_s=600.0):
-    """The next message of these kinds with that; a machine on which nothing has flown yet compiles first."""
-    end_s = time.monotonic() + timeout_s
-    while time.monotonic() < end_s:
-        told = json.loads(link.recv(timeout=timeout_s))
-        if told["k"] in kinds and having(told):
-            return told
-    raise AssertionError(f"no {kinds}")
 
 
 def test_a_guest_who_takes_nothing_holds_nobody_up(cockpit):
@@ -78,13 +47,6 @@ def test_a_guest_who_takes_nothing_holds_nobody_up(cockpit):
             now_s, frames = until(flyer, "f")["v"][0], frames + 1
         took_s = time.monotonic() - from_s
         assert now_s - start_s == pytest.approx(took_s, rel=0.5)
-
-
-def status(address, **headers):
-    try:
-        return urllib.request.urlopen(urllib.request.Request(address, headers=headers)).status
-    except urllib.error.HTTPError as error:
-        return error.code
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "own", "::1"])

@@ -8,12 +8,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
 
 
-def test_a_request_keeps_its_number_and_values():
-    asked = messages.parse('{"do": "stick", "rates_deg_s": [1, -2.5, 0], "n": 7}')
-    assert isinstance(asked, messages.Stick)
-    assert (asked.n, asked.rates_deg_s) == (7, (1.0, -2.5, 0.0))
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -41,12 +35,6 @@ def test_anything_else_is_refused_in_one_line(text):
     assert "\n" not in str(refused.value)
 
 
-def test_a_long_message_is_not_even_read():
-    text = json.dumps({"do": "break", "fault": {"type": "x" * messages.MAX_BYTES}})
-    with pytest.raises(BadInput, match="allowed: 2048"):
-        messages.parse(text)
-
-
 # Of each number the least and the largest that is taken, and the field that has it.
 LIMITS = [
     ({"do": "break", "fault": {"magnitude": 0.0}}, ("fault", "magnitude"), -1000, 1000),
@@ -72,11 +60,3 @@ def test_a_number_on_its_limit_is_taken_and_one_beyond_it_is_not(request_, place
         else:
             with pytest.raises(BadInput, match=str(place[-1])):
                 messages.parse(json.dumps(given))
-
-
-def test_what_is_left_out(changed):
-    asked = ("save", "repair", "aim", "change", "fresh", "invite")
-    least = [{"do": do} for do in asked] + [
-        {"do": "stick", "rates_deg_s": [0, 0, 0]}, {"do": "game", "move": "stop"},
-    ]  # fmt: skip
-    assert not changed([messages.parse(json.dumps(one)).model_dump() for one in least])

@@ -84,19 +84,6 @@ def test_the_page_may_name_scenarios_and_no_files(session, tmp_path):
     assert session.sim.frames == 2
 
 
-def test_a_flight_that_cannot_begin_leaves_the_old_one(session):
-    flown(session, 20)
-    with pytest.raises(BadInput):
-        asked(session, do="fresh", law="no-such-law")
-    assert session.sim.frames == 22
-
-
-def test_a_wrong_fault_is_refused_in_words(session):
-    with pytest.raises(BadInput, match="actuator"):
-        asked(session, do="break", fault={"type": "stuck", "actuator": "nose"})
-    assert session.state()["broken"] == []
-
-
 # What is asked of a new flight, and what of its scenario is then other than the default.
 FRESH = {
     "law": ("lqr", {"control.law": "lqr"}),
@@ -175,15 +162,3 @@ def test_the_rates_of_a_level_turn():
     rates = level_turn(np.pi / 3, 0.0, 98.0665 * np.tan(np.pi / 3))
     assert rates == pytest.approx([0.0, 0.1 * np.sin(np.pi / 3), 0.05])
     assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
-
-
-def test_what_the_session_was_given_can_be_flown_again_and_files_cannot(session):
-    given = bf.load({"name": "mine", "seed": 77})
-    own = Session(given, session._out)
-    asked(own, do="fresh", scenario="fault-free")
-    assert own.hello()["scenario"] == "fault-free"
-    assert "mine" in own.hello()["scenarios"]
-    asked(own, do="fresh", scenario="mine", law="lqr")
-    assert (own.scenario.seed, own.scenario.control.law, own.hello()["law"]) == (77, "lqr", "lqr")
-    with pytest.raises(BadInput, match="scenario: 'fault-fre' is not known, did you mean fault-free"):
-        asked(own, do="fresh", scenario="fault-fre")

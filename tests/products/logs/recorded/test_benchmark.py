@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -73,6 +74,23 @@ def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
         assert one["worst"]["classes"] <= one["mean"]["classes"]
         assert one["worst"]["mean_error"] >= one["mean"]["mean_error"]
     assert "| drawn, not looked at: worst |" in page.read_text()
+
+
+def test_drawn_days_differ_as_they_say():
+    """Standard deviations of 600 days; of the absolute of a normal number, its own."""
+    drawn = other_days.random_days(2, range(600))
+
+    def sd(name, change=np.asarray, middle=True):
+        values = change(np.array([getattr(day, name) for day in drawn]))
+        return values.std() if middle else np.sqrt((values**2).mean())
+
+    found = [
+        sd("trim_shift_commands"), sd("neutral_shift_commands"), sd("surface_gains", np.log),
+        sd("common_gain", np.log), sd("command_delay_s"), sd("motion_scale", np.log),
+        sd("noise_ratio", lambda of: of - 1.0, middle=False), sd("trim_drift_sd_commands", middle=False),
+    ]  # fmt: skip
+    assert found == pytest.approx([0.015, 0.01, 0.03, 0.1, 0.02, 0.25, 0.3, 0.006], rel=0.1)
+    assert min(day.noise_ratio for day in drawn) >= 1.0
 
 
 def test_other_days_without_a_folder():

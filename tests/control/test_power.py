@@ -10,11 +10,9 @@ from beaver_ftc.control import engines
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.diagnosis import EnginePower
-from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from beaver_ftc.studies.mismatch.linear import in_fdc
 from flying import flown, scenario
@@ -191,8 +189,10 @@ def swing_deg(log):
     return float(np.ptp(np.rad2deg(log["theta_rad"][late])))
 
 
-@pytest.mark.parametrize("V", SPEEDS)
-@pytest.mark.parametrize("law", ["oracle-published", "fault-tolerant-published"])
+@pytest.mark.parametrize(
+    ("V", "law"),
+    [(38.0, "oracle-published"), (45.0, "fault-tolerant-published"), (52.0, "fault-tolerant-published")],
+)
 class TestBothLost:
     def test_near_trim_the_phugoid_goes(self, V, law):
         (_, without), (flight, log) = (lost(V, law=law, enabled=on) for on in (False, True))
@@ -231,13 +231,3 @@ class TestOtherwise:
             )
             assert (log["manifold_pressure_inhg"] == 20.0).all()
             assert flight.engine_power is None
-
-    def test_switched_off_the_flight_is_to_the_bit_the_one_before(self):
-        _, log = lost(45.0, enabled=False, duration_s=20.0)
-        assert "manifold_pressure_inhg" not in log.columns
-
-
-def test_a_range_upside_down_is_refused_in_one_line():
-    text = "name: x\ncontrol:\n  power: {lowest_inhg: 30, highest_inhg: 20}\n"
-    with pytest.raises(BadInput, match=r"control\.power\.highest_inhg: below lowest_inhg, allowed: 30 inHg"):
-        load_text(text)

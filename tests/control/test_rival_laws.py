@@ -64,13 +64,6 @@ def test_a_constant_reference_is_reached_whatever_stands_in_the_way(name, effect
     assert np.abs(errors).max() < 1.0
 
 
-def test_gains_solve_the_scalar_riccati_equation():
-    """a = b = q = r = 1: P = P - P^2 / (1 + P) + 1, so P is the golden ratio and K = P / (1 + P)."""
-    one = np.eye(1)
-    golden = (1 + np.sqrt(5)) / 2
-    assert gains(one, one, one, one)[0, 0] == pytest.approx(golden / (1 + golden))
-
-
 def test_gains_minimise_the_cost():
     """Any other gain costs more, summed over a long run."""
     rng = np.random.default_rng(4)

@@ -9,19 +9,9 @@ from kernels import fill, new_fdi
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.bounds import map_dtype
-from beaver_ftc.diagnosis.detection import filters
 
-SPAN, V = 14.63, 45.0
+V = 45.0
 Y = np.array([0.1, 0.03, V, 1036.0, 0.3, 0.0, 0.0, 0.0])
-
-
-def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
-    """By corners: theta at either end at each instant, by the sign of what it multiplies."""
-    low, high = filters.residual_interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
-    assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
-    assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert filters.published_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert filters.published_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
 
 
 COUPLINGS = ("Ppq", "Pqr", "Qpp", "Qpr", "Qrr", "Rpq", "Rqr")
@@ -96,11 +86,6 @@ def test_the_share_of_its_travel_is_the_farthest_at_any_instant(where, before, i
     error_map["stop_lo"][1], error_map["stop_hi"][1] = 0.0, 0.0  # a travel that ends at neutral
     beyond = float(where[0] < 0.0 or where[1] > 0.0)
     assert bounds.share_used(error_map, 1, where, 0.0, 1) == beyond
-
-
-@pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
-def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.map_row(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(

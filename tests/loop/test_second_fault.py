@@ -81,34 +81,11 @@ def test_of_two_losses_at_once_the_truth_is_their_product_at_the_instant_of_the_
     assert "at 29.99 s (true 75 %)" in text(found)
 
 
-MASKED = [("stuck", "oscillatory"), ("float", "bias"), ("stuck", "rate_limit"), ("stuck", "stuck")]
 KEYS = {
     "oscillatory": {"amplitude_deg": 2, "frequency_rad_s": 6}, "bias": {"bias_deg": 2}, "stuck": {},
     "rate_limit": {"scale": 0.02}, "float": {}, "hardover": {"direction": 1},
     "loss_of_effectiveness": {"magnitude": 0.4},
 }  # fmt: skip
-
-
-@pytest.mark.parametrize(("first", "second"), MASKED)
-def test_a_fault_that_another_one_masks_as_it_begins_is_refused(first, second):
-    faults = [
-        {"actuator": "elevator", "type": kind, "at_s": at_s, **KEYS[kind]}
-        for kind, at_s in ((first, 8.0), (second, 8.0 if first == "stuck" else 9.0))
-    ]
-    with pytest.raises(bf.BadInput, match=r"faults\[1\].at_s: .*no effect.*allowed: before 8 s"):
-        load({"name": "masked", "faults": faults})
-    faults[0]["end_s"], faults[1]["at_s"] = 12.0, 12.0
-    load({"name": "in-turn", "faults": faults})
-    sim = bf.Simulation({"name": "by-hand"}, log=False)
-    sim.step()
-    sim.inject({"actuator": "elevator", "type": first, **KEYS[first]})
-    sim.step()
-    with pytest.raises(bf.BadInput, match="no effect"):
-        sim.inject({"actuator": "elevator", "type": second, **KEYS[second], **_elsewhere(second)})
-
-
-def _elsewhere(kind):
-    return {"position_deg": 3.0} if kind == "stuck" else {}  # the same jam again is no second one
 
 
 AGAIN = KEYS | {

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from kernels import new_fdi
-from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
@@ -16,23 +15,15 @@ from beaver_ftc.diagnosis.detection.forces import (
     configure_forces,
     update_both_forces,
 )
-from beaver_ftc.diagnosis.detection.parity import (
-    VANE_VIEW,
-    configure_parity_views,
-    configure_tones,
-)
-from beaver_ftc.diagnosis.state import NORMAL_FORCE, SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
 AIRCRAFT = load()
-ELEVATOR, FLAP = 1, 3
 X, U = np.array([0.05, -0.03, 0.04]), np.array([0.06, -0.08, 0.05, 0.1])
 Y = np.array([0.11, 0.07, 46.0, 1150.0, 2.1])
 ALONG_Y = np.arange(15.0).reshape(3, 5)
 DT, GRAVITY = 0.01, 9.80665
-ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, UP_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW, SIDE_VIEW = range(5, 13)
 
 
 def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
@@ -192,42 +183,6 @@ def test_in_turbulence_gusts_turn_the_flow():
         two += dt * (one - two) / tau
         gust[k] = two + np.sqrt(3.0) * (one - two)
     assert more == pytest.approx(np.std(np.diff(gust)) / V / np.sqrt(dt), rel=0.03)
-
-
-@pytest.fixture
-def viewed():
-    fdi = felt(Bounds(coefficients=0.05))
-    statistical = fdi["statistical"]
-    (
-        statistical["test"]["alarm_level"],
-        statistical["test"]["margin"],
-        statistical["test"]["forget"],
-    ) = 6.0, 0.5 * 5.0**2, 0.99
-    configure_parity_views(statistical, AIRCRAFT)
-    configure_tones(statistical["tone_test_config"], 1e-8, 45.0, 15.0, DT)
-    for _ in range(2):
-        update_both_forces(statistical["forces"], statistical["gust"], measured(), U, DT)
-    fdi["layout"]["position"] = range(4)
-    return fdi
-
-
-@pytest.mark.parametrize("v", [ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW])
-def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, v):
-    view, G = viewed["statistical"]["views"][v], np.random.default_rng(7).normal(0.0, 3.0, (3, 4))
-    G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
-    Across.turn(viewed, view, G)
-    first, second = view["plane_pair"]
-    force = viewed["statistical"]["forces"]["component"][second - SIDE_FORCE]
-    s = int(view["nulled"])
-    of_it = force["vane"] if s == VANE_VIEW else (G[first, s], force["G"][s])
-    assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
-    assert np.count_nonzero(view["direction"]) == 2
-    if s != VANE_VIEW:
-        assert Across.changes_view(viewed, view, s, G[:, s]) == 0
-        assert Across.changes_view(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (
-            second == NORMAL_FORCE
-        )
 
 
 def test_without_vanes_the_flow_is_what_the_forces_say():

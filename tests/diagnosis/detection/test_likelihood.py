@@ -66,32 +66,6 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
             assert by_onset(block, "R")[:3, slot, h] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
 
 
-def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
-    """N / sqrt(D) of the newest long onset, theta_hat and D over many flights with a fault from the start."""
-    rng = np.random.default_rng(1)
-    normal, estimate, information = [], [], []
-    for _ in range(flights):
-        block = _block(case, STEP_FAULT)
-        n = int(block["n"])
-        signature = scale * rng.normal(size=(frames, 1, n))
-        nu = drawn(block, frames, DT, rng, start=1.0) + theta * signature[:, 0]
-        _shown(block, nu, signature)
-        N, D = by_onset(block, "correlation")[-1, 0], by_onset(block, "information")[-1, 0]
-        normal.append(N / np.sqrt(D))
-        estimate.append(N / D)
-        information.append(D)
-    return np.array(normal), np.array(estimate), np.array(information)
-
-
-@pytest.mark.parametrize("case", AXES)
-@pytest.mark.parametrize("theta", [-0.4, 1.5])
-def test_the_estimate_is_unbiased_and_as_sure_as_it_says(case, theta):
-    _, estimate, information = _statistics(case, theta)
-    error = (estimate - theta) * np.sqrt(information)
-    assert np.mean(error) == pytest.approx(0.0, abs=4 / np.sqrt(len(error)))
-    assert np.mean(error**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(error)))
-
-
 @settings(max_examples=samples(60))
 @given(
     st.sampled_from(sorted(AXES)),

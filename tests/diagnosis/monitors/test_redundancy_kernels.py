@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
@@ -97,17 +96,6 @@ def test_a_reading_that_jumps_exceeds_its_own_tests_and_a_small_error_none(senso
             assert residual[RPM_TEST:N_EQUATIONS].max() == pytest.approx(size * UNITS[sensor])
 
 
-@pytest.mark.parametrize("i", range(3))
-def test_what_each_angle_turns_the_axes_by(i):
-    """By a small step of the angle, as a rotation vector in body axes."""
-    readings, angles, small = np.zeros(N_SENSORS), np.array([0.4, -0.3, 2.0]), 1e-6
-    readings[PHI : PHI + 3] = angles
-    moved = angles + small * (np.arange(3) == i)
-    one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
-    turned = (one.inv() * other).as_rotvec() / small
-    assert [redundancy.turn_share(readings, axis, i) for axis in range(3)] == pytest.approx(turned, abs=1e-5)
-
-
 def test_a_pressure_that_is_gone_shows_and_stays_finite():
     readings = np.repeat(true_flight(np.random.default_rng(0), 1, 0.01), 3, axis=0)
     dense = readings[0, QDYN] / readings[0, AIRSPEED] ** 2
@@ -142,15 +130,6 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     assert test["r"] == pytest.approx(weight @ residual)
     assert test["B"] == pytest.approx(h * weight @ rate + changes + 0.5 * gust)
     assert test["ratio"] == pytest.approx(np.max(np.abs(test["r"]) / test["B"]))
-
-
-def test_no_air_of_the_standard_atmosphere_thins_faster_than_the_bound_has_it():
-    """Density (1 - 2.25577e-5 h)^4.2559, its logarithm falling fastest high up; above 11 km of 216.65 K."""
-    troposphere = 4.2559 * 2.25577e-5 / (1.0 - 2.25577e-5 * np.arange(0.0, 11_000.0))
-    stratosphere = 9.80665 / (287.053 * 216.65)
-    assert (
-        max(troposphere.max(), stratosphere) < 1.0 / redundancy.DENSITY_SCALE_HEIGHT_M < 1.01 * stratosphere
-    )
 
 
 def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():

@@ -125,15 +125,6 @@ def test_sound_sensors_raise_no_alarm(seed):
     assert (given == readings).all() and inertial.all()  # noqa: PT018
 
 
-@pytest.mark.parametrize("i", range(N_SENSORS))
-def test_a_sensor_without_a_reading_is_isolated_at_once(i):
-    readings, true = with_fault(3, i, "none", 0)
-    monitor, given, _ = flown(readings, true, missing=i)
-    assert monitor["output"]["isolated_sensor"] == i
-    assert monitor["output"]["isolated_at_s"] == FROM * H
-    assert i >= AX or abs(given[FROM:, i] - true[FROM:, i]).max() < 8.0 * UNITS[i]
-
-
 def with_ratios(ratios, **fields):
     """Tests {test: ratio}, of which the residual is as large; in level flight, where each angle turns the
     aircraft about one axis. Other bounds are 1."""
@@ -302,44 +293,6 @@ def test_a_surface_may_be_isolated_if_no_gyro_and_no_frozen_flow_sensor_can_be_i
     allowed = bool(earlier and (excluded or not noisy) and frozen in (None, 0))
     assert bool(sensor_monitor.allows_isolation(monitor, earlier)) == allowed
     assert sensor_monitor.allows_isolation(fill(monitor, enabled=0), earlier)
-
-
-@pytest.mark.parametrize(
-    ("detected_at_s", "isolated", "alarm"),
-    [(9.6, 1, (9.6, 0, 1)), (9.6, -1, (9.6, 0, 0)), (9.4, 1, (10.0, 1, 0)), (None, -1, (10.0, 0, 0))],
-)  # fmt: skip
-def test_an_alarm_voids_what_was_concluded_a_moment_ago(detected_at_s, isolated, alarm):
-    """The instant of the alarm, whether a surface stays isolated, whether one had been."""
-    monitor, found = new_monitor(H), new_fdi()["verdict"]
-    found["detected"], found["isolated_estimator"] = detected_at_s is not None, isolated
-    found["detected_at_s"] = detected_at_s or -1.0
-    for t in (10.0, 11.0):
-        sensor_monitor.raise_alarm(monitor, found, t)
-        output = monitor["output"]
-        assert (output["alarmed_at_s"], output["keeps_surface"], output["had_surface"]) == alarm
-
-
-@pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
-def test_an_alarm_of_the_first_second_may_be_a_sensors_first_error(detected_at_s, early):
-    assert sensor_monitor.may_be_initial(new_monitor(H, t_start=2.5), detected_at_s) == early
-    assert not sensor_monitor.may_be_initial(new_monitor(H, enabled=0, t_start=2.5), detected_at_s)
-
-
-@pytest.mark.parametrize("i", range(3))
-@pytest.mark.parametrize("flow", [(0.0, 0.0), (0.2, -0.3)])
-def test_the_axis_of_the_spurious_velocity_is_that_of_the_accelerometer(i, flow):
-    """By turning a step along a body axis into speed, incidence and sideslip."""
-    monitor, V, (alpha, beta) = new_monitor(H), 45.0, flow
-    monitor["redundancy"]["memory"]["y_past"][[ALPHA, BETA, AIRSPEED]] = alpha, beta, V
-    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
-    moved = v + 1e-4 * np.eye(3)[i]
-    V_moved = np.linalg.norm(moved)
-    r = V_moved - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / V_moved) - beta
-    monitor["memory"]["r_sum"] = r
-    for doubt, by_gyro, who in ((0.0, False, [AX + i]), (0.51e-4, False, [*FORCES]), (0.0, True, [])):
-        monitor["memory"]["B_sum"] = doubt, 0.0, 0.0
-        sensor_monitor.suspect_accelerometers(monitor, by_gyro)
-        assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == who
 
 
 @pytest.fixture

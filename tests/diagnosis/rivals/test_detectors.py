@@ -129,16 +129,6 @@ def test_declared_air_is_no_fault_and_hides_a_large_one_only_for_a_while(name):
     assert 5.0 <= alarm_s < 7.0
 
 
-def test_cusum_waits_inversely_to_the_excess():
-    """A steady excess e over the allowance crosses h after h / e samples [Page1954]."""
-    detector = plugin_class(DETECTORS, "augmented-ukf")()
-    detector.reset(context(alarm=50.0, allowance=1.0))
-    values = [detector.update_statistic(5.0) for _ in range(26)]
-    assert values[24] == pytest.approx(1.0)
-    assert values[25] > 1.0
-    assert detector.update_statistic(0.0) == pytest.approx((52.0 - 3.0) / 50.0)
-
-
 def test_the_observers_residual_has_its_closed_form():
     """A constant unexplained acceleration c gives eps = dt c (1 - a^n) / (1 - a) after n frames."""
     detector = plugin_class(DETECTORS, "observer-constant")()

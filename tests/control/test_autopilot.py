@@ -115,14 +115,6 @@ class TestFlights:
         assert found["airspeed_mps"] < 4.5
         assert found["heading_deg"] < 6.0
 
-    @pytest.mark.parametrize("magnitude", [0.4, 1.0])
-    def test_an_elevator_loss_is_not_felt(self, magnitude):
-        flight, _ = flown(100.0, faults=[loss(magnitude=magnitude, at_s=30.0)], **REAL)
-        found = metrics(flight)["profile"]
-        assert found["altitude_m"] < 15.0
-        assert found["airspeed_mps"] < 3.0
-        assert found["heading_deg"] < 5.0
-
     @pytest.mark.parametrize("off_deg", [1.0, 3.0, 5.0])
     def test_an_elevator_jammed_nose_down_is_carried_by_the_flap(self, off_deg):
         trimmed_deg = np.degrees(Loop(Scenario(name="trim")).trim.elevator_rad)

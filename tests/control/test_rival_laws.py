@@ -93,16 +93,6 @@ def test_the_predictor_finds_a_constant_disturbance_within_frames():
         assert predictor.step(DT * d, np.zeros(3)) == pytest.approx(first)
 
 
-def test_the_filter_has_its_step_response():
-    """1 - (1 + n (1 - a)) a^n ... of two equal discrete poles, against the convolution sum."""
-    a, n = np.exp(-50.0 * DT), 30
-    low_pass = LowPass(50.0, DT, np.zeros(1))
-    for _ in range(n):
-        value = low_pass.step(np.ones(1))
-    impulse = (1 - a) * a ** np.arange(n)
-    assert value[0] == pytest.approx(np.convolve(impulse, impulse)[:n].sum())
-
-
 @pytest.mark.parametrize("reach", [1.0, 0.2])
 def test_incremental_inversion_sets_what_was_measured_against_the_positions_that_gave_it(reach):
     """Of an actuator that goes a share of its way in a frame, too: what is left is the disturbance alone."""

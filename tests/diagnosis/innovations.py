@@ -12,7 +12,6 @@ from statistics_of import Statistical
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
     N_GROUP_TESTS,
@@ -29,17 +28,6 @@ from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 LEVEL_FLIGHT = np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4)  # x, y, u
-
-
-def misread(y, place, error, power_error_kw_per_density_ratio=0.0):
-    """y (5,) with a reading of it off, and with dpt as it is then worked out from the same engine's chart."""
-    out = y.copy()
-    out[place] += error
-    density, before = 2.0 * out[3] / out[2] ** 2, 2.0 * y[3] / y[2] ** 2
-    power_kw = (y[4] - DPT_0) * y[3] * y[2] / KW_TO_DPT
-    power_kw -= power_error_kw_per_density_ratio * (density - before) / SEA_LEVEL_DENSITY_KG_M3
-    out[4] = DPT_0 + KW_TO_DPT * power_kw / (out[3] * out[2])
-    return out
 
 
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):

@@ -1,12 +1,9 @@
 """What the vanes know of the air's rotation, held against JSBSim's own gusts, and the algebra behind it."""
 
-import shutil
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import gusts
@@ -14,7 +11,6 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import load as load_given
 from flying import scenario
 
-ROOT = Path(__file__).resolve().parents[2]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
 FT = 0.3048
 
@@ -99,47 +95,6 @@ def test_all_three_true_gusts_drift_no_faster_than_declared(turbulence):
     share = np.mean([flight.intensity(flight.true) for flight in flights], axis=0)
     assert (share < 1.0).all()
     assert (share > 0.5).all()
-
-
-@pytest.mark.parametrize("forces", ["felt", "nobody's", "claimed"])
-def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path, monkeypatch, forces):
-    """A pull-up in still air: accelerometers say that it is no gust, and without them none is seen; told that
-    there are forces all the same, the detector takes it for one."""
-    shutil.copytree(ROOT / "tests/data/aircraft/trainer", tmp_path / "trainer")
-    file = tmp_path / "trainer/aircraft.yaml"
-    text = yaml.safe_load(file.read_text())
-    del text["forces"]
-    text["damage"] = {"tip-off": {"property": "failures/unanticipated/Cm-alpha3", "takes": ["aileron"]}}
-    file.write_text(yaml.safe_dump(text))
-    monkeypatch.chdir(tmp_path)
-    loop = Loop(
-        load_given(
-            {
-                "aircraft": "./trainer",
-                "duration_s": 5,
-                "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}},
-                "reference": {"q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.5}}]},
-            }
-        )
-    )
-    statistical = loop.frames["fdi"]["statistical"][0]
-    assert statistical["gust"]["output"]["uses_accelerometers"] == 1
-    if forces != "felt":
-        gusts.drop_accelerometers(statistical["gust"])
-    if forces == "claimed":
-        (
-            statistical["gust"]["output"]["measured"],
-            statistical["gust"]["memory"]["share"],
-        ) = (
-            1,
-            gusts.MIN_UNMEASURED_SHARES,
-        )
-    for _ in loop.chunks():
-        pass
-    assert bool(statistical["alarm"]["peak"] > 0.2) is (forces == "claimed")
-    seen = float(np.abs(statistical["gust"]["output"]["acc"]).max())
-    assert (seen == 0.0) is (forces == "nobody's")
-    assert (seen > 0.05) is (forces == "claimed")
 
 
 def test_the_specific_force_is_the_one_felt_aboard():

@@ -139,19 +139,3 @@ def test_a_mistake_is_said_in_one_line_and_the_flight_goes_on(change, says):
     assert "\n" not in str(refusal.value)
     sim.step(frames=10)
     assert sim.scenario_flown().changes == ()
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ([{"law": "lqr"}], r"changes\[0\].at_s: required key is missing"),
-        ([{"at_s": 40, "law": "lqr"}], r"changes\[0\].at_s: 40 is after the end"),
-        ([{"at_s": 3, "law": "lqr"}, {"at_s": 3, "law": "indi"}], r"changes\[1\].at_s: 3 is not after the"),
-        ([{"at_s": 3}], r"changes\[0\]: says no change, allowed: law"),
-        ({"at_s": 3}, "changes: this is a mapping, allowed: a list"),
-    ],
-)
-def test_a_scenario_is_told_what_is_wrong(changes, says):
-    with pytest.raises(bf.BadInput, match=says) as refusal:
-        bf.load({"changes": changes})
-    assert "\n" not in str(refusal.value)

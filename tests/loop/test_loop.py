@@ -113,13 +113,6 @@ def test_reading_through_python_gives_the_same_bits(monkeypatch):
     assert np.array_equal(native.rows, through_python.rows, equal_nan=True)
 
 
-def test_the_log_does_not_depend_on_the_chunks(monkeypatch):
-    _, whole = flown(faults=[loss()])
-    monkeypatch.setattr(loop, "CHUNK_ROWS", 257)
-    _, pieces = flown(faults=[loss()])
-    assert np.array_equal(whole.rows, pieces.rows, equal_nan=True)
-
-
 def test_a_flight_without_a_log_has_the_same_outcome():
     case = scenario(faults=[loss()])
     assert yielded(fly(case)) == yielded(fly(case, Memory()))

@@ -123,21 +123,6 @@ def test_what_is_no_sample_is_refused_and_not_taken(published):
         assert diagnosis.step(*good) == published.verdicts[k]
 
 
-@pytest.mark.parametrize(
-    ("keys", "says"),
-    [
-        ({"fdi": {"bound": {}}}, "^fdi.bound: unknown key, did you mean bounds"),
-        ({"rate_hz": 5}, "^rate_hz: 5 is out of range"),
-        ({"fdi": {"scheme": "rls-monitor"}}, r"^fdi\.scheme: rls-monitor is plugged in"),
-        ({"fdi": {"fault_class": "all", "probing": {}}}, r"^fdi\.probing: moves surfaces"),
-        ({"actuators": {"bandwidth": 3}}, "^actuators.bandwidth: unknown key"),
-    ],
-)
-def test_a_mistake_is_named_by_its_key(keys, says):
-    with pytest.raises(bf.BadInput, match=says):
-        bf.Diagnosis(bf.aircraft("beaver"), **keys)
-
-
 def test_the_model_is_what_the_surfaces_are_expected_to_give():
     flown = Flown(**CASES["published"])
     diagnosis = flown.diagnosis()

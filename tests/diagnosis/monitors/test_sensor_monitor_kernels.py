@@ -1,10 +1,10 @@
 """The sensor monitor in flights by rotation matrices, and its decisions on tests that are set by hand."""
 
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from kernels import fill, new_fdi
+from kernels import new_fdi
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.detection import attitude
@@ -24,7 +24,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_REFUTED,
     PRESSURE_TEST,
     PSI,
-    QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
@@ -278,75 +277,3 @@ def test_no_gyro_is_broken_if_w_and_the_attitude_differ_by_more_than_all_bounds(
     sensor_monitor.exclude_gyros(monitor)
     assert monitor["memory"]["gyros_excluded"] == excluded
     assert monitor["memory"]["gap"][1] == pytest.approx([size * limit] * 3)
-
-
-@pytest.mark.parametrize(
-    ("earlier", "excluded", "noisy", "frozen"), [*product((0, 1), (0, 1), (0, 1), (None, ALPHA, QDYN, 0))]
-)
-def test_a_surface_may_be_isolated_if_no_gyro_and_no_frozen_flow_sensor_can_be_it(
-    earlier, excluded, noisy, frozen
-):
-    monitor = new_monitor(H, gyros_excluded=excluded, noisy=noisy)
-    monitor["redundancy"]["memory"]["y_past"] = 0.1
-    if frozen is not None:
-        monitor["memory"]["n_same"][frozen] = 3
-    allowed = bool(earlier and (excluded or not noisy) and frozen in (None, 0))
-    assert bool(sensor_monitor.allows_isolation(monitor, earlier)) == allowed
-    assert sensor_monitor.allows_isolation(fill(monitor, enabled=0), earlier)
-
-
-@pytest.fixture
-def duplicates(monkeypatch):
-    """Two sensors that should equal another, in the places of the engine's: a heading, an altitude."""
-    places = {
-        "DUPLICATE": np.array([ENGINE_SPEED, MANIFOLD]), "COUNTERPART": np.array([PSI, ALTITUDE]),
-        "COUNTERPART_TEST": np.array([TURN_TEST, CLIMB_TEST]),
-        "DUPLICATE_TOLERANCE": np.array([0.01, 2.0]), "N_EQUATIONS": RPM_TEST, "N_IN_EQUATIONS": ENGINE_SPEED,
-    }  # fmt: skip
-    for module, name in product((redundancy, sensor_monitor), places):
-        monkeypatch.setattr(module, name, places[name], raising=False)
-    monitor = new_monitor(H)
-    monitor["redundancy"]["memory"]["reading_bound"] = np.arange(N_SENSORS) / 1000.0
-    return monitor
-
-
-def as_python(compiled):
-    """A kernel whose globals are looked up as it runs."""
-    return getattr(compiled, "py_func", compiled)
-
-
-def test_what_should_equal_another_reading_differs_by_the_errors_of_both_and_the_tolerance(duplicates):
-    """The heading by 6.2 rad, a turn less 0.083; the altitude by 5 m; neither where it is not fresh."""
-    readings, tests = np.zeros(N_SENSORS), duplicates["redundancy"]["test"][RPM_TEST:][:2]
-    readings[[ENGINE_SPEED, PSI, MANIFOLD, ALTITUDE]] = 3.1, -3.1, 905.0, 900.0
-    bounds = 1e-6 + np.array([0.01 + (ENGINE_SPEED + PSI) / 1e3, 2.0 + (MANIFOLD + ALTITUDE) / 1e3])
-    residual = np.array([6.2 - 2.0 * np.pi, 5.0])
-    for fresh in ((1, 1), (1, 0)):
-        as_python(redundancy.compare_duplicates)(duplicates["redundancy"], readings, np.array(fresh))
-        assert tests["ratio"] == pytest.approx(fresh * np.abs(residual) / bounds)
-    for alarmed, fresh, agreed in ((1, (1, 1), 0), (0, (0, 1), 0), (0, (1, 0), 1)):
-        tests["ratio"], duplicates["output"]["alarmed"] = (1.0, 1.1), alarmed
-        as_python(sensor_monitor.latch_agreed)(duplicates, np.array(fresh))
-        assert duplicates["memory"]["agreed"][0] == agreed
-
-
-@pytest.mark.parametrize(
-    ("own_test", "residual", "bound", "frozen", "agreed", "suspected"),
-    [
-        (0, 5.0, 1.4, 0, 1, {"duplicate"}), (1, 5.0, 1.4, 0, 1, {"reading"}),
-        (0, 5.0, 1.5, 0, 1, {"duplicate", "reading"}), (0, 5.0, 1.4, 3, 1, {"duplicate", "reading"}),
-        (0, 5.0, 1.4, 0, 0, {"duplicate", "reading"}), (0, -5.0, 1.4, 2, 1, {"duplicate"}),
-    ],
-)  # fmt: skip
-def test_of_two_that_differ_the_reading_is_suspected_unless_its_own_test_would_show_it(
-    duplicates, own_test, residual, bound, frozen, agreed, suspected
-):
-    """An error of 5 less 2 beyond the bound of both: hidden up to twice that of the reading's own test."""
-    test, memory = duplicates["redundancy"]["test"], duplicates["memory"]
-    test["residual"][RPM_TEST], test["B"][RPM_TEST, 0], test["B"][TURN_TEST, 0] = residual, 2.0, bound
-    memory["exceeded"][TURN_TEST], memory["n_same"][PSI], memory["agreed"][0] = own_test, frozen, agreed
-    as_python(sensor_monitor.suspect_duplicate)(duplicates, 0)
-    places = {"duplicate": ENGINE_SPEED, "reading": PSI}
-    assert np.flatnonzero(duplicates["output"]["suspect"]).tolist() == sorted(
-        places[name] for name in suspected
-    )

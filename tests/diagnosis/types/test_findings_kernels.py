@@ -5,7 +5,7 @@ import pytest
 from kernels import put
 
 from beaver_ftc.diagnosis.schemes import fdi_dtype
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
@@ -70,28 +70,6 @@ def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
         14.0,
         (TYPE_NAMES[0],),
     )
-
-
-def test_a_fault_outside_the_class_is_unanticipated():
-    found = verdict.fault_finding_dict(new(verdict=UNANTICIPATED), SURFACES)
-    assert (found["isolated"], found["isolation_type"]) == ("unanticipated", "unanticipated")
-    assert (found["isolation_time_s"], found["candidates"]) == (12.5, ())
-    several = verdict.fault_finding_dict(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
-    assert (several["isolated"], several["faults"]) == ("unanticipated", ())
-
-
-def several(named=(), alarmed=(0, 0), left=None):
-    fdi = new(left, pairs=1)
-    for s, at_s in named:
-        (
-            fdi["types"]["surface"]["status"]["is_isolated"][s],
-            fdi["types"]["surface"]["status"]["isolated_at_s"][s],
-        ) = (
-            1,
-            at_s,
-        )
-    fdi["types"]["pair"]["group_alarm"] = alarmed
-    return verdict.fault_finding_dict(fdi, SURFACES)
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])

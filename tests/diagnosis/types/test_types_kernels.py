@@ -221,11 +221,6 @@ def test_an_oscillation_is_counted_by_half_cycles():
     assert swing["square_past"] == pytest.approx(10 * 0.01)
 
 
-def test_the_amplitude_is_that_of_the_mean_square():
-    fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
-    assert commanded_surface.swing_amplitude(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
-
-
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(
@@ -305,11 +300,3 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         shown + 1e-12,
     )
     assert on(held_surface.keep_returns, fdi, surface, STUCK)
-
-
-def way(start, commands):
-    """Where the actuator brings a surface, from `start` on: half of what is left, 0.1 rad at most."""
-    places = [start]
-    for order in commands:
-        places.append(places[-1] + np.clip(0.5 * (order - places[-1]), -0.1, 0.1))
-    return np.array(places)

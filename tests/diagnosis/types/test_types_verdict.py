@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi, on, put, put_on
+from kernels import new_fdi, on, put_on
 
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
@@ -11,7 +11,6 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
     pairs,
-    registry,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import N_TYPES
@@ -223,18 +222,6 @@ def test_how_far_a_surface_is_off(kinds, at_fault, off):
 
 
 # Examining frames.
-
-
-def n_rest(low=0.1, high=0.2, frames=1, **fields):
-    fdi = new_case()
-    surface = fdi["types"]["surface"][RUDDER]
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.15, 0.3
-    surface["judged"]["lo"], surface["judged"]["hi"] = low, high
-    fdi["types"]["surface"]["evidence"]["n_anomalous"] = 0
-    put(fdi, **fields)
-    for _ in range(frames):
-        on(registry.count_rest, fdi, RUDDER)
-    return fdi, surface
 
 
 # Two faults at once.

@@ -6,7 +6,7 @@ import pytest
 import beaver_ftc as bf
 from flying import loss, scenario
 
-LAWS = ("nominal", "adaptive", "fault-tolerant", "fault-tolerant-published", "oracle", "lqr", "indi")
+LAWS = ("nominal", "adaptive", "fault-tolerant-published", "oracle", "indi")
 SCHEMES = ("none", "augmented-ekf", "adaptive-estimators")
 
 

@@ -182,18 +182,6 @@ def test_who_is_suspected_of_what_the_tests_show(ratios, who):
     assert suspects(ratios) == who
 
 
-@pytest.mark.parametrize(
-    ("verdict", "n_same", "who"),
-    [(GYRO_OPEN, 0, {1, THETA}), (GYRO_CONFIRMED, 0, {1}), (GYRO_REFUTED, 0, {THETA}),
-     (GYRO_CONFIRMED, 2, {1, THETA}), (GYRO_OPEN, 3, {THETA})],
-)  # fmt: skip
-def test_the_rates_and_a_frozen_angle_decide_between_a_gyro_and_the_attitude(verdict, n_same, who):
-    same, verdicts = np.zeros(N_SENSORS, int), (GYRO_OPEN, verdict, GYRO_OPEN)
-    same[THETA] = n_same
-    ratios = {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}
-    assert suspects(ratios, gyro_verdict=verdicts, n_same=same) == who
-
-
 @pytest.mark.parametrize("wrong", range(3))
 def test_the_error_of_one_angle_leaves_nothing_beyond_it(wrong):
     """In random attitudes the reading of one angle is off by random steps: the tests of turning show nothing

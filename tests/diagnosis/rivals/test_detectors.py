@@ -5,7 +5,6 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.rivals.observer import FadingSurfaceFits
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
 
@@ -138,20 +137,6 @@ def test_the_observers_residual_has_its_closed_form():
         detector.step(Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND), np.zeros(4))
     a = np.exp(-10.0 * DT)
     assert detector.eps[1] == pytest.approx(DT * 0.3 * (1 - a**50) / (1 - a))
-
-
-def test_the_best_fit_is_the_constrained_least_squares_solution():
-    rng = np.random.default_rng(3)
-    eps, Omega = rng.normal(size=(40, 3)), rng.normal(size=(40, 3, 3))
-    eps += -0.4 * Omega[:, :, 1]
-    fit = FadingSurfaceFits(1.0)
-    for e, omega in zip(eps, Omega, strict=True):
-        fit.step(e, omega)
-    surface, theta, misfit = fit.fit_best_surface()
-    solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
-    assert surface == 1
-    assert theta == pytest.approx(solution)
-    assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 120)
 
 
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():

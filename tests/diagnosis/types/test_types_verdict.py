@@ -204,23 +204,6 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
     assert verdict.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
-@pytest.mark.parametrize(
-    ("kinds", "at_fault", "off"),
-    [
-        ((FLOAT, STUCK), True, -0.3), ((STUCK,), True, 0.15 - 0.3), ((STUCK, BIAS), True, -0.05),
-        ((BIAS,), True, -0.05), ((SLOW,), True, 0.22 - 0.3), ((STUCK,), False, 0.22 - 0.3),
-    ],
-)  # fmt: skip
-def test_how_far_a_surface_is_off(kinds, at_fault, off):
-    _, surface = one(*kinds, command=0.3, low=0.2, high=0.24)
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.1, 0.2
-    surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS] = -0.1, 0.0
-    assert verdict.deflection_error(surface, at_fault) == pytest.approx(off)
-    if kinds == (BIAS,):
-        surface["sets"]["low"][BIAS] = -np.inf
-        assert verdict.deflection_error(surface, at_fault) == pytest.approx(0.22 - 0.3)
-
-
 # Examining frames.
 
 

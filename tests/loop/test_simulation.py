@@ -88,10 +88,7 @@ class TestBreakingThings:
         ("given", "key"),
         [
             ({"type": "stuck"}, "actuator: required key is missing"),
-            ({"type": "stuk", "actuator": "elevator"}, "type: 'stuk' is not known, did you mean stuck"),
             ({"type": "stuck", "actuator": "elevater"}, "actuator: 'elevater' is not known, did you mean"),
-            ({"type": "bias", "actuator": "flap", "bias_rad": 0.1}, "bias_rad: unknown key"),
-            ({"type": "loss_of_effectiveness", "actuator": "flap", "magnitude": 40}, "magnitude: 40 is out"),
             ({"type": "float", "actuator": "flap", "at_s": 3}, "at_s: has no meaning here"),
             ("stuck", "'stuck' is no fault"),
         ],

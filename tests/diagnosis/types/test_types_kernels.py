@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import new_fdi, on, put, put_on
+from kernels import new_fdi, on, put_on
 
 from beaver_ftc.diagnosis import types
 from beaver_ftc.diagnosis.types import registry
@@ -30,34 +30,17 @@ ALL = set(range(N_TYPES))
 def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
     fdi = new_fdi()
-    put(fdi, whole=1, half_frames=20, instants=1)
-    (
-        fdi["types"]["config"]["frames_per_block"],
-        fdi["types"]["config"]["block_duration_s"],
-        fdi["types"]["frame_index"],
-    ) = (
-        1,
-        DT,
-        10,
-    )
+    config, fdi["types"]["frame_index"] = fdi["types"]["config"], 10
+    config["single_instant"], config["half_frames"], config["n_substeps"] = 1, 20, 1
+    config["frames_per_block"], config["block_duration_s"] = 1, DT
     surface = fdi["types"]["surface"][0]
-    (
-        surface["actuator"]["stop_lo"],
-        surface["actuator"]["stop_hi"],
-        surface["actuator"]["approaches"],
-        surface["actuator"]["steps"],
-    ) = LOW, HIGH, 0.5, 0.1
-    surface["actuator"]["reach_lo"], surface["actuator"]["reach_hi"] = (
-        min(LOW, 0.0),
-        max(HIGH, 0.0),
-    )
+    actuator = surface["actuator"]
+    actuator["stop_lo"], actuator["stop_hi"], actuator["approaches"], actuator["steps"] = LOW, HIGH, 0.5, 0.1
+    actuator["reach_lo"], actuator["reach_hi"] = LOW, HIGH
     registry.restart_surface(surface)
     surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS] = -np.inf, np.inf
-    (
-        surface["judged"]["lo"],
-        surface["judged"]["hi"],
-        surface["judged"]["u"],
-    ) = low, high, command
+    judged = surface["judged"]
+    judged["lo"], judged["hi"], judged["u"] = low, high, command
     surface["sets"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
     put_on(surface, **fields)
     return fdi, surface

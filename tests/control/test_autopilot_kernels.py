@@ -11,7 +11,7 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
 from law_records import put
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
-AILERON, ELEVATOR, RUDDER = 0, 1, 2
+AILERON, RUDDER = 0, 2
 GAINS = {
     "altitude": 0.7, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015, "bank": 1.1,
     "bank_i": 0.2, "heading": 0.25, "heading_i": 0.04, "sideslip": 0.5, "alpha_s": 2.0, "airspeed_s": 3.0,

@@ -7,7 +7,6 @@ import pytest
 
 import beaver_ftc as bf
 import needs
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
@@ -58,19 +57,3 @@ def test_a_glider_holds_its_airspeed_and_pays_for_more_with_height():
     _, faster = flown({"airspeed_mps": [{"value": 28.2, "change_mps2": 0.5}]}, **glider)
     assert faster["airspeed_mps"][-1] == pytest.approx(28.2, abs=0.3)
     assert energy_lost_m(faster) == pytest.approx(energy_lost_m(held), rel=0.2)
-
-
-@pytest.mark.parametrize(
-    ("aircraft", "autopilot", "says"),
-    [
-        ("jsbsim:SGS", {"altitude_m": [{"hold": True}]},
-         "SGS has no steady thrust, so it glides: no altitude can be held, allowed: airspeed_mps"),
-        ("jsbsim:SGS", {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}]}, "no altitude"),
-        ("jsbsim:737", {"airspeed_mps": [{"value": 19}]}, "19 is out of range, allowed: a number from"),
-        ("beaver", {"airspeed_mps": [{"value": 139}]}, "139 is out of range, allowed: a number from 20 to 7"),
-    ],
-)  # fmt: skip
-def test_what_an_aircraft_cannot_do_is_refused(aircraft, autopilot, says):
-    with pytest.raises(BadInput) as refused:
-        bf.load({"name": "x", "aircraft": aircraft, "autopilot": autopilot})
-    assert says in str(refused.value)

@@ -70,10 +70,3 @@ def test_a_heading_is_turned_to_the_short_way_from_what_is_commanded():
     loops.advance_commands(pilot, -WHERE, 0.1)  # wherever the aircraft is
     loops.advance_commands(pilot, -WHERE, 0.2)
     assert pilot["command"][HEADING] == pytest.approx(3.0)
-
-
-def test_of_legs_of_the_same_instant_the_last_counts():
-    pilot = new(speed=[(0.0, 50.0, 1.0), (0.0, 40.0, 0.5), (9.0, 60.0, 1.0)])
-    loops.advance_commands(pilot, WHERE, 0.0)
-    assert (pilot["next_leg_index"][SPEED], pilot["goal"][SPEED]) == (2, 40.0)
-    assert pilot["command"][SPEED] == pytest.approx(45.0 - 0.05)

@@ -39,17 +39,6 @@ def filled():
     return set_up()
 
 
-@pytest.mark.parametrize(
-    ("loop", "rate", "damping"),
-    [("altitude", 0.8, 2.0), ("speed", 0.3, 1.224745), ("bank", 1.0, 1.118034), ("heading", 0.25, 1.976424)],
-)
-def test_a_loop_that_integrates_what_is_missing_does_not_overshoot_by_it(filled, loop, rate, damping):
-    """s^2 + k s + k_i: k in 1/s, and a damping of k / (2 sqrt k_i) above 1."""
-    gain = filled[0]["gain"]
-    assert gain[loop] == rate
-    assert gain[loop] / (2.0 * np.sqrt(gain[f"{loop}_i"])) == pytest.approx(damping, rel=1e-6)
-
-
 def level(qdyn_pa, flap_rad):
     """Elevator of level flight, rad, by the identified polynomials [TM88]; Cm_alpha times 1.2."""
     load = 1.1 * 2288.231 * 9.80665 / (qdyn_pa * 23.23)

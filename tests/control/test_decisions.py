@@ -20,7 +20,7 @@ from beaver_ftc.loop.assembly import frame_dtype
 from beaver_ftc.loop.frame import true_faults_dtype
 from law_records import put
 
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+ELEVATOR, RUDDER, FLAP = 1, 2, 3
 DT = 0.02
 
 

@@ -49,14 +49,3 @@ def test_the_power_for_an_acceleration_gives_it(airspeed_mps, trim, power):
 @pytest.mark.parametrize(("wanted", "power"), [(-50.0, 0.0), (50.0, 1.0)])
 def test_what_no_power_gives_is_asked_of_the_end(wanted, power):
     assert power_for(engine_of(), 0.0, 0.5, wanted) == power
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [({"setting": [0.0, 1.0, 0.5]}, "rising"), ({"force_n": [[1.0, 2.0]]}, "no table"),
-     ({"force_n": [[0.0, 9.0, 8.0]] * 3}, "falls with the setting")],
-)  # fmt: skip
-def test_what_is_no_table_is_refused(changes, says):
-    with pytest.raises(ValueError, match="contradictory") as refused:
-        ThrustSection.model_validate(SECTION | changes)
-    assert says in str(refused.value.errors())

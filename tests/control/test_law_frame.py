@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import row_of
 from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
@@ -14,7 +13,7 @@ from beaver_ftc.scenario.schema import Scenario
 from fault_kinds import BIAS, CONSTANT_LOSS, STUCK
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+ELEVATOR, RUDDER = 1, 2
 X = np.array([0.02, -0.01, 0.015])
 TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4), np.zeros(4))
 G = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])
@@ -97,15 +96,3 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
     frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
     commanded(frame)
     assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt
-
-
-def test_known_laws_are_those_of_the_page():
-    given = {
-        "nominal": (0, 0, 0), "adaptive": (1, 0, 0), "fault-tolerant": (1, 1, 0),
-        "oracle-published": (1, 1, 1),
-    }  # fmt: skip
-    for name, what in given.items():
-        assert tuple(new_frame(name)["control"]["config"])[1:] == what
-    files = {name: row_of(name).file for name in ("fault-tolerant", "fault-tolerant-published")}
-    assert files == {"fault-tolerant": "rejecting", "fault-tolerant-published": "published"}
-    assert LOSS == 0

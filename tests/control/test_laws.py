@@ -118,18 +118,6 @@ class TestAllocation:
         assert u[ELEVATOR] == pytest.approx(-0.04 / 0.6)
         assert u[FLAP] == pytest.approx(0.2 / 2.1)
 
-    def test_the_hand_over_is_continuous(self):
-        control = control_record()
-        control["layout"]["trim"][ELEVATOR] = -0.04
-        control["axes"]["demand"] = [0.0, 0.55, 0.0]
-        shares = np.linspace(0, 1, 101)
-        flap = []
-        for share in shares:
-            control["allocation"]["output"]["hand_over"] = share
-            flap.append(float(allocated(control, G_TYPICAL)[FLAP]))
-        assert np.max(np.abs(np.diff(flap))) < 0.02 * np.ptp(flap)
-        assert np.abs(np.diff(flap)[[0, -1]]).max() < 0.001 * np.ptp(flap)  # no kink at either end
-
 
 def test_effectiveness_moves_no_faster_than_allowed():
     control = control_record()

@@ -64,13 +64,6 @@ def test_a_constant_reference_is_reached_whatever_stands_in_the_way(name, effect
     assert np.abs(errors).max() < 1.0
 
 
-def test_gains_solve_the_scalar_riccati_equation():
-    """a = b = q = r = 1: P = P - P^2 / (1 + P) + 1, so P is the golden ratio and K = P / (1 + P)."""
-    one = np.eye(1)
-    golden = (1 + np.sqrt(5)) / 2
-    assert gains(one, one, one, one)[0, 0] == pytest.approx(golden / (1 + golden))
-
-
 def test_gains_minimise_the_cost():
     """Any other gain costs more, summed over a long run."""
     rng = np.random.default_rng(4)
@@ -98,16 +91,6 @@ def test_the_predictor_finds_a_constant_disturbance_within_frames():
     assert first == pytest.approx(a * DT * pole / (1.0 - a) * d)
     for _ in range(20):
         assert predictor.step(DT * d, np.zeros(3)) == pytest.approx(first)
-
-
-def test_the_filter_has_its_step_response():
-    """1 - (1 + n (1 - a)) a^n ... of two equal discrete poles, against the convolution sum."""
-    a, n = np.exp(-50.0 * DT), 30
-    low_pass = LowPass(50.0, DT, np.zeros(1))
-    for _ in range(n):
-        value = low_pass.step(np.ones(1))
-    impulse = (1 - a) * a ** np.arange(n)
-    assert value[0] == pytest.approx(np.convolve(impulse, impulse)[:n].sum())
 
 
 @pytest.mark.parametrize("reach", [1.0, 0.2])

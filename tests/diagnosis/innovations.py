@@ -8,12 +8,9 @@ with w, v, and n over its own standard deviation, independent and standard norma
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
-from statistics_of import Statistical
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
-from beaver_ftc.diagnosis.detection import likelihood, statistical
+from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.likelihood import (
     N_GROUP_TESTS,
     N_SLOTS,
@@ -22,24 +19,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     BlockCapacity,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
-from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
-
-TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
-LEVEL_FLIGHT = np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4)  # x, y, u
-
-
-def misread(y, place, error, power_error_kw_per_density_ratio=0.0):
-    """y (5,) with a reading of it off, and with dpt as it is then worked out from the same engine's chart."""
-    out = y.copy()
-    out[place] += error
-    density, before = 2.0 * out[3] / out[2] ** 2, 2.0 * y[3] / y[2] ** 2
-    power_kw = (y[4] - DPT_0) * y[3] * y[2] / KW_TO_DPT
-    power_kw -= power_error_kw_per_density_ratio * (density - before) / SEA_LEVEL_DENSITY_KG_M3
-    out[4] = DPT_0 + KW_TO_DPT * power_kw / (out[3] * out[2])
-    return out
 
 
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
@@ -166,67 +145,3 @@ def bounded_all(block, d, signatures, onset, dt):
         likelihood.bound_responses(block, bounded, dt)
         if k >= onset:
             likelihood.accumulate_evidence(block, False, dt, 1.0)
-
-
-class Detector:
-    """The compiled detector alone, made ready as before a flight, at one flight condition."""
-
-    def __init__(self, rate_hz=100.0, **fdi):
-        keys = {"rate_hz": rate_hz, "fdi": {"statistical": {}, **fdi}}
-        scenario = Scenario.model_validate({"name": "detector-alone", **keys})
-        self.frames = configure_design(scenario, TRAVEL_RAD).view(np.recarray)
-        frame = self.frames[0]
-        self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
-        design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
-        self.detector = self.fdi["statistical"]
-        Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
-        self.frame = 0
-
-    @property
-    def blocks(self):
-        return self.detector["block"]
-
-    def innovations(self, frames, rng):
-        """Healthy ones (frames, 3), as declared."""
-        out = np.empty((frames, 3))
-        for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
-            out[:, block["axes"][: block["n"]]] = drawn(
-                block, frames, self.dt, rng, likelihood.DRIFT_PRIOR_RAD_S2
-            )
-        return out
-
-    def watch(self, innovations, Gu, cubic, renew=False):
-        """Scores (k,), shares of the alarm level; `renew`: begin anew after an alarm, as a new flight."""
-        scores = np.empty(len(innovations))
-        watch_all(self.detector, innovations, Gu, cubic, self.frame, renew, self.dt, scores)
-        self.frame += len(innovations)
-        return scores
-
-
-@kernel
-def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
-    """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
-    for k in range(len(innovations)):
-        blocks, alarm, tests = detector.block, detector.alarm, detector.test
-        fill_block_signatures(blocks, Gu[k], cubic[k])
-        bounded, still = detector.noise.eta, detector.gust
-        statistical.update_blocks(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
-        views = detector.views[: detector.n_views]
-        statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
-        scores[k] = alarm.ratio
-        if renew and alarm.ratio > 1.0:
-            for slot in range(N_SLOTS):
-                for b in range(detector.block.size):
-                    likelihood.reset_slot(blocks[b], slot)
-
-
-def surfaces_at_work(frames, rate_hz, rng, size=0.3):
-    """Gu (frames, 3, 4) rad/s2 of surfaces that follow sines, and a pitching moment on alpha^3 (frames,)."""
-    t = np.arange(frames)[:, None] / rate_hz
-    wave = np.sin(2 * np.pi * np.array([0.25, 0.2, 0.3]) * t + rng.uniform(0, 6, 3))
-    Gu = np.zeros((frames, 3, 4))
-    Gu[:, 0, 0], Gu[:, 2, 0] = -size * wave[:, 0], -0.05 * size * wave[:, 0]
-    Gu[:, 1, 1] = -size * wave[:, 1]
-    Gu[:, 0, 2], Gu[:, 2, 2] = 0.2 * size * wave[:, 2], -size * wave[:, 2]
-    return Gu, 0.05 + 0.01 * wave[:, 1]

@@ -38,61 +38,11 @@ def fill(record, **values):
     return record
 
 
-# Short names of fields, for cases that say a few of them.
-SHORT = {
-    "whole": "single_instant", "length": "frames_per_block", "thresholds": "mu_kind",
-    "memory": "reach", "shared": "shared", "membership": "narrows",
-    "forgetting": "forget", "instants": "n_substeps",
-}  # fmt: skip
-WHERE = {
-    **dict.fromkeys(("enabled", "authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
-    **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
-    **dict.fromkeys(("eta_bar", "noise"), "bound"),
-}
-
-
-def put(fdi, **values):
-    """Fill fields of the stages' records, by their names alone."""
-    for name, value in values.items():
-        field = SHORT.get(name, name)
-        if field in fdi["types"]["config"].dtype.names:
-            fdi["types"]["config"][field] = value
-        if name in WHERE:
-            fill(fdi[WHERE[name]], **{field: value})
-
-
 # Fields of a surface's records by one name each, for cases that say a few of them.
-_ACTUATOR = {
-    **{name: name for name in ("stop_lo", "stop_hi", "reach_lo", "reach_hi")},
-    "runaway": "runaway",
-    "approach": "approach_share", "step": "step",
-    "slowest_step": "slow_step",
-}  # fmt: skip
-_OBSERVED = {
-    "command": "u", "low": "lo", "high": "hi",
-    **{name: name for name in ("anomalous", "kappa",
-    "hides")},
-}  # fmt: skip
-_EVIDENCE = (
-    "n_rest",
-    "n_unhidden",
-    "k_first",
-    "first_lo",
-    "first_hi",
-)
 OF_SURFACE = {
-    **{name: ("actuator", field) for name, field in _ACTUATOR.items()},
-    **{name: ("last", field) for name, field in _OBSERVED.items()},
-    **{f"{name}_then": ("judged", field) for name, field in _OBSERVED.items()},
-    **{
-        f"{name}_before": ("earlier", _OBSERVED[name]) for name in ("low", "high", "anomalous")
-    },
+    "runaway": ("actuator", "runaway"), "slowest_step": ("actuator", "slow_step"),
     "evidence": ("evidence", "n_anomalous"),
-    **{name: ("evidence", name) for name in _EVIDENCE},
-    "n_silent": ("accommodation", "n_silent"),
-    "in_question": ("status", "may_be_sole"), "standing": ("status", "basis"),
-    "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
-    "type": ("status", "fault_type"), "type_at_s": ("status", "typed_at_s"),
+    **{name: ("evidence", name) for name in ("n_rest", "n_unhidden", "k_first", "first_lo", "first_hi")},
 }  # fmt: skip
 
 
@@ -103,48 +53,22 @@ def put_on(surface, **values):
         surface[part][field] = value
 
 
-def of(surface, *names):
-    """Fields of a surface's records, by the same names."""
-    return tuple(surface[part][field] for part, field in map(OF_SURFACE.__getitem__, names))
-
-
-def of_stages(fdi, kernel):
+def of_stages(fdi):
     """What the arguments of kernels are called, of the stages of one diagnosis."""
-    types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
-    later = "range" in kernel.__name__
-    first = types["frame_index"]
-    values = {
-        ("c", "cfg", "config"): types["config"] if whole else fdi["config"],
-        ("types",): types,
-        ("surfs",): types["surface"],
-        ("pair",): types["pair"],
-        ("conclusion", "done", "found", "past"): fdi["verdict"],
-        ("layout",): fdi["layout"],
-        ("iso", "isolation"): fdi["isolation"],
-        ("est", "fies", "estimators"): fdi["isolation"]["estimator"],
-        ("bound",): fdi["bound"],
-        ("shared",): fdi["isolation"]["config"]["shared"],
-        ("abrupt",): fdi["config"]["abrupt"],
-        ("all_types",): fdi["config"]["diagnoses_all_types"],
-        ("n_substeps",): fdi["config"]["n_substeps"],
-        ("bank",): fdi["bank"],
-        ("fdae",): fdi["fdae"],
-        ("nu", "innovation"): fdi["bank"]["output"]["innovation"],
-        ("detected",): fdi["verdict"]["detected"],
-        ("nu_max",): fdi["bound"]["nu_max"],
-        ("noise", "n", "n_gyro"): fdi["bound"]["n_gyro"],
-        ("dt",): fdi["config"]["dt"],
-        ("alarm",): fdi["statistical"]["alarm"],
-        ("k",) if whole else (): first if later else first - 1,
-    }
-    return {name: value for names, value in values.items() for name in names}
+    types, isolation = fdi["types"], fdi["isolation"]
+    return {
+        "c": types["config"], "k": types["frame_index"] - 1, "types": types, "surfs": types["surface"],
+        "layout": fdi["layout"], "est": isolation["estimator"], "shared": isolation["config"]["shared"],
+        "bank": fdi["bank"], "nu": fdi["bank"]["output"]["innovation"], "nu_max": fdi["bound"]["nu_max"],
+        "dt": fdi["config"]["dt"],
+    }  # fmt: skip
 
 
 def on(kernel, fdi, *given):
     """Call a kernel on the records of its stages and on what is given, in the order of its arguments."""
     parameters = signature(getattr(kernel, "py_func", kernel)).parameters.values()
     needed = sum(each.default is each.empty for each in parameters)
-    stages, left, missing = of_stages(fdi, kernel), list(given), max(needed - len(given), 1)
+    stages, left, missing = of_stages(fdi), list(given), max(needed - len(given), 1)
     arguments = []
     for each in parameters:
         if missing > 0 and each.name in stages:

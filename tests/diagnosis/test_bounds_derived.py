@@ -8,15 +8,11 @@ from hypothesis import strategies as st
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds import (
     add_declared_bound,
-    fill_eG,
     inertia_bounds,
-    poles_for_delays,
 )
 from beaver_ftc.diagnosis.detection.filters import advance_gyro
 from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensors import Sensors
 from samples import samples
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -123,45 +119,3 @@ def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames)
             filtered = advance_gyro(filtered, nbar[k], a)
         assert abs(eps) <= filtered + nbar[-1] + 1e-12
     assert abs(eps) == pytest.approx(filtered + nbar[-1], rel=1e-9)
-
-
-def test_poles_for_noise_give_the_greatest_excess():
-    """By brute force: no other pole finds a smaller fault within the same time."""
-    sensors = Sensors.model_validate("tactical-grade")
-    nbar, eta = 8 * np.radians(0.0208), 0.02
-
-    def smallest_fault(pole, delay_s):
-        return (nbar * pole + eta) / (1 - np.exp(-pole * delay_s))
-
-    for delay_s, pole in zip((0.1, 0.5, 2.0), poles_for_delays(SensorErrors(sensors), eta), strict=True):
-        least = min(smallest_fault(other, delay_s) for other in np.geomspace(0.05, 200, 4000))
-        assert smallest_fault(pole, delay_s) == pytest.approx(least, rel=1e-5)
-    assert poles_for_delays(SensorErrors(Sensors()), eta) == ()
-
-
-def test_errors_that_have_no_bound_cannot_be_declared():
-    from beaver_ftc.documents.validation import ScenarioError
-    from beaver_ftc.scenario.schema import load_text
-
-    with pytest.raises(ScenarioError, match=r"fdi\.bounds\.sensors\.p"):
-        load_text("name: x\nfdi: {bounds: {sensors: {p: {delay_s: 0.1}}}}\n")
-    with pytest.raises(ScenarioError, match=r"Cm_alfa.*did you mean Cm_alpha"):
-        load_text("name: x\nfdi: {bounds: {coefficients: {Cm_alfa: 0.1}}}\n")
-
-
-@settings(max_examples=samples(50), deadline=None)
-@given(st.integers(0, 2**32), st.integers(0, 3))
-def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
-    """The bound is affine in |u|: a radian more raises it by what the surface's own terms may be off."""
-    x, y, u = state(np.random.default_rng(seed))
-    bounds = {"coefficients": 0.05, "inertia": 0.02, "sensors": SENSORS, "deflection_deg": 0.1}
-    further = u.copy()
-    further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
-    frame = configure_design(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), TRAVEL_RAD)[0]
-    add_declared_bound(
-        frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, np.zeros(3)
-    )
-    fill_eG(frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], surface)
-    rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
-    assert frame["fdi"]["bound"]["declared_errors"]["eG"][:, surface] == pytest.approx(rise, abs=1e-9)
-    assert rise.max() > 0.1

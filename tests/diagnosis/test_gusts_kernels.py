@@ -89,13 +89,3 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
         axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
         assert record["output"]["C"] == pytest.approx(axes)
         assert record["memory"]["C_dot"] == pytest.approx((axes - axes_then) / DT)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_level_axes_are_a_rotation(seed):
-    phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)
-    turn, body = np.full((3, 3), 9.0), np.random.default_rng(seed + 10).normal(size=3)
-    gusts.fill_rotation(phi, theta, turn)
-    of_level = to_earth((phi, theta, 0.0))
-    assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
-    assert [gusts.level_component(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))

@@ -17,39 +17,6 @@ def record_of(dtype):
     return np.zeros(1, dtype).view(np.recarray)[0]
 
 
-def in_moving_air():
-    record = record_of(gusts.GUST_RECORD)
-    (
-        record["output"]["measured"],
-        record["config"]["v_max"],
-        record["config"]["a_v"],
-    ) = (
-        1,
-        30.0,
-        0.02,
-    )
-    (
-        record["memory"]["v"],
-        record["memory"]["v_g"],
-        record["memory"]["start_left"],
-    ) = (
-        (44.0, 1.5, 3.0),
-        (5.0, -2.0, 0.7),
-        0.8,
-    )
-    return record
-
-
-def test_the_speed_is_that_through_the_air_without_the_gust():
-    record, dt = in_moving_air(), 0.5
-    gusts.update_gust_speed(record, (1.0, -0.4, 0.3), 44.1, dt)
-    kept = np.exp(-0.02 * dt)
-    blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
-    assert record["memory"]["v_g"] == pytest.approx(blown)
-    assert record["output"]["V"] == pytest.approx(np.linalg.norm(blown + np.array([44.0, 1.5, 3.0])))
-    assert record["memory"]["start_left"] == pytest.approx(0.8 * kept**2)
-
-
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
 @pytest.mark.parametrize("height_ft", [4.0, 10.0, 120.0, 300.0, 900.0, 5000.0])
 def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_than_aloft(

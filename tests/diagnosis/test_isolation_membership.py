@@ -1,69 +1,67 @@
-"""Sets of parameters that agree with an innovation: inequalities solved by trying, and by hand."""
+"""Sets of parameters that agree with innovations: they hold the true one, shrink, and exclude another."""
 
 import numpy as np
-import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import isolation
 
-
-@pytest.mark.parametrize("slope", [2.0, -2.0])
-def test_the_parameters_that_agree_solve_the_inequality(slope):
-    low, high = isolation.consistent_theta(0.6, 0.2, slope, -5.0, 5.0)
-    theta = np.linspace(-1, 1, 2001)
-    agrees = theta[np.abs(0.6 - theta * slope) <= 0.2 + 1e-12]
-    assert (low, high) == pytest.approx((agrees[0], agrees[-1]))
-    low, high = isolation.consistent_theta(0.6, 0.2, slope, -0.25, 0.25)
-    assert sorted([abs(low), abs(high)]) == pytest.approx([0.2, 0.25])
+AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+WITHIN = st.tuples(*[st.floats(-0.999, 0.999)] * 3)  # shares of a bound, but for rounding
 
 
-def agreeing(innovation, **fields):
+def explained(theta, base, Z, spread, error):
+    """A diagnosis that sees base + theta Z and an admitted error, a share of bound and spread, (3,)."""
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
-    fdi["bank"]["output"]["innovation"], fdi["bound"]["nu_max"] = innovation, 0.1
-    (
-        fie["effect"]["regressor"],
-        fie["effect"]["base"],
-        fie["effect"]["e"],
-    ) = (
-        (1.0, 2.0, -1.0),
-        0.3,
-        0.05,
-    )
-    for name, value in fields.items():
-        fie[name] = value
+    fdi["bound"]["nu_max"] = 0.1
+    fie["effect"]["base"], fie["effect"]["regressor"], fie["effect"]["e"] = base, Z, spread
+    fdi["bank"]["output"]["innovation"] = base + theta * np.array(Z) + (0.1 + spread) * np.array(error)
     return fdi, fie
 
 
-def test_one_theta_has_to_explain_all_axes():
-    theta = -0.5
-    exact = 0.3 + theta * np.array([1.0, 2.0, -1.0])
-    assert on(isolation.theta_explains, *agreeing(exact))
-    assert on(isolation.theta_explains, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
-    # axis 0 allows theta up to -0.35 - ..., axis 2 asks for one below: no theta is left
-    assert not on(isolation.theta_explains, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
-    assert on(
-        isolation.theta_explains,
-        *agreeing(exact + np.array([0.16, 0.0, 0.16]), skip=(0, 0, 1)),
-    )
-    assert on(isolation.theta_explains, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
-    assert not on(
-        isolation.theta_explains, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0]))
-    )  # a gain is no loss
+@given(theta=st.floats(-1.0, 0.0), frames=st.lists(st.tuples(AXES, AXES, WITHIN), min_size=1, max_size=5),
+       spread=st.floats(0.0, 0.3), shared=st.booleans())  # fmt: skip
+def test_the_true_theta_stays_in_every_set_and_sets_shrink(theta, frames, spread, shared):
+    lo, hi = np.full(3, -1.0), np.zeros(3)
+    for base, Z, error in frames:
+        fdi, fie = explained(theta, base, Z, spread, error)
+        fdi["isolation"]["config"]["shared"] = shared
+        fie["set_lo"], fie["set_hi"], fie["theta"], fie["e"] = lo, hi, -0.5, 0.05
+        fie["Om"] = Z
+        fie["residual"] = fie["Om"] * (theta + 0.5) + 0.05 * np.array(error)
+        kept = on(isolation.theta_explains, fdi, fie), on(isolation.narrow_sets, fdi, fie)
+        assert all(kept)
+        assert (fie["set_lo"] <= theta + 1e-9).all()
+        assert (fie["set_hi"] >= theta - 1e-9).all()
+        assert (fie["set_lo"] >= lo).all()
+        assert (fie["set_hi"] <= hi).all()
+        lo, hi = fie["set_lo"].copy(), fie["set_hi"].copy()
 
 
-@pytest.mark.parametrize("shared", [False, True])
-def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
-    exact = 0.3 - 0.5 * np.array([1.0, 2.0, -1.0])
-    fdi, fie = agreeing(exact)
-    fdi["isolation"]["config"]["shared"] = shared
-    fie["Om"], fie["theta"], fie["e"] = (0.5, 0.0, 1.0), -0.2, 0.05
-    fie["residual"] = fie["Om"] * (-0.5 + 0.2)
-    assert on(isolation.narrow_sets, fdi, fie)
-    # frame: (0.1 + 0.05) / |Z|; filtered: 0.05 / |omega|
-    half = np.minimum(0.15 / np.array([1.0, 2.0, 1.0]), [0.1, np.inf, 0.05])
-    half = np.full(3, half.min()) if shared else half
-    assert fie["set_lo"] == pytest.approx(-0.5 - half)
-    assert fie["set_hi"] == pytest.approx(-0.5 + half)
-    fie["set_lo"][2], fie["set_hi"][2] = -0.2, -0.1
-    assert not on(isolation.narrow_sets, fdi, fie)
+@given(measured=st.floats(-1.0, 1.0), bound=st.floats(0.0, 0.5),
+       Z=st.floats(0.2, 2.0), sign=st.sampled_from([-1.0, 1.0]))  # fmt: skip
+def test_of_one_axis_the_set_is_what_solves_the_inequality(measured, bound, Z, sign):
+    low, high = isolation.consistent_theta(measured, bound, sign * Z, -5.0, 5.0)
+    theta = np.linspace(-6.0, 6.0, 4001)
+    agrees = (np.abs(measured - theta * sign * Z) <= bound) & (np.abs(theta) <= 5.0)
+    inside = (low <= theta) & (theta <= high)
+    at_an_end = np.minimum(np.abs(theta - low), np.abs(theta - high)) < 1e-9
+    assert (agrees == inside)[~at_an_end].all()
+
+
+TURNED = st.tuples(st.floats(0.6, 1.0), st.floats(-1.0, -0.6), st.floats(-1.0, 1.0))
+
+
+@given(theta=st.floats(-1.0, 0.0), Z=TURNED, beyond=st.floats(0.01, 1.0))
+def test_what_no_theta_explains_on_two_axes_together_is_excluded(theta, Z, beyond):
+    """Axis 0 asks for less than theta by its bound, axis 1 for more."""
+    fdi, fie = explained(theta, np.zeros(3), Z, 0.05, np.zeros(3))
+    fdi["bank"]["output"]["innovation"][:2] -= 0.15 + beyond
+    at_rest = (np.abs(fdi["bank"]["output"]["innovation"]) <= 0.1).all()
+    both = on(isolation.theta_explains, fdi, fie)
+    fie["skip"][:2] = 1
+    neither = on(isolation.theta_explains, fdi, fie)
+    assert at_rest or not both
+    assert neither

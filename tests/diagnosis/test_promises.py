@@ -143,16 +143,3 @@ def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
 
     none = {"memory": False, "shared_effectiveness": False, "set_membership": False}
     assert excluded({**none}) <= excluded({**none, "memory": True}) <= excluded("all")
-
-
-@settings(max_examples=samples(60), deadline=None)
-@given(st.integers(0, 2**32), st.sampled_from([0, 2]), st.floats(0.1, 1.0))
-def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
-    """Without any uncertainty the set closes on the parameter, and so does the estimate."""
-    plant = DesignPlant(seed, surface=surface, theta=constant(20, size), fault_profile="abrupt")
-    plant.fly(200, lambda *_: np.zeros(3), until=lambda p: False)
-    fie = plant.fdi["isolation"]["estimator"][surface]
-    if plant.fdi["verdict"]["detected"]:
-        assert fie["set_lo"][0] - 1e-9 <= -size <= fie["set_hi"][0] + 1e-9
-        assert fie["set_lo"][0] <= fie["theta"][0] <= fie["set_hi"][0]
-        assert fie["set_lo"][0] == fie["set_lo"][2]

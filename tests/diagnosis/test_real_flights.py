@@ -26,9 +26,8 @@ def flight(truth, bounds, **more):
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-@pytest.mark.parametrize("seed", [1, 2])
-def test_what_is_declared_raises_no_alarm(condition, seed):
-    flown = fly(flight(*CONDITIONS[condition], seed=seed))
+def test_what_is_declared_raises_no_alarm(condition):
+    flown = fly(flight(*CONDITIONS[condition], seed=1))
     assert flown.detection_time_s is None
     assert flown.worst_residual_ratio < 1.0
 

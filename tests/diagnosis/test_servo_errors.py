@@ -64,19 +64,3 @@ def test_a_loss_is_found_in_spite_of_them():
     flight = bf.fly(PUBLISHED.with_(errors), log=False)
     assert flight.isolation.correct
     assert flight.detection.delay_s <= 0.05
-
-
-def test_what_is_declared_is_said_where_the_truth_exceeds_it():
-    bounds = {"actuators": {"bandwidth": 0.2, "elevator": {"dead_band_deg": 0.1}}}
-    said = {"name": "x", "actuators": "servo", "fdi": {"bounds": bounds}}
-    within = {"bandwidth": 0.8, "elevator": {"dead_band_deg": 0.1, "bandwidth": 1.2}}
-    assert not [*warned(said, within)]
-    beyond = warned(said, {"rudder": {"dead_band_deg": 0.1}, "flap": {"bandwidth": 1.3}})
-    assert [*beyond] == ["uncertainty.actuators.rudder.dead_band_deg", "uncertainty.actuators.flap.bandwidth"]
-
-
-def warned(said, truth):
-    from beaver_ftc.scenario.declared import undeclared
-
-    scenario = Scenario.model_validate({**said, "uncertainty": {"actuators": truth}})
-    return [fact.key for fact in undeclared(scenario)]

@@ -1,6 +1,5 @@
 """Flights with the statistical detector: what it finds under noise, and what it leaves alone."""
 
-import numpy as np
 import pytest
 
 from flying import flown, loss
@@ -10,7 +9,6 @@ NOISY = {
     "environment": {"turbulence": "dryden", "severity": "light"},
 }
 DECLARED = {"sensors": "tactical-grade", "turbulence": "light"}
-UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 4}
 AT_WORK = {  # enough for the ailerons to stand out against the rolling gust
     "p": [{"sine": {"amplitude_deg_s": 12, "frequency_hz": 0.5}}],
     "q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}],
@@ -70,16 +68,6 @@ def test_a_dive_past_the_vertical_is_no_fault(
     assert flight.detection_time_s is None
 
 
-@pytest.mark.parametrize("noise", [{}, NOISY])
-@pytest.mark.parametrize("authority", ["either", "statistical"])
-def test_the_published_unanticipated_fault_is_named_so(authority, noise):
-    flight, _ = flown(
-        duration_s=8, faults=[UNANTICIPATED], fdi=_fdi(authority, DECLARED if noise else None), **noise
-    )
-    assert flight.isolated == "unanticipated"
-    assert flight.detection_time_s < 4.5
-
-
 @pytest.mark.parametrize("substeps", [1, 3])
 @pytest.mark.parametrize("authority", ["either", "statistical"])
 def test_a_small_loss_that_nobody_sees_until_it_ends_is_not_taken_for_an_unanticipated_fault(
@@ -94,17 +82,6 @@ def test_a_small_loss_that_nobody_sees_until_it_ends_is_not_taken_for_an_unantic
     assert flight.detection_time_s > 3.8
     assert flight.isolated in ("elevator", None)
     assert "elevator" in (*flight.candidates, flight.isolated)
-
-
-@pytest.mark.parametrize("noise", [{}, NOISY])
-def test_with_worst_case_authority_the_flight_is_the_one_without_it(noise):
-    keys = {"duration_s": 10, "faults": [loss(at_s=4)], **noise}
-    bounds = DECLARED if noise else {}
-    _, without = flown(fdi={"bounds": bounds}, **keys)
-    _, beside = flown(fdi=_fdi("worst-case", bounds), **keys)
-    assert set(without.columns) < set(beside.columns)  # the latter logs what the detector sees besides
-    for column in without.columns:
-        assert np.array_equal(without[column], beside[column], equal_nan=True), column
 
 
 @pytest.mark.parametrize("authority", ["either", "statistical"])
@@ -123,7 +100,6 @@ def test_a_loss_that_grows_is_never_taken_for_something_else(surface, kappa, aut
         ("light", {}),
         ("moderate", {"initial": {"airspeed_mps": 38}}),
         ("severe", {"initial": {"airspeed_mps": 52}}),
-        ("light", {"rate_hz": 20}),
         ("light", {"rate_hz": 200, "duration_s": 20}),
         ("light", {"substeps": 4, "duration_s": 30}),
         ("light", {"sensors": "consumer-grade"}),
@@ -136,20 +112,6 @@ def test_no_false_alarm_in_moving_air(severity, keys):
     flight, _ = flown(fdi=_fdi("statistical", bounds), **keys)
     assert flight.detection_time_s is None
     assert 0.2 < flight.statistical["closest_approach"] < 1.0
-
-
-@pytest.mark.parametrize("authority", ["either", "statistical"])
-@pytest.mark.parametrize(
-    ("fault", "kind"),
-    [
-        (loss("elevator", 0.5, at_s=4), "loss_of_effectiveness"),
-        ({"type": "stuck", "actuator": "rudder", "at_s": 4}, "stuck"),
-    ],
-)
-def test_of_every_type_the_sets_name_whoever_raised_the_alarm(fault, kind, authority):
-    flight, _ = flown(duration_s=10, faults=[fault], fdi=_fdi(authority, fault_class="all"))
-    assert flight.isolated == fault["actuator"]
-    assert kind in (flight.isolation_type, *flight.candidates) or any(kind in c for c in flight.candidates)
 
 
 @pytest.mark.parametrize(
@@ -180,16 +142,21 @@ _HIDING = {
 @pytest.mark.parametrize("sensor", ["alpha", "beta"])
 def test_an_error_of_a_vane_that_a_gust_may_hide_is_no_surfaces(sensor, severity, authority):
     watched = _fdi(authority, {**_HIDING, "turbulence": severity}, sensor_monitor="always")
-    for size_deg in (0.5, 0.8, 1.2, 1.7, 2.5, -0.5, -0.8, -1.2, -1.7, -2.5):
+    for size_deg in (0.5, 1.2, -0.8, -2.5):
         broken = {"sensor": sensor, "type": "bias", "magnitude": size_deg, "at_s": 1, "end_s": 2.2}
         flight, _ = flown(duration_s=4, uncertainty={}, faults=[broken], fdi=watched)
         assert flight.isolated in (None, "unanticipated", f"sensor {sensor}"), size_deg
 
 
 @pytest.mark.parametrize("fault_class", ["published", "all"])
-@pytest.mark.parametrize("law", ["nominal", "fault-tolerant", "indi"])
 @pytest.mark.parametrize(
-    "noisy", [{"qdyn": {"noise_std_pa": 3}}, {"alpha": {"noise_std_deg": 0.3}}, {"V": {"noise_std_mps": 0.3}}]
+    ("noisy", "law"),
+    [
+        ({"qdyn": {"noise_std_pa": 3}}, "nominal"),
+        ({"alpha": {"noise_std_deg": 0.3}}, "fault-tolerant"),
+        ({"V": {"noise_std_mps": 0.3}}, "indi"),
+        ({"alpha": {"noise_std_deg": 0.3}}, "indi"),
+    ],
 )
 def test_what_a_law_makes_of_noisy_air_data_is_no_fault(noisy, law, fault_class):
     """With gyros without noise: all that the law does, it does for what the readings are off by. Of every

@@ -4,25 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import fill, new_fdi
+from kernels import new_fdi
 
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.bounds import map_dtype
-from beaver_ftc.diagnosis.detection import filters
-
-SPAN, V = 14.63, 45.0
-Y = np.array([0.1, 0.03, V, 1036.0, 0.3, 0.0, 0.0, 0.0])
-
-
-def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
-    """By corners: theta at either end at each instant, by the sign of what it multiplies."""
-    low, high = filters.residual_interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
-    assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
-    assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert filters.published_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert filters.published_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
-
 
 COUPLINGS = ("Ppq", "Pqr", "Qpp", "Qpr", "Qrr", "Rpq", "Rqr")
 COMPONENT = st.floats(-1.0, 1.0)
@@ -51,35 +36,6 @@ def test_the_turning_earth_moves_no_aircraft_more_whatever_its_inertia(constants
     assert (np.abs(moved) <= out).all()
 
 
-def new_map(**fields):
-    record = np.zeros(1, map_dtype(4)).view(np.recarray)[0]
-    record["n_boxes"], record["n_levels"], record["n_rows"] = 2, 3, 2
-    record["outside"] = 7
-    record["lo"], record["hi"] = -1e6, 1e6
-    record["lo"][0, 0], record["hi"][0, 0] = -0.1, 0.1  # the inner box by roll rate
-    record["lo"][1, 5], record["hi"][1, 5] = 30.0, 60.0  # the outer one by airspeed
-    record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
-    record["stop_lo"], record["stop_hi"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
-    record["e"] = np.arange(record["e"].size).reshape(record["e"].shape) / 1000.0
-    return fill(record, **fields)
-
-
-@pytest.mark.parametrize(
-    ("u", "level"),
-    [
-        ((0.0, 0, 0, 0), 0), ((0.05, 0, 0, 0), 0), ((0.0501, 0, 0, 0), 1), ((-0.1, 0, 0, 0), 0),
-        ((-0.11, 0, 0, 0), 1), ((0, 0.2, 0, 0), 1), ((0, 0.21, 0, 0), 2), ((0, 0, -0.06, 0), 1),
-        ((0, 0, 0, 0.25), 0), ((0, 0, 0, -0.1), 2),
-    ],
-)  # fmt: skip
-def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    exact, off = np.zeros(len(u)), np.full(len(u), 0.07)
-    assert bounds.level_of_positions(new_map(), np.array(u), exact) == level
-    assert bounds.level_of_positions(new_map(two_free=1), np.array(u), exact) == 2
-    either = [bounds.level_of_positions(new_map(), np.array(u) + side * off, exact) for side in (-1, 0, 1)]
-    assert bounds.level_of_positions(new_map(), np.array(u), off) == max(either)
-
-
 @pytest.mark.parametrize(
     ("where", "before", "instants", "share"),
     [
@@ -96,32 +52,3 @@ def test_the_share_of_its_travel_is_the_farthest_at_any_instant(where, before, i
     error_map["stop_lo"][1], error_map["stop_hi"][1] = 0.0, 0.0  # a travel that ends at neutral
     beyond = float(where[0] < 0.0 or where[1] > 0.0)
     assert bounds.share_used(error_map, 1, where, 0.0, 1) == beyond
-
-
-@pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
-def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.map_row(new_map(time_s=time_s)) == age
-
-
-@pytest.mark.parametrize(
-    ("roll", "airspeed", "time_s", "box"),
-    [
-        (0.1, 45.0, 5.0, 0),
-        (0.11, 45.0, 20.0, 1),
-        (-0.1, 90.0, 5.0, 0),
-        (0.11, 61.0, 5.0, None),
-        (0.0, 45.0, 61.0, None),
-    ],
-)
-def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_s, box):
-    record = new_map(time_s=time_s)
-    y = Y.copy()
-    y[2] = airspeed
-    bounds.look_up_map(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), np.zeros(4))
-    age = 0 if time_s <= 10.0 else 1
-    expected = record["e"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
-    assert record["e_now"] == pytest.approx(np.full(3, expected))
-    assert record["outside"] == (box is None)
-    assert record["coordinates"][:7] == pytest.approx(
-        [roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2]
-    )

@@ -87,9 +87,9 @@ def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
 ):
     """The monitor's guarantee: worst-case bounds, whatever is drawn."""
     air = {"turbulence": "dryden", "severity": "light"} if turbulence == "light" else {}
-    for seed in range(3):
+    for seed in range(2):
         fdi = {"sensor_monitor": "always", "bounds": {"sensors": sensors, "turbulence": turbulence}}
-        given = {"rate_hz": rate_hz, "substeps": substeps, "seed": seed, "duration_s": 30}
+        given = {"rate_hz": rate_hz, "substeps": substeps, "seed": seed, "duration_s": 20}
         loop = Loop(flight(sensors=sensors, environment=air, fdi=fdi, **given))
         for _ in loop.chunks():
             pass
@@ -115,7 +115,7 @@ def test_beyond_what_is_declared_they_are():
 def test_what_is_declared_of_them_raises_no_false_alarm(sensors, turbulence):
     """By the statistics, with forces weighed: unwatched, accelerometers taken at their word."""
     air = {"turbulence": "dryden", "severity": "light"} if turbulence == "light" else {}
-    for seed in range(3):
+    for seed in range(2):
         bounds = {"sensors": sensors, "turbulence": turbulence}
         scenario = flight(
             sensors=sensors, environment=air, seed=seed, duration_s=20, fdi={**SOUND, "bounds": bounds}

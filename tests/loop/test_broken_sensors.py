@@ -17,7 +17,7 @@ SIZE = {"V": 4.0, "qdyn": 100.0, "altitude": 20.0, "engine_rpm": 100.0, "manifol
 def flight(*faults, fdi=None, **more):
     fdi = {"sensor_monitor": "always", **(fdi or {})}
     return load(
-        {"name": "x", "duration_s": 9, "reference": MOVING, "faults": list(faults), "fdi": fdi, **more}
+        {"name": "x", "duration_s": 7, "reference": MOVING, "faults": list(faults), "fdi": fdi, **more}
     )
 
 

@@ -104,19 +104,3 @@ def test_faults_on_several_surfaces_and_several_on_one_overlap():
     assert effective_at("aileron", 1.3)[0] == pytest.approx(np.deg2rad(-2))
     assert effective_at("aileron", 1.6)[0] == effective_at("aileron", 1.6)[1]
     assert effective_at("rudder", 2.0)[0] == 0.0
-
-
-def test_two_faults_are_no_single_one_and_the_aircraft_is_kept():
-    """Beyond the class of single faults: said to be so, and the law flies on with what it learns."""
-    flight, _ = flown(
-        duration_s=40,
-        faults=[
-            {"actuator": "elevator", "type": "stuck", "position_deg": 0, "at_s": 12},
-            {"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 20},
-        ],
-        fdi={"fault_class": "all"},
-    )
-    assert flight.detection_time_s == pytest.approx(12.01)
-    assert flight.isolated == "unanticipated"
-    assert flight.isolation_time_s >= 20.0
-    assert flight.departure is None

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -66,12 +65,3 @@ def test_outside_of_the_altitudes_nothing_is_concluded_and_it_is_said(folder):
     assert warned[0].startswith(
         "initial.altitude_m: 3000: nothing can be detected or named outside the altitudes"
     )
-
-
-def mapped():
-    """An aircraft whose map has two boxes, none the other's: of each quantity (low, high), SI."""
-    first = [(-0.1, 0.2), (-0.2, 0.1), (-0.3, 0.3), (-0.05, 0.3), (-0.1, 0.1), (30.0, 50.0), (1.0, 1.1)]
-    second = [(-0.4, 0.1), (-0.1, 0.3), (-0.2, 0.2), (-0.1, 0.2), (-0.2, 0.1), (40.0, 60.0), (0.9, 1.05)]
-    boxes = [SimpleNamespace(ends=lambda signals, of=of: [*of, (0.1, 0.9)]) for of in (first, second)]
-    file = SimpleNamespace(model_error_map=SimpleNamespace(boxes=boxes, until_s=[5.0, 12.0]))
-    return SimpleNamespace(file=file, signals=("dpt",))

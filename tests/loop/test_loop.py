@@ -113,13 +113,6 @@ def test_reading_through_python_gives_the_same_bits(monkeypatch):
     assert np.array_equal(native.rows, through_python.rows, equal_nan=True)
 
 
-def test_the_log_does_not_depend_on_the_chunks(monkeypatch):
-    _, whole = flown(faults=[loss()])
-    monkeypatch.setattr(loop, "CHUNK_ROWS", 257)
-    _, pieces = flown(faults=[loss()])
-    assert np.array_equal(whole.rows, pieces.rows, equal_nan=True)
-
-
 def test_a_flight_without_a_log_has_the_same_outcome():
     case = scenario(faults=[loss()])
     assert yielded(fly(case)) == yielded(fly(case, Memory()))
@@ -154,26 +147,6 @@ class TestFrames:
         for axis in "pqr":
             moved = np.diff(log[f"{axis}_rad_s"]) * 100
             assert moved == pytest.approx(log[f"{axis}dot_rad_s2"][:-1], abs=1e-4)
-
-    def test_a_command_acts_one_frame_later(self):
-        _, log = flown(faults=[loss()])
-        assert log["elevator_cmd_rad"] == pytest.approx(log["elevator_pos_rad"], abs=1e-15)
-
-    @pytest.mark.parametrize("substeps", [2, 5, 10])
-    def test_finer_truth_raises_no_alarm(self, substeps):
-        flight, _ = flown(substeps=substeps, duration_s=15)
-        assert flight.detection_time_s is None
-
-
-@pytest.mark.parametrize("fdi", [{}, {"sharpen": "none"}, {"pole_bank_per_s": [3, 100]}])
-def test_the_log_holds_what_raised_the_alarm(fdi):
-    flight, log = flown(duration_s=15, faults=[loss()], fdi=fdi)
-    over = [
-        np.abs(log[f"{axis}_alarm_residual_rad_s"]) > log[f"{axis}_alarm_threshold_rad_s"] for axis in "pqr"
-    ]
-    first = [np.argmax(axis) if axis.any() else np.inf for axis in over]
-    assert log["t_s"][int(min(first))] == flight.detection_time_s
-    assert "pqr"[int(np.argmin(first))] == flight.detection_axis
 
 
 class TestDepartures:

@@ -1,6 +1,5 @@
 """An aircraft that is only data: three surfaces, no slipstream, terms the built-in one does not have."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_record
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.trim import trim
@@ -106,16 +104,6 @@ def test_a_jam_is_named_or_stays_possible(surface):
     assert "stuck" in (flight.isolation_type, *flight.candidates)
 
 
-def test_what_it_has_not_is_refused_by_its_key():
-    text = FLIGHT.read_text()
-    for change, says in (
-        ("actuator: flap", "'flap' is not known, allowed: aileron, elevator, rudder"),
-        ("actuator: aileron, magnitud: 1", "unknown key, did you mean magnitude?"),
-    ):
-        with pytest.raises(BadInput, match=re.escape(says)):
-            load_text(text.replace("actuator: elevator", change), folder=FOLDER)
-
-
 LOST = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6, "at_s": 10.0}
 RUNS_AWAY = {"type": "hardover", "actuator": "elevator", "direction": 1, "at_s": 10.0}
 
@@ -133,15 +121,6 @@ def test_every_detector_names_its_elevator(scheme):
 def test_every_law_flies_it(law):
     flight = fly(quiet(**{"control.law": law}))
     assert flight.departure is None
-
-
-def test_its_sweep_is_flown_by_other_processes(tmp_path):
-    table = bf.sweep(
-        load_scenario(FLIGHT), vary={"faults[0].magnitude": {"uniform": [0.5, 0.9]}}, runs=2, workers=2
-    )
-    assert set(table["isolation.fault"]) == {"elevator"}
-    travel = {c for c in table.columns if c.startswith("tracking.surface_travel_deg.")}
-    assert {column.rpartition(".")[2] for column in travel} == {"aileron", "elevator", "rudder"}
 
 
 def test_a_result_folder_flies_it_again(tmp_path):

@@ -45,26 +45,6 @@ def test_a_frame_is_read_as_the_log_has_it(flown):
     assert now.alarmed == bool(row["detected"])
 
 
-def test_the_diagnosis_is_read_as_the_log_has_it(flown):
-    flight, _, now, row, alarm_s = flown
-    diagnosis, verdict = now.diagnosis, flight.verdict
-    assert diagnosis.detected
-    columns = [name for name in row if name.startswith("fie_") and name.endswith("_excluded")]
-    names = [name.removeprefix("fie_").removesuffix("_excluded") for name in columns]
-    assert diagnosis.detected_at_s == alarm_s
-    assert names[diagnosis.isolated_estimator].removesuffix("_position") == verdict.isolated
-    assert diagnosis.is_estimator_excluded.tolist() == [bool(row[f"fie_{name}_excluded"]) for name in names]
-    assert [one.is_excluded for one in diagnosis.estimators] == diagnosis.is_estimator_excluded.tolist()
-    assert (diagnosis.enabled, diagnosis.diagnoses_all_types) == (True, True)
-    aircraft = bf.load(FLIGHT).airframe
-    for s, name in enumerate(aircraft.surfaces):
-        stops, actuator = aircraft.travel[name], diagnosis.surface_fault_types[s].actuator
-        assert (actuator.travel_low_rad, actuator.travel_high_rad) == (stops.min_rad, stops.max_rad)
-        assert names[diagnosis.layout.position_estimator_index_by_surface[s]] == f"{name}_position"
-        assert names[diagnosis.layout.loss_estimator_index_by_surface[s]] == name
-        assert diagnosis.layout.dominant_axis_by_surface[s] == aircraft.dominant_axis[s]
-
-
 def test_a_readout_stays_when_the_flight_goes_on(flown):
     _, first, now, *_ = flown
     assert (first.rates_rad_s != now.rates_rad_s).any()

@@ -59,20 +59,3 @@ def test_steps_across_chunks(small, monkeypatch):
     _flown(other)
     assert np.array_equal(other.log, log, equal_nan=True)
     assert other.land().metrics == sim.land().metrics
-
-
-@pytest.mark.parametrize("frames", [0, -1, 1.5, "3", None])
-def test_so_many_frames_are_no_step(frames):
-    sim = bf.Simulation(scenario(duration_s=0.2))
-    with pytest.raises(
-        bf.BadInput, match=r"frames: .* is out of range, allowed: a whole number of at least 1"
-    ):
-        sim.step(frames=frames)
-    sim.step(frames=1)
-    assert sim.frames == 2
-
-
-@pytest.mark.parametrize("stick", [(0.0, 0.1), [0.0] * 4, (0.0, np.nan, 0.0), "left", 0.1])
-def test_what_is_no_stick(stick):
-    with pytest.raises(bf.BadInput, match=r"^stick: .* is not usable, allowed: 3 finite numbers, rad/s$"):
-        bf.Simulation(scenario(duration_s=0.2)).step(stick=stick)

@@ -3,14 +3,12 @@
 import subprocess
 import sys
 import tracemalloc
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import beaver_ftc as bf
 from flying import loss, scenario
-from telling import apart
 
 PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
 NOISY = {"p": {"noise_std_deg_s": 0.06}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.04}}
@@ -123,49 +121,6 @@ def test_what_is_no_sample_is_refused_and_not_taken(published):
             with pytest.raises(bf.BadInput, match=says):
                 diagnosis.step(*sample)
         assert diagnosis.step(*good) == published.verdicts[k]
-
-
-@pytest.mark.parametrize(
-    ("keys", "says"),
-    [
-        ({"fdi": {"bound": {}}}, "^fdi.bound: unknown key, did you mean bounds"),
-        ({"rate_hz": 5}, "^rate_hz: 5 is out of range"),
-        ({"fdi": {"scheme": "rls-monitor"}}, r"^fdi\.scheme: rls-monitor is plugged in"),
-        ({"fdi": {"fault_class": "all", "probing": {}}}, r"^fdi\.probing: moves surfaces"),
-        ({"actuators": {"bandwidth": 3}}, "^actuators.bandwidth: unknown key"),
-    ],
-)
-def test_a_mistake_is_named_by_its_key(keys, says):
-    with pytest.raises(bf.BadInput, match=says):
-        bf.Diagnosis(bf.aircraft("beaver"), **keys)
-
-
-def test_declared_turbulence_follows_the_altitude_that_is_given():
-    """The scale of turbulence is shorter near the ground: gusts turn the air faster [MIL-F-8785C]."""
-    bounds = {}
-    for altitude_m in (None, 1828.8, 20.0):
-        diagnosis = bf.Diagnosis(bf.aircraft("beaver"), 100, {"bounds": {"turbulence": "light"}})
-        sample = [0.01, 0.02, 0.03], [0.1, 0.01, 45.0, 1000.0, 0.2], [0.0] * 4, [0.0, 0.1, 0.0]
-        for _ in range(3):
-            diagnosis.step(*sample, altitude_m)
-        bounds[altitude_m] = diagnosis.innovation()[1]
-    assert (bounds[None] == bounds[1828.8]).all()
-    assert (bounds[20.0] > bounds[1828.8]).all()
-    with pytest.raises(bf.BadInput, match="is not finite"):
-        diagnosis.step(*sample, np.nan)
-
-
-def test_what_a_frame_left_unexplained_is_held_against_the_bound_of_that_frame():
-    """What is declared of the model, which hardly changes in a frame, and of its two readings of a gyro."""
-    noisy = Flown(**CASES["in noise and turbulence"])
-    diagnosis, rows = noisy.diagnosis(), []
-    for sample in noisy.samples[:120]:
-        diagnosis.step(*sample)
-        rows.append((*diagnosis.innovation(), diagnosis.inside()[0]["fdi"]["bound"].copy()))
-    for (*_, then), (innovation, bound, _, now) in pairwise(rows[60:]):
-        errors = (then["n_gyro"][0] + now["n_gyro"][0]) * 100.0
-        apart(errors=errors, bound=bound, innovation=innovation, eta_bar=then["eta_bar"][0])
-        assert bound == pytest.approx(then["eta_bar"][0] + errors, rel=1e-2)
 
 
 def test_the_model_is_what_the_surfaces_are_expected_to_give():

@@ -29,23 +29,6 @@ def test_attitude_and_altitude_of_sound_instruments_are_those_flown():
     assert read == pytest.approx(log["altitude_m"], abs=1e-6)
 
 
-def test_accelerations_of_sound_instruments_add_up_to_the_change_of_the_velocity():
-    """force + gravity - w x v is the acceleration in body axes; its sum over a second, by the mean of two
-    frames, is the change of airspeed and flow angles in still air."""
-    recorder, log = recorded()
-    a, b, V = (log[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps"))
-    phi, theta = log["phi_rad"], log["theta_rad"]
-    v = np.stack([V * np.cos(a) * np.cos(b), V * np.sin(b), V * np.sin(a) * np.cos(b)], axis=1)
-    w = np.stack([log[f"{axis}_rad_s"] for axis in "pqr"], axis=1)
-    down = np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
-    force = np.array([measured.force for measured, _ in recorder.seen])
-    rate = force + 9.80665 * down - np.cross(w, v)
-    change = v[200:] - v[100:-100]
-    summed = np.cumsum(0.005 * (rate[1:] + rate[:-1]), axis=0)
-    assert summed[199:] - summed[99:-100] == pytest.approx(change, abs=0.05)
-    assert np.abs(change).max() > 0.5
-
-
 def test_readings_have_the_errors_of_their_instruments():
     """As the context declares them."""
     sound, _ = recorded()

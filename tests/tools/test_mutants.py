@@ -55,7 +55,7 @@ def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
 def test_every_test_file_runs_plain_or_compiled_and_none_in_both():
     plain, compiled = map(set, map(scope.tests, (scope.PLAIN, scope.COMPILED)))
     assert not plain & compiled
-    assert scope.TESTS / "diagnosis" / "test_isolation_kernels.py" in plain
+    assert scope.TESTS / "diagnosis" / "test_surroundings_kernels.py" in plain
     every = {file for file in scope.TESTS.rglob("test_*.py") if "acceptance" not in file.parts}
     assert plain | compiled == every
 

@@ -95,12 +95,3 @@ def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
     assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
     assert rejecting.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
-
-
-def test_without_the_airframe_a_surface_is_blamed_for_what_it_answers():
-    """The last surface answers the sideslip, whose yaw has turned round."""
-    flight = flown(3, tied=0.5)
-    with_it = listened(*flight).found[:N]
-    without = listened(*flight, airframe=False).found[:N]
-    assert abs(with_it - THETA).max() < 0.2
-    assert abs(without - THETA).max() > 0.4

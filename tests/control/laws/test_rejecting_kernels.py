@@ -11,7 +11,7 @@ from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
 from law_records import fields, new_control, put
 
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+FLAP = 3
 DT = 0.01
 TRAVEL = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 
@@ -48,21 +48,6 @@ def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
         of = [np.interp(qdyn, config["qdyn"], row) for row in config[f"{name}_at"]]
         expected = [of[0], (1 - lost) * of[1] + lost * of[3], of[2]]
         assert memory[name] == pytest.approx(expected, rel=1e-12)
-
-
-def handed_over(allocated, reallocated, left):
-    """The share of pitch that the stand-in carries, once it is brought to a frame."""
-    allocation.hand_over_pitch(allocated, reallocated, 0, left, 0.1)
-    return float(allocated["output"]["transfer_share"])
-
-
-@pytest.mark.parametrize("given", [0.0, 0.25, 0.5, 1.0])
-@pytest.mark.parametrize(("left", "lost"), [(1.0, 0.0), (0.6, 0.4), (0.1, 0.9), (0.09, 1.0), (0.0, 1.0)])
-def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, left, lost):
-    allocated = record()[0]["allocation"]
-    allocated["output"]["hand_over"] = given
-    part = 1.0 if left == 0.0 else 3 * given**2 - 2 * given**3
-    assert handed_over(allocated, 1, left) == pytest.approx(part * lost, abs=1e-15)
 
 
 @given(st.integers(0, 50))

@@ -15,11 +15,10 @@ def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():
     loop.release()
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_rudder_that_floats_in_a_gust_stays_a_candidate(seed):
+def test_a_rudder_that_floats_in_a_gust_stays_a_candidate():
     """With ideal gyros at 200 Hz the elevator, which answered the gusts, ruled it out within seconds."""
     flown = fly(scenario(
-        duration_s=6, rate_hz=201, seed=seed, initial={"airspeed_mps": 51.7, "altitude_m": 2138},
+        duration_s=6, rate_hz=201, seed=1, initial={"airspeed_mps": 51.7, "altitude_m": 2138},
         uncertainty={},
         faults=[{"actuator": "rudder", "type": "float", "at_s": 2}], control={"law": "nominal"},
         environment={"turbulence": "dryden", "severity": "light"},

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from kernels import new_fdi
-from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
@@ -16,23 +15,15 @@ from beaver_ftc.diagnosis.detection.forces import (
     configure_forces,
     update_both_forces,
 )
-from beaver_ftc.diagnosis.detection.parity import (
-    VANE_VIEW,
-    configure_parity_views,
-    configure_tones,
-)
-from beaver_ftc.diagnosis.state import NORMAL_FORCE, SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
 
 AIRCRAFT = load()
-ELEVATOR, FLAP = 1, 3
 X, U = np.array([0.05, -0.03, 0.04]), np.array([0.06, -0.08, 0.05, 0.1])
 Y = np.array([0.11, 0.07, 46.0, 1150.0, 2.1])
 ALONG_Y = np.arange(15.0).reshape(3, 5)
 DT, GRAVITY = 0.01, 9.80665
-ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, UP_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW, SIDE_VIEW = range(5, 13)
 
 
 def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
@@ -72,31 +63,6 @@ def per_coefficient(y=Y):
 
 
 @pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
-def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
-    fdi, rate = felt(), 0.04
-    record, seen = fdi["statistical"]["forces"], measured()
-    record["angle_rate"][SIDE_INDEX], record["n_seen"] = rate, 1
-    update_both_forces(record, fdi["statistical"]["gust"], seen, U, DT)
-    whole = per_coefficient() * coefficient(name, rate=rate)
-    force = record["component"][f]
-    expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
-    assert force["innovation"] == pytest.approx(expected, rel=1e-12)
-    n = int(force["n_Z"])
-    assert force["regressor"][n - 1] == pytest.approx(whole)
-    values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
-    values += [
-        t.value
-        for t in AIRCRAFT.forces
-        if t.coefficient == "CY" and f == SIDE_INDEX and "betadoth" in dict(t.of)
-    ]
-    terms = force["regressor"][: n - 1]
-    if f == SIDE_INDEX:
-        terms = np.append(terms[:-1], terms[-1] / values[-1])
-        assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
-    assert np.dot(values, terms) == pytest.approx(whole)
-
-
-@pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
@@ -116,43 +82,6 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
         assert force["e_G"][s] == pytest.approx(0.05 * per_coefficient() * size)
-
-
-def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
-    """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
-    record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
-    forces.fill_angle_rates(record, measured())
-    alpha, beta, V = Y[:3]
-    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
-    g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
-    step = 1e-6
-    later = v + step * (a + g - np.cross(X, v))
-    now, then = (np.array([np.arcsin(w[1] / np.linalg.norm(w)), np.arctan2(w[2], w[0])]) for w in (later, v))
-    assert record["angle_rate"] == pytest.approx((now - then) / step, rel=1e-4)
-
-
-@pytest.mark.parametrize(("f", "place"), [(SIDE_INDEX, 1), (NORMAL_INDEX, 0)])
-def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
-    """Whatever a vane says after the first frame, what is left of the force is the same but for curvature."""
-    courses = np.zeros(30), np.append(0.0, np.random.default_rng(3).normal(0.0, 0.002, 29).cumsum())
-    left = []
-    for course in courses:
-        fdi = felt()
-        record = fdi["statistical"]["forces"]
-        record["CY_bdot"] = 0.0
-        for error in course:
-            y = Y.copy()
-            y[place] += error
-            update_both_forces(record, fdi["statistical"]["gust"], measured(y=y), U, DT)
-        left.append(
-            (
-                record["component"][f]["e_inertial"],
-                record["component"][f]["innovation"],
-            )
-        )
-    (inertial, plain), (inertial_too, other) = left
-    assert abs(plain - other) > 0.005
-    assert abs(inertial - inertial_too) < 0.05 * abs(plain - other)
 
 
 def test_noise_of_the_readings_is_jitter_of_the_forces():
@@ -192,42 +121,6 @@ def test_in_turbulence_gusts_turn_the_flow():
         two += dt * (one - two) / tau
         gust[k] = two + np.sqrt(3.0) * (one - two)
     assert more == pytest.approx(np.std(np.diff(gust)) / V / np.sqrt(dt), rel=0.03)
-
-
-@pytest.fixture
-def viewed():
-    fdi = felt(Bounds(coefficients=0.05))
-    statistical = fdi["statistical"]
-    (
-        statistical["test"]["alarm_level"],
-        statistical["test"]["margin"],
-        statistical["test"]["forget"],
-    ) = 6.0, 0.5 * 5.0**2, 0.99
-    configure_parity_views(statistical, AIRCRAFT)
-    configure_tones(statistical["tone_test_config"], 1e-8, 45.0, 15.0, DT)
-    for _ in range(2):
-        update_both_forces(statistical["forces"], statistical["gust"], measured(), U, DT)
-    fdi["layout"]["position"] = range(4)
-    return fdi
-
-
-@pytest.mark.parametrize("v", [ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW])
-def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, v):
-    view, G = viewed["statistical"]["views"][v], np.random.default_rng(7).normal(0.0, 3.0, (3, 4))
-    G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
-    Across.turn(viewed, view, G)
-    first, second = view["plane_pair"]
-    force = viewed["statistical"]["forces"]["component"][second - SIDE_FORCE]
-    s = int(view["nulled"])
-    of_it = force["vane"] if s == VANE_VIEW else (G[first, s], force["G"][s])
-    assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
-    assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
-    assert np.count_nonzero(view["direction"]) == 2
-    if s != VANE_VIEW:
-        assert Across.changes_view(viewed, view, s, G[:, s]) == 0
-        assert Across.changes_view(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (
-            second == NORMAL_FORCE
-        )
 
 
 def test_without_vanes_the_flow_is_what_the_forces_say():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
@@ -19,16 +18,12 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     PRESSURE_TEST,
     QDYN,
     RPM_TEST,
-    SENSOR_MONITOR_RECORD,
     SPEED_TEST,
     TEST_RECORD,
     THETA,
     TURN_TEST,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
-from telling import not_zero
 
 
 def compared(monitor, readings):
@@ -97,25 +92,6 @@ def test_a_reading_that_jumps_exceeds_its_own_tests_and_a_small_error_none(senso
             assert residual[RPM_TEST:N_EQUATIONS].max() == pytest.approx(size * UNITS[sensor])
 
 
-@pytest.mark.parametrize("i", range(3))
-def test_what_each_angle_turns_the_axes_by(i):
-    """By a small step of the angle, as a rotation vector in body axes."""
-    readings, angles, small = np.zeros(N_SENSORS), np.array([0.4, -0.3, 2.0]), 1e-6
-    readings[PHI : PHI + 3] = angles
-    moved = angles + small * (np.arange(3) == i)
-    one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
-    turned = (one.inv() * other).as_rotvec() / small
-    assert [redundancy.turn_share(readings, axis, i) for axis in range(3)] == pytest.approx(turned, abs=1e-5)
-
-
-def test_a_pressure_that_is_gone_shows_and_stays_finite():
-    readings = np.repeat(true_flight(np.random.default_rng(0), 1, 0.01), 3, axis=0)
-    dense = readings[0, QDYN] / readings[0, AIRSPEED] ** 2
-    readings[1, QDYN] = 0.0
-    gone, back = (residual[DENSITY_TEST] for _, residual in compared(new_monitor(0.01), readings))
-    assert (gone, -back) == pytest.approx((np.log(1e-9 / dense),) * 2)
-
-
 def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change():
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
     red, signal = new_monitor(0.02, 0.3, 0.25)["redundancy"], np.full(N_SENSORS, -3.0)
@@ -144,15 +120,6 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     assert test["ratio"] == pytest.approx(np.max(np.abs(test["r"]) / test["B"]))
 
 
-def test_no_air_of_the_standard_atmosphere_thins_faster_than_the_bound_has_it():
-    """Density (1 - 2.25577e-5 h)^4.2559, its logarithm falling fastest high up; above 11 km of 216.65 K."""
-    troposphere = 4.2559 * 2.25577e-5 / (1.0 - 2.25577e-5 * np.arange(0.0, 11_000.0))
-    stratosphere = 9.80665 / (287.053 * 216.65)
-    assert (
-        max(troposphere.max(), stratosphere) < 1.0 / redundancy.DENSITY_SCALE_HEIGHT_M < 1.01 * stratosphere
-    )
-
-
 def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
     readings = np.repeat(true_flight(np.random.default_rng(1), 1, 0.02), 5, axis=0)
     readings[:, :3], readings[:, THETA] = 0.0, (1.25, 1.28, 1.31, 1.28, 1.25)
@@ -175,11 +142,3 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     monitor["redundancy"]["config"]["decay"] = 0.0, 0.99, 0.9999
     for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()
-
-
-def test_a_monitor_that_is_off_has_found_nothing_and_holds_no_more():
-    monitor = np.zeros(1, SENSOR_MONITOR_RECORD)[0]
-    redundancy.configure_sensor_monitor(monitor, Declared.of(Scenario(name="x")), None, None)
-    assert {path: value.item() for path, value in not_zero(monitor)} == {
-        "output.alarmed_at_s": -1.0, "output.isolated_sensor": -1, "output.isolated_at_s": -1.0,
-    }  # fmt: skip

@@ -1,10 +1,10 @@
 """The sensor monitor in flights by rotation matrices, and its decisions on tests that are set by hand."""
 
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from kernels import fill, new_fdi
+from kernels import new_fdi
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.detection import attitude
@@ -24,7 +24,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_REFUTED,
     PRESSURE_TEST,
     PSI,
-    QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
@@ -125,15 +124,6 @@ def test_sound_sensors_raise_no_alarm(seed):
     assert (given == readings).all() and inertial.all()  # noqa: PT018
 
 
-@pytest.mark.parametrize("i", range(N_SENSORS))
-def test_a_sensor_without_a_reading_is_isolated_at_once(i):
-    readings, true = with_fault(3, i, "none", 0)
-    monitor, given, _ = flown(readings, true, missing=i)
-    assert monitor["output"]["isolated_sensor"] == i
-    assert monitor["output"]["isolated_at_s"] == FROM * H
-    assert i >= AX or abs(given[FROM:, i] - true[FROM:, i]).max() < 8.0 * UNITS[i]
-
-
 def with_ratios(ratios, **fields):
     """Tests {test: ratio}, of which the residual is as large; in level flight, where each angle turns the
     aircraft about one axis. Other bounds are 1."""
@@ -190,18 +180,6 @@ def suspects(ratios, alarm=None, **fields):
 )
 def test_who_is_suspected_of_what_the_tests_show(ratios, who):
     assert suspects(ratios) == who
-
-
-@pytest.mark.parametrize(
-    ("verdict", "n_same", "who"),
-    [(GYRO_OPEN, 0, {1, THETA}), (GYRO_CONFIRMED, 0, {1}), (GYRO_REFUTED, 0, {THETA}),
-     (GYRO_CONFIRMED, 2, {1, THETA}), (GYRO_OPEN, 3, {THETA})],
-)  # fmt: skip
-def test_the_rates_and_a_frozen_angle_decide_between_a_gyro_and_the_attitude(verdict, n_same, who):
-    same, verdicts = np.zeros(N_SENSORS, int), (GYRO_OPEN, verdict, GYRO_OPEN)
-    same[THETA] = n_same
-    ratios = {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}
-    assert suspects(ratios, gyro_verdict=verdicts, n_same=same) == who
 
 
 @pytest.mark.parametrize("wrong", range(3))
@@ -305,98 +283,3 @@ def test_data_speak_about_surfaces_if_no_flow_sensor_is_frozen_and_of_a_doubted_
         (earlier or doubts) and frozen in (None, 0)
     )
     assert sensor_monitor.allows_isolation(fill(monitor, enabled=0), earlier)
-
-
-@pytest.mark.parametrize(
-    ("detected_at_s", "isolated", "alarm"),
-    [(9.6, 1, (9.6, 0, 1)), (9.6, -1, (9.6, 0, 0)), (9.4, 1, (10.0, 1, 0)), (None, -1, (10.0, 0, 0))],
-)  # fmt: skip
-def test_an_alarm_voids_what_was_concluded_a_moment_ago(detected_at_s, isolated, alarm):
-    """The instant of the alarm, whether a surface stays isolated, whether one had been."""
-    monitor, found = new_monitor(H), new_fdi()["verdict"]
-    found["detected"], found["isolated_estimator"] = detected_at_s is not None, isolated
-    found["detected_at_s"] = detected_at_s or -1.0
-    for t in (10.0, 11.0):
-        sensor_monitor.raise_alarm(monitor, found, t)
-        output = monitor["output"]
-        assert (output["alarmed_at_s"], output["keeps_surface"], output["had_surface"]) == alarm
-
-
-@pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
-def test_an_alarm_of_the_first_second_may_be_a_sensors_first_error(detected_at_s, early):
-    assert sensor_monitor.may_be_initial(new_monitor(H, t_start=2.5), detected_at_s) == early
-    assert not sensor_monitor.may_be_initial(new_monitor(H, enabled=0, t_start=2.5), detected_at_s)
-
-
-@pytest.mark.parametrize("i", range(3))
-@pytest.mark.parametrize("flow", [(0.0, 0.0), (0.2, -0.3)])
-def test_the_axis_of_the_spurious_velocity_is_that_of_the_accelerometer(i, flow):
-    """By turning a step along a body axis into speed, incidence and sideslip."""
-    monitor, V, (alpha, beta) = new_monitor(H), 45.0, flow
-    monitor["redundancy"]["memory"]["y_past"][[ALPHA, BETA, AIRSPEED]] = alpha, beta, V
-    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
-    moved = v + 1e-4 * np.eye(3)[i]
-    V_moved = np.linalg.norm(moved)
-    r = V_moved - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / V_moved) - beta
-    monitor["memory"]["r_sum"] = r
-    for doubt, by_gyro, who in ((0.0, False, [AX + i]), (0.51e-4, False, [*FORCES]), (0.0, True, [])):
-        monitor["memory"]["B_sum"] = doubt, 0.0, 0.0
-        sensor_monitor.suspect_accelerometers(monitor, by_gyro)
-        assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == who
-
-
-@pytest.fixture
-def duplicates(monkeypatch):
-    """Two sensors that should equal another, in the places of the engine's: a heading, an altitude."""
-    places = {
-        "DUPLICATE": np.array([ENGINE_SPEED, MANIFOLD]), "COUNTERPART": np.array([PSI, ALTITUDE]),
-        "COUNTERPART_TEST": np.array([TURN_TEST, CLIMB_TEST]),
-        "DUPLICATE_TOLERANCE": np.array([0.01, 2.0]), "N_EQUATIONS": RPM_TEST, "N_IN_EQUATIONS": ENGINE_SPEED,
-    }  # fmt: skip
-    for module, name in product((redundancy, sensor_monitor), places):
-        monkeypatch.setattr(module, name, places[name], raising=False)
-    monitor = new_monitor(H)
-    monitor["redundancy"]["memory"]["reading_bound"] = np.arange(N_SENSORS) / 1000.0
-    return monitor
-
-
-def as_python(compiled):
-    """A kernel whose globals are looked up as it runs."""
-    return getattr(compiled, "py_func", compiled)
-
-
-def test_what_should_equal_another_reading_differs_by_the_errors_of_both_and_the_tolerance(duplicates):
-    """The heading by 6.2 rad, a turn less 0.083; the altitude by 5 m; neither where it is not fresh."""
-    readings, tests = np.zeros(N_SENSORS), duplicates["redundancy"]["test"][RPM_TEST:][:2]
-    readings[[ENGINE_SPEED, PSI, MANIFOLD, ALTITUDE]] = 3.1, -3.1, 905.0, 900.0
-    bounds = 1e-6 + np.array([0.01 + (ENGINE_SPEED + PSI) / 1e3, 2.0 + (MANIFOLD + ALTITUDE) / 1e3])
-    residual = np.array([6.2 - 2.0 * np.pi, 5.0])
-    for fresh in ((1, 1), (1, 0)):
-        as_python(redundancy.compare_duplicates)(duplicates["redundancy"], readings, np.array(fresh))
-        assert tests["ratio"] == pytest.approx(fresh * np.abs(residual) / bounds)
-    for alarmed, fresh, agreed in ((1, (1, 1), 0), (0, (0, 1), 0), (0, (1, 0), 1)):
-        tests["ratio"], duplicates["output"]["alarmed"] = (1.0, 1.1), alarmed
-        as_python(sensor_monitor.latch_agreed)(duplicates, np.array(fresh))
-        assert duplicates["memory"]["agreed"][0] == agreed
-
-
-@pytest.mark.parametrize(
-    ("own_test", "residual", "bound", "frozen", "agreed", "suspected"),
-    [
-        (0, 5.0, 1.4, 0, 1, {"duplicate"}), (1, 5.0, 1.4, 0, 1, {"reading"}),
-        (0, 5.0, 1.5, 0, 1, {"duplicate", "reading"}), (0, 5.0, 1.4, 3, 1, {"duplicate", "reading"}),
-        (0, 5.0, 1.4, 0, 0, {"duplicate", "reading"}), (0, -5.0, 1.4, 2, 1, {"duplicate"}),
-    ],
-)  # fmt: skip
-def test_of_two_that_differ_the_reading_is_suspected_unless_its_own_test_would_show_it(
-    duplicates, own_test, residual, bound, frozen, agreed, suspected
-):
-    """An error of 5 less 2 beyond the bound of both: hidden up to twice that of the reading's own test."""
-    test, memory = duplicates["redundancy"]["test"], duplicates["memory"]
-    test["residual"][RPM_TEST], test["B"][RPM_TEST, 0], test["B"][TURN_TEST, 0] = residual, 2.0, bound
-    memory["exceeded"][TURN_TEST], memory["n_same"][PSI], memory["agreed"][0] = own_test, frozen, agreed
-    as_python(sensor_monitor.suspect_duplicate)(duplicates, 0)
-    places = {"duplicate": ENGINE_SPEED, "reading": PSI}
-    assert np.flatnonzero(duplicates["output"]["suspect"]).tolist() == sorted(
-        places[name] for name in suspected
-    )

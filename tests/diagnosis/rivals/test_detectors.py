@@ -5,7 +5,6 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.rivals.observer import FadingSurfaceFits
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
 
@@ -129,16 +128,6 @@ def test_declared_air_is_no_fault_and_hides_a_large_one_only_for_a_while(name):
     assert 5.0 <= alarm_s < 7.0
 
 
-def test_cusum_waits_inversely_to_the_excess():
-    """A steady excess e over the allowance crosses h after h / e samples [Page1954]."""
-    detector = plugin_class(DETECTORS, "augmented-ukf")()
-    detector.reset(context(alarm=50.0, allowance=1.0))
-    values = [detector.update_statistic(5.0) for _ in range(26)]
-    assert values[24] == pytest.approx(1.0)
-    assert values[25] > 1.0
-    assert detector.update_statistic(0.0) == pytest.approx((52.0 - 3.0) / 50.0)
-
-
 def test_the_observers_residual_has_its_closed_form():
     """A constant unexplained acceleration c gives eps = dt c (1 - a^n) / (1 - a) after n frames."""
     detector = plugin_class(DETECTORS, "observer-constant")()
@@ -148,20 +137,6 @@ def test_the_observers_residual_has_its_closed_form():
         detector.step(Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND), np.zeros(4))
     a = np.exp(-10.0 * DT)
     assert detector.eps[1] == pytest.approx(DT * 0.3 * (1 - a**50) / (1 - a))
-
-
-def test_the_best_fit_is_the_constrained_least_squares_solution():
-    rng = np.random.default_rng(3)
-    eps, Omega = rng.normal(size=(40, 3)), rng.normal(size=(40, 3, 3))
-    eps += -0.4 * Omega[:, :, 1]
-    fit = FadingSurfaceFits(1.0)
-    for e, omega in zip(eps, Omega, strict=True):
-        fit.step(e, omega)
-    surface, theta, misfit = fit.fit_best_surface()
-    solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
-    assert surface == 1
-    assert theta == pytest.approx(solution)
-    assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 120)
 
 
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():

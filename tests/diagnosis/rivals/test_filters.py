@@ -36,20 +36,6 @@ def test_an_update_is_the_conditional_gaussian():
     assert got_S == pytest.approx(S)
 
 
-def test_a_filter_run_is_the_batch_posterior():
-    """A random walk seen in noise: the last filtered state is the marginal of one big Gaussian problem."""
-    n, q, r = 30, 0.3, 0.7
-    y = RNG.normal(size=n)
-    z, P = np.zeros(1), np.eye(1)
-    for value in y:
-        P = P + q
-        z, P, _ = update_state_and_covariance(z, P, np.array([value]) - z, np.array([[r]]))
-    walk = 1.0 + q * (1.0 + np.minimum.outer(np.arange(n), np.arange(n)))
-    gain = walk @ np.linalg.inv(walk + r * np.eye(n))
-    assert z[0] == pytest.approx((gain @ y)[-1])
-    assert P[0, 0] == pytest.approx((walk - gain @ walk)[-1, -1])
-
-
 @pytest.mark.parametrize("spread", [3.0, 6.0, 7.5])
 def test_sigma_points_have_the_mean_and_the_covariance(spread):
     z, P = RNG.normal(size=6), _covariance(6)
@@ -57,14 +43,6 @@ def test_sigma_points_have_the_mean_and_the_covariance(spread):
     assert weights.sum() == pytest.approx(1.0)
     assert weights @ points == pytest.approx(z)
     assert (points - z).T @ np.diag(weights) @ (points - z) == pytest.approx(P)
-
-
-def test_sigma_points_carry_a_square_exactly():
-    """E[x' A x] = z' A z + trace(A P) for any quadratic: what a linearisation misses."""
-    z, P, A = RNG.normal(size=4), _covariance(4), RNG.normal(size=(4, 4))
-    points, weights = sigma_points(z, P, 4.0)
-    squares = np.einsum("ki,ij,kj->k", points, A, points)
-    assert weights @ squares == pytest.approx(z @ A @ z + np.trace(A @ P))
 
 
 def test_recursive_least_squares_is_the_weighted_batch_solution():

@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.conclusion import (
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+ELEVATOR, FLAP = 1, 3
 
 
 def nameless():

@@ -5,14 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.bounds import bound_dtype
-from beaver_ftc.diagnosis.isolation import isolation_dtype
 from beaver_ftc.diagnosis.schemes import published as published_scheme
 
 TRAVEL = np.array([[-0.52, -0.49, -0.44], [0.52, 0.49, 0.44]])
 MAIN = np.arange(3)
-POLE, DT = 10.0, 0.01
 
 
 def network(gain=60.0, limit=20.0):
@@ -44,38 +40,3 @@ def test_the_basis_is_a_product_of_gaussians_of_x_and_u(alpha, beta, rate, defle
         expected = np.einsum("a,b,c->abc", gaussians(centres, angle), *along).ravel()
         np.testing.assert_allclose(new.memory.basis[i], expected, atol=1e-12)
         assert np.linalg.norm(new.memory.basis[i]) == pytest.approx(1.0)
-
-
-@given(
-    st.floats(-1.0, 0.0),
-    st.floats(0.0, 5000.0),
-    st.lists(st.floats(-3.0, 3.0), min_size=40, max_size=40),
-    st.booleans(),
-)
-def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
-    """However it adapts: the term Om ths' of the estimator sees to that."""
-    records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
-    records.config.a[:], records.config.gradient, records.config.gain = (
-        published_scheme.euler_decay(POLE, DT),
-        1,
-        gain,
-    )
-    fie = records.estimator[0]
-    fie.theta_min, fie.theta_max, fie.set_lo[:], fie.set_hi[:] = (
-        -1.0,
-        0.0,
-        -np.inf,
-        np.inf,
-    )
-    if projects:
-        fie.set_lo[:], fie.set_hi[:] = -1.0, 0.0
-    rate, bound = np.zeros(3), np.zeros(1, bound_dtype(4))[0]
-    for z in Z:
-        fie.residual[:] = rate - fie.xhat
-        assert fie.residual == pytest.approx(fie.Om * (theta - fie.theta), abs=1e-9)
-        fie.effect.regressor[:] = z, -z, 0.5 * z
-        before = rate.copy()
-        rate = before + DT * theta * fie.effect.regressor
-        isolation.advance_estimator(records, fie, bound, before, np.zeros(3), DT)
-        if projects:
-            assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()

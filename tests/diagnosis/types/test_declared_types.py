@@ -8,15 +8,10 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
 from test_release import HELD, Repaired
 
-import fault_kinds
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.assembly import configure_design
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensors import Sensors
 from samples import samples
 
 NOISE_DEG_S = 0.02
@@ -73,25 +68,6 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     said = fault_finding_dict(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
-
-
-@pytest.mark.parametrize("noisy", [False, True])
-def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
-    """An aileron stuck a quarter up its travel."""
-    plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
-    known = plant.fdi["types"]["surface"][0]
-    assert known["sets"]["low"][fault_kinds.STUCK] <= -0.26 <= known["sets"]["high"][fault_kinds.STUCK]
-    assert known["sets"]["high"][fault_kinds.STUCK] - known["sets"]["low"][fault_kinds.STUCK] < np.deg2rad(4)
-    assert fault_finding_dict(plant.fdi, SURFACES)["isolated"] == "aileron"
-
-
-def test_pairs_are_refused_with_noisy_gyros_in_one_line():
-    """What a change in flight would make of it, too."""
-    scenario = Scenario.model_validate({"name": "x", "fdi": {"fault_class": "all", "pairs": True}})
-    noisy = scenario.fdi.bounds.model_copy(update={"sensors": Sensors.model_validate("tactical-grade")})
-    changed = scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": noisy})})
-    with pytest.raises(BadInput, match=r"x: fdi\.pairs: not available with errors .*, allowed: false$"):
-        configure_design(changed, np.array([[-1.0] * 4, [1.0] * 4]))
 
 
 @pytest.mark.parametrize("kind", HELD)

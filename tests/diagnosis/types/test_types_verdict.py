@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi, on, put, put_on
+from kernels import new_fdi, on, put_on
 
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.diagnosis.types import (
@@ -11,7 +11,6 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
     pairs,
-    registry,
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import N_TYPES
@@ -46,42 +45,20 @@ def leave(surface, *kinds):
 def new_case(**left):
     """Four surfaces, of which each has these types left: by default all; none: it cannot be at fault."""
     fdi = new_fdi()
-    (
-        fdi["types"]["config"]["half_frames"],
-        fdi["types"]["config"]["single_instant"],
-        fdi["config"]["diagnoses_all_types"],
-        fdi["types"]["config"]["n_substeps"],
-    ) = PATIENCE, 1, 1, 1
-    fdi["isolation"]["config"]["n_estimators"] = 8
-    fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = 1, DT
-    layout = fdi["layout"]
+    types, isolation, layout = fdi["types"], fdi["isolation"], fdi["layout"]
+    config, surfaces, estimators = types["config"], types["surface"], isolation["estimator"][:8]
+    config["half_frames"], config["single_instant"], config["n_substeps"] = PATIENCE, 1, 1
+    config["frames_per_block"], config["block_duration_s"] = 1, DT
+    fdi["config"]["diagnoses_all_types"], isolation["config"]["n_estimators"] = 1, 8
     layout["loss"], layout["position"] = range(4), range(4, 8)
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
-    fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["hypothesis_kind"][:8] = (
-        (0, 1, 2, 3) * 2,
-        (0,) * 4 + (1,) * 4,
-    )
-    (
-        fdi["types"]["surface"]["status"]["may_be_sole"],
-        fdi["types"]["surface"]["evidence"]["n_anomalous"],
-        fdi["types"]["surface"]["evidence"]["n_unhidden"],
-    ) = 1, 99, 99
-    fdi["types"]["surface"]["actuator"]["stop_lo"], fdi["types"]["surface"]["actuator"]["stop_hi"] = (
-        -0.4,
-        0.5,
-    )
-    (
-        fdi["types"]["surface"]["actuator"]["reach_lo"],
-        fdi["types"]["surface"]["actuator"]["reach_hi"],
-    ) = (
-        -0.4,
-        0.5,
-    )
-    fdi["isolation"]["estimator"]["theta_min"][4:8], fdi["isolation"]["estimator"]["theta_max"][4:8] = (
-        -0.4,
-        0.5,
-    )
+    estimators["surface"], estimators["hypothesis_kind"] = (0, 1, 2, 3) * 2, (0,) * 4 + (1,) * 4
+    estimators["theta_min"][4:], estimators["theta_max"][4:] = -0.4, 0.5
+    surfaces["status"]["may_be_sole"] = 1
+    surfaces["evidence"]["n_anomalous"] = surfaces["evidence"]["n_unhidden"] = 99
+    for end, stop in (("lo", -0.4), ("hi", 0.5)):
+        surfaces["actuator"][f"stop_{end}"] = surfaces["actuator"][f"reach_{end}"] = stop
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
         if kinds is None:
@@ -205,36 +182,7 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
     assert verdict.choose_mode(one(*kinds)[1]) == accommodation_mode
 
 
-@pytest.mark.parametrize(
-    ("kinds", "at_fault", "off"),
-    [
-        ((FLOAT, STUCK), True, -0.3), ((STUCK,), True, 0.15 - 0.3), ((STUCK, BIAS), True, -0.05),
-        ((BIAS,), True, -0.05), ((SLOW,), True, 0.22 - 0.3), ((STUCK,), False, 0.22 - 0.3),
-    ],
-)  # fmt: skip
-def test_how_far_a_surface_is_off(kinds, at_fault, off):
-    _, surface = one(*kinds, command=0.3, low=0.2, high=0.24)
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.1, 0.2
-    surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS] = -0.1, 0.0
-    assert verdict.deflection_error(surface, at_fault) == pytest.approx(off)
-    if kinds == (BIAS,):
-        surface["sets"]["low"][BIAS] = -np.inf
-        assert verdict.deflection_error(surface, at_fault) == pytest.approx(0.22 - 0.3)
-
-
 # Examining frames.
-
-
-def n_rest(low=0.1, high=0.2, frames=1, **fields):
-    fdi = new_case()
-    surface = fdi["types"]["surface"][RUDDER]
-    surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.15, 0.3
-    surface["judged"]["lo"], surface["judged"]["hi"] = low, high
-    fdi["types"]["surface"]["evidence"]["n_anomalous"] = 0
-    put(fdi, **fields)
-    for _ in range(frames):
-        on(registry.count_rest, fdi, RUDDER)
-    return fdi, surface
 
 
 # Two faults at once.

@@ -265,21 +265,3 @@ def test_no_gyro_is_broken_if_w_and_the_attitude_differ_by_more_than_all_bounds(
     sensor_monitor.exclude_gyros(monitor)
     assert monitor["memory"]["gyros_excluded"] == excluded
     assert monitor["memory"]["gap"][1] == pytest.approx([size * limit] * 3)
-
-
-@pytest.mark.parametrize(
-    ("earlier", "excluded", "noisy", "frozen"), [*product((0, 1), (0, 1), (0, 1), (None, ALPHA, QDYN, 0))]
-)
-def test_data_speak_about_surfaces_if_no_flow_sensor_is_frozen_and_of_a_doubted_gyro_at_once(
-    earlier, excluded, noisy, frozen
-):
-    monitor = new_monitor(H, gyros_excluded=excluded, noisy=noisy)
-    monitor["redundancy"]["memory"]["y_past"] = 0.1
-    if frozen is not None:
-        monitor["memory"]["n_same"][frozen] = 3
-    doubts = bool(noisy and not excluded)
-    assert bool(sensor_monitor.doubts_gyros(monitor)) == doubts
-    assert bool(sensor_monitor.allows_isolation(monitor, earlier)) == (
-        (earlier or doubts) and frozen in (None, 0)
-    )
-    assert sensor_monitor.allows_isolation(fill(monitor, enabled=0), earlier)

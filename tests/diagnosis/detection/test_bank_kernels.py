@@ -38,3 +38,12 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
         kept = DT * weights(decay, 3).sum()
         assert fie["reach_lo"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
         assert fie["reach_hi"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
+
+
+@pytest.mark.parametrize(("share", "axis"), [(1.0, -1), (-1.0, -1), (1.001, 1), (-1.001, 1)])
+def test_a_filter_at_its_bound_is_within_and_beyond_it_alarms(share, axis):
+    fdi = new_fdi()
+    bank = fdi["bank"]["output"]
+    bank["threshold"][:3] = 0.5
+    bank["residual"][1, 1] = share * 0.5
+    assert on(filters.bank_axis, fdi) == axis

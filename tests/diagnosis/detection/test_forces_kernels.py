@@ -63,6 +63,31 @@ def per_coefficient(y=Y):
 
 
 @pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
+def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
+    fdi, rate = felt(), 0.04
+    record, seen = fdi["statistical"]["forces"], measured()
+    record["angle_rate"][SIDE_INDEX], record["n_seen"] = rate, 1
+    update_both_forces(record, fdi["statistical"]["gust"], seen, U, DT)
+    whole = per_coefficient() * coefficient(name, rate=rate)
+    force = record["component"][f]
+    expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
+    assert force["innovation"] == pytest.approx(expected, rel=1e-12)
+    n = int(force["n_Z"])
+    assert force["regressor"][n - 1] == pytest.approx(whole)
+    values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
+    values += [
+        t.value
+        for t in AIRCRAFT.forces
+        if t.coefficient == "CY" and f == SIDE_INDEX and "betadoth" in dict(t.of)
+    ]
+    terms = force["regressor"][: n - 1]
+    if f == SIDE_INDEX:
+        terms = np.append(terms[:-1], terms[-1] / values[-1])
+        assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
+    assert np.dot(values, terms) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
@@ -82,6 +107,19 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
         assert force["e_G"][s] == pytest.approx(0.05 * per_coefficient() * size)
+
+
+def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
+    """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
+    record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
+    forces.fill_angle_rates(record, measured())
+    alpha, beta, V = Y[:3]
+    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+    step = 1e-6
+    later = v + step * (a + g - np.cross(X, v))
+    now, then = (np.array([np.arcsin(w[1] / np.linalg.norm(w)), np.arctan2(w[2], w[0])]) for w in (later, v))
+    assert record["angle_rate"] == pytest.approx((now - then) / step, rel=1e-4)
 
 
 def test_noise_of_the_readings_is_jitter_of_the_forces():

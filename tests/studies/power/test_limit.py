@@ -49,17 +49,6 @@ def covariance(context, n):
     return rates.reshape(3 * n, 3 * n)
 
 
-def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
-    before, after = 150, 40
-    rng = np.random.default_rng(4)
-    phi = np.cumsum(rng.normal(size=(after, 3)), axis=0) * [0.1, 0.03, 0.02]
-    mean = np.zeros((3, before + after))
-    mean[:, before:] = DT * np.cumsum(phi, axis=0).T
-    C = covariance(context, before + after)
-    expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
-    assert WhiteningFilter(context).deflection_by_frame(phi)[-1] == pytest.approx(expected, rel=0.01)
-
-
 def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     """Constants are noise of covariance R diag(sigma^2) R', added to that of the rates."""
     n, sigma = 120, np.array([0.3, 0.5])

@@ -41,16 +41,6 @@ def test_each_is_prepared_then_timed_in_an_order_that_turns_round():
     assert gc.isenabled()
 
 
-def test_garbage_is_collected_again_even_after_a_failure():
-    class Broken(Runner):
-        def fly(self, frames):
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        interleave([Broken("a", 1.0, Clock(), [])], 1, 1)
-    assert gc.isenabled()
-
-
 def test_median_and_quartiles():
     values = np.array([9.0, 1.0, 4.0, 2.0, 7.0])
     assert quartiles(values) == statistics.quantiles(values.tolist(), n=4, method="inclusive")

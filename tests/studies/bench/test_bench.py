@@ -18,9 +18,7 @@ from beaver_ftc.studies.bench.contenders import (
     state_of,
     take_over,
 )
-from flying import Memory, scenario
-
-ELEVATOR_LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 12}
+from flying import Memory, loss, scenario
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +55,7 @@ def test_the_bare_aircraft_starts_where_the_loop_does_and_stays_in_the_envelope(
 
 def test_every_round_flies_what_the_flight_itself_flew():
     """Without sinusoids in the truth, whose phase starts anew with its clock."""
-    wanted = scenario(duration_s=20, faults=[ELEVATOR_LOSS], uncertainty={})
+    wanted = scenario(duration_s=20, faults=[loss()], uncertainty={})
     log, contender = Memory(), ClosedLoop(wanted, measure.AFTER_ALARM_S)
     fly(wanted, log)
     first = round(measure.AFTER_ALARM_S * wanted.rate_hz)

@@ -10,15 +10,14 @@ from beaver_ftc.studies.bench.straightforward import (
     PublishedModel,
     Straightforward,
 )
-from flying import Memory, scenario
+from flying import Memory, loss, scenario
 
 FAULT_FRAME, FRAMES = 200, 500
-LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 2}
 
 
 @pytest.fixture(scope="module")
 def wanted():
-    return scenario(duration_s=5, faults=[LOSS], control={"law": "adaptive"})
+    return scenario(duration_s=5, faults=[loss(at_s=2.0)], control={"law": "adaptive"})
 
 
 @pytest.fixture(scope="module")

@@ -84,14 +84,6 @@ def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):
     assert (np.diff(d) >= 0.0).all()
 
 
-def test_rougher_air_hides_more(context):
-    phi = np.full((100, 3), 0.1)
-    rough = replace(context, declared=replace(context.declared, gust_rad_s=3.0 * context.declared.gust_rad_s))
-    still = replace(context, declared=replace(context.declared, gust_rad_s=np.zeros(3)))
-    found = [WhiteningFilter(one).deflection_by_frame(phi)[-1] for one in (rough, context, still)]
-    assert found[0] < 0.6 * found[1] < 0.6 * found[2]
-
-
 def test_of_a_flight_it_takes_what_the_surface_gave(context):
     block = Block(LIGHT, 6.0, 2)
     at_s = strikes_at_s(block)

@@ -1,4 +1,4 @@
-"""`smallest` on flights: which are flown, what each row says, and that a second start flies nothing again."""
+"""`smallest` on flights: which are flown, and what each row and the document say."""
 
 import json
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.smallest import survey
-from beaver_ftc.studies.smallest.survey import Asked, Flight, check, fly_one, run_smallest, variants_of
+from beaver_ftc.studies.smallest.survey import Asked, Flight, check, fly_one, variants_of
 
 STAGES = (45, 50)  # the fewest of which an order statistic bounds the 0.9 quantile from above: 36
 SCENARIO = {
@@ -125,27 +125,6 @@ def test_a_document_and_its_files(few, tmp_path):
     assert [row["variant"] for row in document["compared"]] == [*COMPARED[1:]]
     folder = tmp_path / "sines-smallest-elevator"
     assert {".json", ".csv", ".html"} <= {path.suffix for path in folder.iterdir()}
-
-
-def test_what_is_stopped_goes_on_and_flies_no_finished_round_again(few, tmp_path, monkeypatch):
-    scenario, flown, last = bf.load(SCENARIO), [], STAGES[0] + 5
-
-    def counted(variants, asked, flight):
-        flown.append(flight)
-        if len(flown) == last:
-            raise KeyboardInterrupt
-        return fly_one(variants, asked, flight)
-
-    monkeypatch.setattr(survey, "fly_one", counted)
-    with pytest.raises(KeyboardInterrupt):
-        run_smallest(tmp_path, scenario, ASKED)
-    document = run_smallest(tmp_path, scenario, ASKED)
-    resumed = len(flown) - last
-    flown.clear()
-    last = -1
-    whole = run_smallest(tmp_path / "other", scenario, ASKED)
-    assert {**document, "folder": 0} == {**whole, "folder": 0}
-    assert resumed <= len(flown) - STAGES[0]
 
 
 @pytest.mark.parametrize(

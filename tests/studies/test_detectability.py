@@ -1,7 +1,5 @@
 """The fault mismatch function against brute force, and its promises against flights."""
 
-import csv
-import json
 import shutil
 from pathlib import Path
 
@@ -9,23 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 import needs
-from beaver_ftc.cli.main import app
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import load_text
-from beaver_ftc.studies import detectability as surveying
 from beaver_ftc.studies.detectability import (
-    EXCITATIONS,
     SETTLED_S,
     alike,
     answers,
     at,
     best_in_window,
     detection_magnitude,
-    draw,
     excitation,
     exclusion_magnitude,
     geometry,
@@ -35,7 +27,6 @@ from beaver_ftc.studies.detectability import (
     run_survey,
     with_aircraft,
 )
-from beaver_ftc.studies.present.tables import as_csv
 from flying import loss, scenario
 from samples import samples
 
@@ -149,31 +140,6 @@ def test_what_cannot_be_trimmed_is_said_not_dropped(flight, tmp_path):
     assert all(row["detected"] is None and row["why"] for row in rows[len(FAULTS) :])
 
 
-def test_another_scheme_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="sharpened scheme"):
-        run_survey(tmp_path, scenario(fdi={"thresholds": "published"}))
-
-
-def test_csv_and_map_hold_every_point(flight, tmp_path):
-    document = run_survey(
-        tmp_path, flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0]
-    )
-    rows = document["points"]
-    assert len(list(csv.DictReader(as_csv(rows).splitlines()))) == len(rows) == 2 * 2 * len(FAULTS)
-    assert len([axes for axes in draw("x", rows).axes if axes.get_title()]) == 2 * len(FAULTS)
-
-
-def test_the_command_leaves_map_csv_and_json(tmp_path, monkeypatch):
-    monkeypatch.setattr(surveying.run_survey, "__defaults__", ([45.0], [1000.0], EXCITATIONS[2:3], None))
-    asked = ["detectability", "fault-free", "--out", str(tmp_path), "--format", "json"]
-    result = CliRunner().invoke(app, asked)
-    assert result.exit_code == 0
-    document = json.loads(result.stdout)
-    folder = tmp_path / "fault-free-detectability"
-    assert json.loads((folder / "detectability.json").read_text())["points"] == document["points"]
-    assert {file.suffix for file in folder.iterdir()} == {".json", ".csv", ".png", ".html"}
-
-
 ROW = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 2.0, "fault": "aileron", "why": "a reason"}
 
 
@@ -183,17 +149,6 @@ def test_an_answer_is_a_line_and_rounds_up():
     assert found == (
         "at 50 m/s and 1800 m, 6 deg/s of roll: a loss of aileron of 31 % and more is certain to be detected "
         "within 0.5 s, isolated within 1 s from 40 % on"
-    )
-
-
-def test_an_answer_says_what_is_not_certain():
-    detected, nothing = answers(
-        scenario(), [ROW | {"detected": 0.3, "isolated": None}, ROW | {"detected": None, "isolated": None}]
-    )
-    assert detected.endswith("a loss of aileron of 30 % and more is certain to be detected within 0.5 s, "
-                             "none is certain to be isolated")  # fmt: skip
-    assert nothing.endswith(
-        "not even a total loss of aileron is certain to be detected within 0.5 s (a reason)"
     )
 
 
@@ -214,13 +169,6 @@ def test_another_aircraft_has_its_own_errors():
     """One of plain JSBSim has no property for the errors of the Beaver's truth."""
     coupled = scenario(duration_s=2.5).with_({"uncertainty.inertia_coupling.p": 0.2})
     assert set(excitation(with_aircraft(coupled, "jsbsim:c172p")).moment) == {"aileron", "elevator", "rudder"}
-
-
-def test_another_aircraft_is_flown_from_where_it_starts():
-    other = with_aircraft(scenario(duration_s=5), "beaver-split")
-    assert other.airframe.name == "beaver-split"
-    assert other.duration_s == 5
-    assert set(excitation(other).moment) == {"aileron_left", "aileron_right", "elevator", "rudder"}
 
 
 @settings(max_examples=samples(100))

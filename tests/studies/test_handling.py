@@ -83,20 +83,6 @@ def test_levels_as_the_specification_has_them(changed, row, level):
     assert of_model(made_up(**changed), 40.0, "trimmed")[row].level == level
 
 
-def test_without_lift_by_the_angle_of_attack_nothing_is_too_slow():
-    """CAP is frequency squared over load factor per angle: without a load factor there is no such limit."""
-    for Z_alpha in (0.0, 0.3):
-        assert of_model(made_up(Z_alpha=Z_alpha), 40.0, "trimmed")[1].value == math.inf
-
-
-def test_the_margin_is_to_the_nearer_limit():
-    damping, spiral = LIMITS[0], LIMITS[6]
-    assert damping.margin(0.5, 1) == pytest.approx(0.2)
-    assert damping.margin(1.9, 1) == pytest.approx(0.1)
-    assert damping.margin(0.1, 2) == pytest.approx(-0.1)
-    assert spiral.margin(math.inf, 1) == math.inf
-
-
 def test_a_jam_leaves_other_modes_than_the_trim():
     flown = scenario(
         duration_s=2.0, faults=[{"actuator": "rudder", "type": "stuck", "position_deg": 3, "at_s": 0.2}]

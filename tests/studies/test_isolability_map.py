@@ -1,6 +1,5 @@
-"""Which losses are told from which other surface: by hand, against flights, and by doublets."""
+"""Which losses are told from which other surface: by hand, by properties, and against flights."""
 
-from itertools import combinations
 from math import inf
 
 import numpy as np
@@ -10,9 +9,8 @@ from hypothesis import strategies as st
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.studies import isolability
-from beaver_ftc.studies.detectability import SETTLED_S, Excitation, excitation, judge, pairs_of
-from beaver_ftc.studies.isolability import loss_limits, smallest_doublets
+from beaver_ftc.studies.detectability import Excitation, excitation, judge, pairs_of
+from beaver_ftc.studies.isolability import loss_limits
 from flying import loss, scenario
 from samples import samples
 
@@ -29,10 +27,6 @@ def test_a_surface_that_tells_in_every_third_frame():
     assert (found["magnitude"], found["magnitude_median"]) == (0.8, 0.8)  # 0.4 in 8 of 17 instants
     # struck with the frame that tells, one before, two before: one, two, three frames
     assert (found["longest_s"], found["median_s"]) == (pytest.approx(0.3), pytest.approx(0.2))
-
-
-def test_what_no_frame_tells_is_never_told():
-    assert set(loss_limits(np.full(20, inf), 5, 0.01).values()) == {None}
 
 
 @given(st.lists(st.one_of(st.just(inf), st.floats(0.01, 1.0)), min_size=4, max_size=30), st.integers(1, 4))
@@ -57,16 +51,6 @@ def test_a_fault_that_is_isolated_is_told_from_every_other(moments):
         assert isolated is None or (None not in own and isolated >= max(own))
 
 
-def test_a_flight_too_short_has_no_pairs_told():
-    seen = Excitation({"a": np.ones((1, 3)), "b": np.ones((1, 3))}, np.ones((1, 3)), 0.1)
-    rows = pairs_of(seen)
-    assert [(row["fault"], row["other"], row["longest_s"]) for row in rows] == [
-        ("a", "b", None),
-        ("b", "a", None),
-    ]
-    assert all(row["why"] == "the flight ends before a fault could be isolated" for row in rows)
-
-
 def test_another_surface_is_excluded_no_later_than_the_map_says():
     """The map follows from the healthy flight; a total loss must agree where it strikes."""
     flight = scenario(duration_s=6)
@@ -81,20 +65,3 @@ def test_another_surface_is_excluded_no_later_than_the_map_says():
         excluded = log.rows[:, log.columns.index("fie_aileron_excluded")]
         told_s = log.rows[np.flatnonzero(excluded)[0], log.columns.index("t_s")]
         assert told_s - struck_s <= row["longest_s"] + 0.01 + 1e-9
-
-
-def test_a_loss_of_all_is_the_largest_that_can_tell():
-    """A frame that tells a total loss alone tells; one that would take more than that does not."""
-    found = loss_limits(np.array([1.0001, 1.0, 1.0001, 1.0]), 2, 0.1)
-    assert found == {
-        "magnitude": 1.0, "magnitude_median": 1.0, "longest_s": pytest.approx(0.2),
-        "median_s": pytest.approx(0.2),
-    }  # fmt: skip
-
-
-def test_without_a_package_that_finds_doublets_the_map_says_so(monkeypatch):
-    monkeypatch.setattr(isolability, "offered", lambda service: None)
-    found = smallest_doublets(scenario(), SETTLED_S)
-    assert set(found) == {(a, b) for pair in combinations(FAULTS, 2) for a, b in (pair, pair[::-1])}
-    assert {(told["doublet_deg"], told["doublet_s"]) for told in found.values()} == {(None, None)}
-    assert {told["why"] for told in found.values()} == {"no installed package offers 'doublets'"}

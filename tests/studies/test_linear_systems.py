@@ -68,13 +68,6 @@ A = np.array([[0.0, 1.0], [-4.0, -0.4]])
 B = np.array([0.0, 1.0])
 
 
-def test_a_frequency_response_is_the_transfer_function():
-    w = np.array([0.1, 2.0, 7.0])
-    s = 1j * w
-    np.testing.assert_allclose(response(A, B, 0, w), 1 / (s**2 + 0.4 * s + 4))
-    np.testing.assert_allclose(response(A, B, 1, w), s / (s**2 + 0.4 * s + 4))
-
-
 def test_zeros_of_a_transfer_function_slowest_first():
     """(s + 0.5)(s - 3) over a cubic, in companion form: the output is 1.5 of the first state."""
     a = np.array([[-6.0, -11.0, -6.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -212,16 +212,3 @@ def test_it_has_help_and_is_flown_told_and_written(curve, tmp_path):
     trimmed = [np.rad2deg(conditions.trim(airspeed_mps=V).alpha_rad) for V in speeds_mps]
     A = np.vander(speeds_mps, 2)
     assert found["fit"] == pytest.approx(np.linalg.solve(A.T @ A, A.T @ trimmed), rel=1e-2)
-
-
-def test_it_goes_on_where_it_was(curve, tmp_path):
-    (tmp_path / "storm").touch()
-    ((status, text, why),) = curve(["--workers", "2"])
-    assert (status, text) == (3, "")
-    assert why.endswith("a storm\n")
-    kept = [*(tmp_path / "runs" / ".level-flight-curve.flown" / "parts").iterdir()]
-    assert 1 <= len(kept) <= 3
-    (tmp_path / "storm").unlink()
-    (tmp_path / "flown.txt").unlink()
-    assert curve([])[0][0] == 0
-    assert len((tmp_path / "flown.txt").read_text().split()) == 5 - len(kept)

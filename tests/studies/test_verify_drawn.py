@@ -10,14 +10,11 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import verify
 from beaver_ftc.studies.verify import (
     CHUNK,
-    STEPS,
     Campaign,
     Draw,
     conduct,
     fly_draw,
     judge,
-    summarise,
-    summary_text,
 )
 
 
@@ -27,22 +24,6 @@ def test_every_draw_of_a_seed_is_what_it_was(kind, changed):
     drawn = [Draw(11, kind, index).scenario().model_dump(mode="json") for index in (0, 1, 2, 40)]
     parts = ("name", "duration_s", "rate_hz", "substeps", "initial", "reference", "faults", "uncertainty")
     assert not changed([{part: found[part] for part in parts} for found in drawn])
-
-
-@pytest.mark.parametrize("kind", ["healthy", "faulty"])
-def test_draws_have_the_distributions_that_are_meant(kind):
-    drawn = [Draw(5, kind, i).scenario() for i in range(250)]
-    rates = np.array([found.rate_hz for found in drawn])
-    assert (rates.min(), rates.max()) == (20, {"healthy": 50, "faulty": 100}[kind])
-    assert np.median(rates) == pytest.approx(np.sqrt(rates.min() * rates.max()), rel=0.1)
-    substeps = [found.substeps for found in drawn]
-    assert set(substeps) == {1, 2, 3, 4}
-    assert np.mean(np.array(substeps) > 1) == pytest.approx(0.05, abs=0.03)
-    for axis, sign in (("p", 1), ("q", -1)):
-        coupling = np.array([getattr(found.uncertainty.inertia_coupling, axis) for found in drawn])
-        assert np.mean(coupling == sign * 0.25) == pytest.approx(0.15, abs=0.05)
-    names = [type(signal).__name__ for found in drawn for signal in found.reference.p]
-    assert 1.4 < len(names) / len(drawn) < 1.6
 
 
 def landing(at_s=4.995, rate_hz=50.0, **changes):
@@ -107,13 +88,6 @@ def test_the_error_of_an_estimate_is_of_what_has_grown_by_the_end():
     assert judge(landing(isolated="rudder", estimate=-0.3))["estimate_error"] is None
 
 
-def test_how_many_flights_an_hour_is():
-    assert [Campaign(hours, 7, 1).wanted("healthy") for hours in (0.0, 0.01, 1.0, 1.001)] == [0, 1, 36, 37]
-    assert Campaign(1.0, 7, 1).wanted("faulty") == 7
-    assert list(Campaign(1.0, 7, 1, steps=True).schemes) == list(STEPS)
-    assert list(Campaign(1.0, 7, 1).schemes) == ["published", "sharpened"]
-
-
 @pytest.fixture
 def unflown(monkeypatch):
     """Rows without flights."""
@@ -133,33 +107,9 @@ def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
         verify._crashed(Draw(3, "faulty", 7), "killed")
 
 
-def test_a_growing_fault_is_not_flown_as_a_constant_one(monkeypatch):
-    flown = []
-    monkeypatch.setattr(verify, "fly", lambda scenario: flown.append(scenario) or landing())
-    growing, abrupt = (
-        next(
-            d for d in (Draw(1, "faulty", i) for i in range(50)) if d.scenario().faults[0].profile == profile
-        )
-        for profile in ("incipient", "abrupt")
-    )
-    row = fly_draw(growing, STEPS)
-    assert len(flown) == len(STEPS) - 1
-    assert row["constant"] is row["sharpened"]
-    assert (row["index"], row["profile"], row["rate_hz"]) == (growing.index, "incipient", flown[0].rate_hz)
-    fly_draw(abrupt, STEPS)
-    assert len(flown) == 2 * len(STEPS) - 1
-
-
 def test_a_draw_without_a_trim_is_said(monkeypatch):
     def untrimmed(scenario):
         raise BadInput("no trim")
 
     monkeypatch.setattr(verify, "fly", untrimmed)
     assert fly_draw(Draw(1, "healthy", 3), {}) == {"index": 3, "skipped": "no trim"}
-
-
-def test_of_nothing_flown_nothing_is_said():
-    found = summarise({"healthy": [], "faulty": []})
-    assert (found["faults"], found["skipped"], found["schemes"], found["kept"]) == (0, 0, {}, True)
-    assert "delay_shorter_by" not in found
-    assert summary_text(found) == "G1 to G3 hold for the sharpened scheme"

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from beaver_ftc import compiled
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.loop import stepping
 from beaver_ftc.loop.loop import Loop
@@ -24,18 +23,6 @@ def test_every_part_names_kernels_there_are(i):
 def test_an_unknown_kernel_is_refused():
     with pytest.raises(ValueError, match=r"no such kernel: frame\.dream"):
         frame_without({"frame.dream": nothing}, "dream")
-
-
-def test_the_loops_own_kernels_are_left_as_they_were():
-
-    from beaver_ftc.diagnosis import isolation
-
-    before = stepping.fly_on, isolation.advance_estimators, compiled.kernel
-    frame_with(1)
-    from beaver_ftc.diagnosis import isolation as isolation_now
-    from beaver_ftc.loop import stepping as stepping_now
-
-    assert (stepping_now.fly_on, isolation_now.advance_estimators, compiled.kernel) == before
 
 
 def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():

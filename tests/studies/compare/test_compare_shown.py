@@ -1,29 +1,24 @@
 """A comparison of made flights, all of it: document, tables, page, figure; and runs side by side."""
 
 import json
-from math import inf, nan
+from math import inf
 from pathlib import Path
 
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare import runs
 from beaver_ftc.studies.compare.leaderboard import (
     MARK,
     as_text,
     figure_of,
-    lost,
     makers_of,
     page_of,
     write_leaderboard,
 )
-from beaver_ftc.studies.compare.replay import Trace, _statistic, alarms_at
+from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.scores import document_of
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, SetFlight, Trial, entries_of
-from beaver_ftc.studies.engine.workers import Case
-from beaver_ftc.studies.present.figures import panels
-from flying import scenario
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, Trial, entries_of
 from kept import page, picture
 
 SCHEMES, LAWS = ("observer", "none"), ("lqr", "nominal")
@@ -99,23 +94,6 @@ def test_what_was_written_above_the_mark_stays(below, compared, tmp_path):
     assert "old" not in board.read_text()
 
 
-def test_a_detector_without_a_statistic_is_far_from_the_level():
-    said = [Verdict(detected=alarm, statistic=value) for alarm, value in ((1, nan), (0, nan), (1, 0.5))]
-    assert list(map(_statistic, said)) == [1e6, 0.0, 0.5]
-
-
-def test_a_case_that_ends_its_process_has_no_results_and_says_why():
-    found = lost(Case(3, SetFlight("faulty", scenario())), "killed")
-    assert found == Trial("faulty", failures=["test: killed"])
-
-
-def test_an_alarm_ends_the_time_in_which_one_would_be_false():
-    one = Trace(2.0, (), False, 3600.0, rises=((10.0, 0.5), (900.0, 1.0), (1800.0, 2.0)))
-    assert [one.fault_free_s(level) for level in (0.4, 0.5, 1.0, 2.0)] == [10.0, 900.0, 1800.0, 3600.0]
-    assert [one.false_alarm(level) for level in (1.9, 2.0)] == [True, False]
-    assert alarms_at([one, Trace(0.1, (), False, 7200.0)], 1.0) == (1, 2.5)
-
-
 LIMITED = {"actuator": "elevator", "type": "rate_limit", "scale": 0.02, "at_s": 12.0, "end_s": 20.0}
 BEFORE = {"p": 0.1, "q": 0.2, "r": 0.3}
 BIASED = {"sensor": "p", "type": "bias", "bias_deg_s": 1, "abrupt": True, "at_s": 2}
@@ -148,43 +126,29 @@ def test_runs_side_by_side(changed, tmp_path):
     assert runs.labels([run_of("x/a"), run_of("y/a")]) == ["x/a", "y/a"]
 
 
-def test_runs_leave_a_figure_a_document_and_a_report(monkeypatch, tmp_path):
-    reports, folders = [], [tmp_path / "a", tmp_path / "b"]
-    monkeypatch.setattr(runs, "read_runs", lambda given: [run_of(folder) for folder in given])
-    monkeypatch.setattr(runs, "figure_of", lambda given: panels(1, 1, 2.0, 2.0)[0])
-    monkeypatch.setattr("beaver_ftc.results.report.write_report", lambda *given: reports.append(given))
-    found = runs.write_runs(tmp_path / "out", folders)
-    there = tmp_path / "out" / "runs"
-    assert found == [run_of(folder) for folder in folders]
-    read = [run.metrics | {"folder": str(run.folder), "flown": FLOWN} for run in found]
-    assert json.loads((there / "runs.json").read_text()) == read
-    assert (there / "runs.png").read_bytes()[1:4] == b"PNG"
-    assert [(path.name, *rest) for path, *rest in reports] == [("runs.html", folders, ["a", "b"])]
+KEYS = json.dumps({key: {} for key in ("flight", "detection", "isolation", "tracking")})
+UNREADABLE = "metrics.json or scenario.yaml cannot be read"
 
 
-def test_folders_that_are_no_runs_are_all_named(tmp_path):
-    for name, metrics in (("a", "{"), ("b", None), ("c", "{}"), ("e", "[" * 100_000), ("f", "null")):
+@pytest.mark.parametrize(
+    ("files", "says"),
+    [
+        ({}, "holds no metrics.json"),
+        ({"metrics.json": KEYS}, "holds no log.parquet"),
+        *(
+            ({"metrics.json": text, "log.parquet": ""}, UNREADABLE)
+            for text in ("{", "{}", "null", "[" * 100_000)
+        ),
+        ({"metrics.json": KEYS, "log.parquet": "", "scenario.yaml": "[" * 100_000}, UNREADABLE),
+        ({"metrics.json": KEYS, "log.parquet": "", "scenario.yaml": "name: ["}, UNREADABLE),
+    ],
+)
+def test_folders_that_are_no_runs_are_named_a_line_each(files, says, tmp_path):
+    for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        for file, content in (("metrics.json", metrics), ("log.parquet", ""), ("scenario.yaml", "{}")):
-            if content is not None:
-                (tmp_path / name / file).write_text(content)
-    (tmp_path / "d").mkdir()
-    (tmp_path / "d" / "metrics.json").write_text(
-        json.dumps({key: {} for key in ("flight", "detection", "isolation", "tracking")})
-    )
-    (tmp_path / "g").mkdir()
-    for file, content in (
-        ("metrics.json", (tmp_path / "d" / "metrics.json").read_text()),
-        ("log.parquet", ""),
-    ):
-        (tmp_path / "g" / file).write_text(content)
-    (tmp_path / "g" / "scenario.yaml").write_text("[" * 100_000)
+        for file, text in ({"scenario.yaml": "{}"} | files).items():
+            (tmp_path / name / file).write_text(text)
     with pytest.raises(BadInput) as said:
-        runs.read_runs([tmp_path / name for name in "abcdefg"])
+        runs.read_runs([tmp_path / "a", tmp_path / "b"])
     allowed = "allowed: a result folder of beaver-ftc run"
-    unreadable = f"metrics.json or scenario.yaml cannot be read, {allowed}"
-    assert str(said.value).splitlines() == [
-        f"{tmp_path / 'a'}: {unreadable}", f"{tmp_path / 'b'}: holds no metrics.json, {allowed}",
-        f"{tmp_path / 'c'}: {unreadable}", f"{tmp_path / 'd'}: holds no log.parquet, {allowed}",
-        *(f"{tmp_path / name}: {unreadable}" for name in "efg"),
-    ]  # fmt: skip
+    assert str(said.value).splitlines() == [f"{tmp_path / name}: {says}, {allowed}" for name in ("a", "b")]

@@ -5,20 +5,15 @@ from math import exp, inf, log, nan, sqrt
 
 import pytest
 
-from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare import criteria
 from beaver_ftc.studies.compare.criteria import (
     EFFORT,
-    FAILED,
     INADMISSIBLE,
     LOST,
     DetectorCost,
     LawCost,
-    effort,
-    least_margins,
 )
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight, result_of
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight
 from beaver_ftc.studies.margins import Margin
 from flying import loss, scenario
 
@@ -53,33 +48,6 @@ def test_a_detector_costs_delay_names_and_false_alarms(monkeypatch):
     assert DetectorCost("x", CASES)({"a": 1.0}) == pytest.approx(J)
     assert asked[0] == (Entry("x", LAW), criteria.DETECTORS, {"a": 1.0})
     assert len(asked) == 5
-
-
-def test_what_cannot_be_flown_costs_more_than_all_else(law, monkeypatch):
-    def refused(*of):
-        raise BadInput("no trim")
-
-    monkeypatch.setattr(criteria, "flown", refused)
-    assert (DetectorCost("x", CASES)({}), law({})) == (FAILED, FAILED)
-    monkeypatch.undo()
-    lost = replace(SOUND, energy_deg2_s2=inf)  # of a flight that has no end
-    monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
-    given(monkeypatch, [SOUND, SOUND, SOUND, lost])
-    assert law({}) == FAILED
-
-
-@pytest.mark.parametrize("alarm", [0.3, 200.0])
-def test_a_flight_that_ends_with_its_false_alarm_costs_what_it_would_have(alarm, monkeypatch):
-    """And flights without one are flown to their end."""
-    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 3}
-    cases = [SetFlight("c", scenario(duration_s=5, faults=faults)) for faults in ([], [fault])]
-    cost, flown_s = DetectorCost("observer-constant", cases), []
-    monkeypatch.setattr(criteria, "result_of", lambda *of: flown_s.append(of[0].frames) or result_of(*of))
-    ended = cost.parts({"alarm": alarm})
-    monkeypatch.setattr(criteria, "fly", lambda scenario, watch: fly(scenario))
-    assert ended == cost.parts({"alarm": alarm})
-    assert ended == ([0.5, 1.5] if alarm == 0.3 else [0.0, pytest.approx(ended[1])])
-    assert len(flown_s) == (2 if alarm == 0.3 else 4)
 
 
 MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", "rudder", 7.0, 8.0, 50.0)]
@@ -131,8 +99,3 @@ def test_a_law_with_too_little_margin_is_not_flown(law, monkeypatch, changes, sh
     if short:
         assert law({}) == pytest.approx(INADMISSIBLE * (1.0 + short))
         assert asked == []
-
-
-def test_effort_is_the_rms_rate_and_the_least_margins_are_of_all_loops():
-    assert effort([SOUND, replace(SOUND, energy_deg2_s2=10.0)]) == pytest.approx(sqrt(7.0))
-    assert least_margins(MARGINS) == (7.0, 50.0)

@@ -4,11 +4,9 @@ from math import inf
 
 import pytest
 
-from beaver_ftc.studies.compare import scores, trial
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.scores import (
     line_of,
-    lines_of,
     matched,
     point_at,
     trade_off,
@@ -82,34 +80,6 @@ def test_the_matched_level_is_the_most_sensitive_one_allowed():
     assert point_at(_traces(), 0.1)["detection_rate"] == 1.0  # of the one flight without an earlier alarm
 
 
-def test_shares_of_the_faulted_flights_and_of_all():
-    mine = [_result(fault_free_s=1800.0, before_deg_s=b, after_deg_s=2 * b, us=b) for b in (1.0, 3.0)]
-    mine.append(_result(correct=False, fault_free_s=1800.0, before_deg_s=5.0, after_deg_s=10.0, us=5.0))
-    line = line_of(ENTRY, mine, mine)
-    assert line["isolation_rate"] == pytest.approx(2 / 3)
-    assert (line["detection_rate"], line["healthy_h"], line["us"]) == (1.0, 1.5, 3.0)
-    assert (line["before_median"], line["before_90"]) == (3.0, 5.0)
-    assert (line["after_median"], line["after_90"]) == (6.0, 10.0)
-    assert 0.0 < line["detection_rate_lower"] < 1.0
-    assert line["false_alarms_per_h_upper"] > 0.0
-
-
-def test_each_entry_is_tallied_from_its_own_flights_against_the_yardsticks():
-    other, yardstick = Entry("c", "d"), Entry(trial.SCHEME, trial.ORACLE)
-    flown = ((ENTRY, 3.0), (yardstick, 1.0), (other, 5.0)), ((ENTRY, 4.0), (yardstick, 2.0), (other, 8.0))
-    trials = [trial.Trial("set", [_result(entry=of, rms_deg_s=rms) for of, rms in one]) for one in flown]
-    mine, theirs = lines_of(trials, [ENTRY, other])
-    assert [(line["scheme"], line["law"], line["flights"]) for line in (mine, theirs)] == [
-        (ENTRY.scheme, ENTRY.law, 2), (other.scheme, other.law, 2),
-    ]  # fmt: skip
-    assert (mine["ratio_median"], mine["ratio_90"]) == (2.0, 3.0)
-    assert (theirs["ratio_median"], theirs["ratio_90"]) == (4.0, 5.0)
-
-
-def test_without_flights_a_level_costs_nothing():
-    assert point_at([], 1.0)["false_alarms_per_h"] == 0.0
-
-
 def test_flights_without_a_number_on_either_side_give_no_ratio():
     """Only 12 / 4 is a ratio: an oracle that departed, stood still or failed has none."""
     mine = [_result(rms_deg_s=rms) for rms in (12.0, 5.0, 7.0, 9.0)] + [_result(error="no")] * 2
@@ -117,18 +87,3 @@ def test_flights_without_a_number_on_either_side_give_no_ratio():
     line = line_of(ENTRY, mine, [*oracle, _result(error="lost", rms_deg_s=2.0), *oracle[:2]])
     assert (line["ratio_median"], line["ratio_90"]) == (3.0, 3.0)
     assert (line["flights"], line["failed"]) == (4, 2)
-
-
-def test_better_is_more_of_rates_and_less_of_all_else_by_more_than_rounding():
-    """Nothing is worse than any number, and no number is no claim."""
-    ours = {"detection_rate": 0.5, "median_delay_s": 0.25, "rms": None}
-    words = {"detection_rate": "rate", "median_delay_s": "delay", "rms": "error"}
-    for row, said in (
-        ({"detection_rate": 0.5 + 5e-10, "median_delay_s": 0.25 - 5e-10, "rms": None}, []),
-        ({"detection_rate": 0.25, "median_delay_s": 0.5}, []),
-        ({"detection_rate": 0.75}, ["x has the better rate: 0.75 against 0.5"]),
-        ({"median_delay_s": 0.125, "rms": 9.0}, [
-            "x has the better delay: 0.125 against 0.25", "x has the better error: 9 against never",
-        ]),
-    ):  # fmt: skip
-        assert list(scores._better(row, ours, words, "x")) == said

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.compare import trial
@@ -59,26 +58,6 @@ BEFORE_ALONE = {"tracking": {**DOCUMENT["tracking"], "post_fault_rms_deg_s": Non
 def test_a_flight_boiled_down(changes, differs):
     found = result(**changes)
     assert {name: getattr(found, name) for name in SOUND} == pytest.approx({**SOUND, **differs})
-
-
-def test_who_is_compared_with_whom():
-    """Each scheme with our law, each law with our scheme, ours with both, and the oracle; none twice."""
-    ours, oracle = trial.Entry(trial.SCHEME, trial.LAW), trial.Entry(trial.SCHEME, trial.ORACLE)
-    ekf, lqr = trial.Entry("ekf", trial.LAW), trial.Entry(trial.SCHEME, "lqr")
-    assert trial.entries_of(["ekf", trial.SCHEME], ["lqr", trial.LAW]) == [ekf, ours, lqr, oracle]
-
-
-@pytest.mark.parametrize("faults", [(), ("a fault",)])
-def test_a_flight_that_cannot_be_flown_counts_as_one_of_its_kind(monkeypatch, faults):
-    def refuse(*of):
-        raise BadInput("no trim")
-
-    monkeypatch.setattr(trial, "with_entry", refuse)
-    entry = trial.Entry("ours", "nominal")
-    found = trial._fly(SimpleNamespace(faults=faults), entry, None)
-    assert (found.entry, found.false_alarm, found.fault_free_s, found.error) == (entry, False, 0.0, "no trim")
-    assert found.faulted is bool(faults)
-    assert (found.delay_s, found.rms_deg_s, found.correct) == (inf, inf, False)
 
 
 # What stands for what, besides the sets of gusts: a constant error of the model covers wrong coefficients.

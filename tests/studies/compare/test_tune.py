@@ -17,13 +17,11 @@ from beaver_ftc.diagnosis.rivals import (
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, registered, tunable
-from beaver_ftc.studies.compare import tune as tuning
 from beaver_ftc.studies.compare.criteria import INADMISSIBLE
-from beaver_ftc.studies.compare.search import EDGE, Found, on_scale
+from beaver_ftc.studies.compare.search import EDGE, on_scale
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
 from beaver_ftc.studies.compare.tune import (
     LEAST_GAIN,
-    Method,
     Search,
     as_text,
     methods_of,
@@ -100,25 +98,6 @@ def test_rivals_fly_with_what_was_chosen_for_their_grade():
         )
 
 
-@pytest.mark.parametrize(("cost", "kept"), [(0.96, True), (0.94, False)])
-def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
-    """The rule is the same for ours and for rivals."""
-    found = Found({"pole_per_s": 3.0}, cost, 1.0, {"pole_per_s": Range(1.0, 9.0)}, 24)
-    monkeypatch.setattr(tuning, "search", lambda *_: found)
-    for name in (SCHEME, "observer-constant"):
-        method = Method(DETECTORS, name, "exact")
-        row = tuning.tune_method(method, Search(24, 1, 3, most=1))
-        assert row["values"] == (method.start() if kept else found.values)
-        assert (row["found"], row["cost"], row["start_cost"], row["trials"]) == (found.values, cost, 1.0, 24)
-
-
-def test_a_method_starts_with_what_ships_or_its_defaults():
-    assert Method(LAWS, "lqr", "exact").start() == tuned_values(load_tuned_values(), "exact", LAWS, "lqr")
-    ours = Method(DETECTORS, STATISTICAL, "nowhere").start()
-    assert ours == {"fdi.statistical.false_alarms_per_h": 1e-3, "fdi.statistical.misnaming": 1e-4}
-    assert Method(LAWS, "zhang2005", "nowhere").start()["network_gain"] == 40.0
-
-
 def test_a_plug_in_is_tuned_like_everybody(tmp_path):
     """By its class's own ranges; the file is read again where methods are compared."""
     (tmp_path / "mine.py").write_text(MINE)
@@ -169,10 +148,3 @@ def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     for name in ("a.json", "nowhere.json"):
         with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):
             read_tuned(tmp_path / name)
-
-
-@pytest.mark.parametrize(
-    ("again", "adopted"), [({"gain": 0.05}, False), ({"gain": 0.051}, True), ({}, False)]
-)
-def test_a_second_tuning_is_adopted_for_its_gain(again, adopted):
-    assert tuning.is_adopted(again | {"gain_low": 0.5, "gain_high": 0.6}) is adopted

@@ -1,8 +1,4 @@
-"""`decay`: which truths are flown, what a flight counts for, and what the document says of them."""
-
-import re
-from dataclasses import replace
-from math import isclose
+"""`decay`: which truths are flown, what a flight counts for, and what a summary counts."""
 
 import numpy as np
 import pytest
@@ -13,19 +9,17 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.studies.decay import survey
 from beaver_ftc.studies.decay.errors import errors_of
-from beaver_ftc.studies.decay.shown import as_text, sentences
 from beaver_ftc.studies.decay.survey import (
-    FACTORS,
     TOGETHER,
     Flight,
     cases_of,
-    document_of,
     row_of,
     run_decay,
     scenario_of,
 )
+from flying import loss
 
-LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 1.5}
+LOSS = loss(at_s=1.5)
 SHORT = {
     "name": "short", "duration_s": 8.0, "rate_hz": 20,
     "reference": {"q": [{"sine": {"amplitude_deg_s": 2.0, "frequency_hz": 0.4}}]}, "faults": [LOSS],
@@ -71,15 +65,6 @@ def test_an_error_is_at_its_limit_and_its_sign_does_not_depend_on_the_factor():
     assert abs(sensors.alpha.bias_deg) == pytest.approx(0.2)
 
 
-def test_flights_of_one_number_have_the_same_seed_and_instants():
-    flown = [truth_of(DECLARED, error, f, run=2) for error in KEYS for f in FACTORS]
-    assert len({(one.seed, one.faults[0].at_s) for one in flown}) == 1
-    later = {truth_of(DECLARED, TOGETHER, 1.0, run).faults[0].at_s - 1.5 for run in range(20)}
-    assert 0.0 <= min(later) < max(later) <= 1.5  # 5 s before the end at the latest
-    assert len(later) > 5
-    assert all(isclose(20.0 * s, round(20.0 * s), abs_tol=1e-9) for s in later)
-
-
 def test_what_is_not_declared_is_flown_alone_in_units_of_its_own():
     scenario = bf.load(SHORT)  # the published bounds alone
     errors = errors_of(scenario)
@@ -99,62 +84,6 @@ def test_what_is_not_declared_is_flown_alone_in_units_of_its_own():
     exact = dict.fromkeys("pqr", 0.0)
     exact = scenario.with_({"fdi.bounds": {"inertia_coupling": exact, "constant_rad_s2": exact}})
     assert [error.name for error in errors_of(exact)] == list(unknown)
-
-
-def test_what_a_flight_counts_for():
-    found = Metrics.of(bf.fly(bf.load(SHORT), log=False).metrics)
-    right = row_of(found)
-    assert (right["detected"], right["named"], right["misnamed"]) == (True, True, False)
-    assert right["tracking_deg_s"] == max(vars(found.tracking.post_fault_rms_deg_s).values())
-    premature = replace(found.isolation, correct=False, premature=True)
-    wrong = row_of(replace(found, isolation=premature, false_alarm=True))
-    assert (wrong["false_alarm"], wrong["detected"], wrong["named"], wrong["misnamed"]) == (
-        True,
-        False,
-        False,
-        True,
-    )
-    assert wrong["delay_s"] is None
-    assert row_of(None)["failed"]
-
-
-def test_what_the_rows_say():
-    scenario, flown = bf.load(SHORT), row_of(None) | {"failed": False, "detected": True, "named": True}
-    flown |= {"delay_s": 0.05, "tracking_deg_s": 0.25, "bound_used": 0.5}
-    errors = errors_of(scenario)
-    cases = cases_of(errors, 4)
-    rows = [
-        flown | {"false_alarm": case.run == 0, "misnamed": case.run < 2, "named": case.run >= 2}
-        if (case.error, case.factor) == ("inertia coupling", 2.0)
-        else flown
-        for case in cases
-    ]
-    document = document_of(scenario, errors, cases, 1, rows)
-    first, *others = sentences(document)
-    assert first == (
-        "short: with every error at the limit of what is declared, 0 of 4 flights have a false alarm and "
-        "0 of 4 a wrong name."
-    )
-    says = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
-    sound = [
-        f"{name} ({of}): no false alarm and no wrong name up to 4 times the declared size."
-        if not of.startswith("none")
-        else f"{name} (not declared{of[4:]}): no false alarm and no wrong name up to 4 times the unit."
-        for name, of in says.items()
-    ]
-    counts = "gives a false alarm in 1 of 4 flights and a wrong name in 2 of 4."
-    found = f"inertia coupling (0.25): an error of 2 times the declared size {counts}"
-    assert others == [found if line.startswith("inertia coupling") else line for line in sound]
-    lines = as_text(document).splitlines()
-    (line,) = (line for line in lines if re.match(r"inertia coupling +0.25 +2 ", line))
-    assert re.split("  +", line)[3:8] == [
-        "4", "25 (1 to 81)", "100 (40 to 100)", "50 (7 to 93)", "50 (7 to 93)",
-    ]  # fmt: skip
-    for row in document["rows"]:
-        if row["error"] == TOGETHER:
-            counts = (1, 2) if row["factor"] == 1.0 else (3, 4)
-            row["false_alarm"]["count"], row["misnamed"]["count"] = counts
-    assert "1 of 4 flights have a false alarm and 2 of 4 a wrong name" in next(sentences(document))
 
 
 METRICS = {
@@ -205,22 +134,6 @@ def test_faults_come_later_together_and_end_so_much_later():
         assert min(later_s) >= 0.0
         assert 0.7 * most_s <= max(later_s) <= most_s
         assert all(one.expect.model_dump(exclude_none=True) == {} for one in flown)
-
-
-@pytest.mark.parametrize(
-    ("declared", "severities"),
-    [
-        ("none", ["light", "light", "moderate", "severe"]),
-        ("light", ["light", "light", "moderate", "severe"]),
-        ("moderate", ["moderate", "severe", "severe", "severe"]), ("severe", ["severe"] * 4),
-    ],
-)  # fmt: skip
-def test_the_air_is_as_rough_as_the_size_of_its_error_allows(declared, severities):
-    scenario = bf.load(SHORT | {"fdi": {"bounds": {"turbulence": declared}}})
-    found = [truth_of(scenario, "turbulence", factor).environment.severity for factor in FACTORS]
-    assert found == severities
-    absent = truth_of(scenario, "inertia coupling", 2.0).environment
-    assert absent.severity == (None if declared == "none" else declared)
 
 
 def of_rows(**changes):

@@ -4,7 +4,6 @@ import random
 
 import pytest
 
-from beaver_ftc.studies.engine import study
 from beaver_ftc.studies.engine.study import Batches, Campaign
 from beaver_ftc.studies.engine.workers import Batch, Case, Outcome
 
@@ -82,48 +81,9 @@ def test_the_flight_that_kills_its_process_is_found_and_only_it():
     assert sorted(row["run"] for row in source.rows) == list(range(100))
 
 
-def test_the_last_tasks_are_small_so_that_no_worker_waits_long():
-    workers = Unreliable(2)
-    fly(Numbers(64, 32), workers)
-    sizes = [len(task.cases) for task in workers.submitted]
-    assert sizes[0] == 8  # 64 flights left for two workers, four tasks each
-    assert sizes[-1] <= 4
-
-
 def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
     source, workers = Numbers(100, 5), Unreliable(2)
     Campaign(source.batches, workers, lost).fly(stopped=lambda: len(workers.submitted) >= 4)
     assert len(workers.submitted) == 4
     assert not workers._tasks
     assert all(len(runs) == 5 for _, runs in source.landings)
-
-
-class Unlucky(Unreliable):
-    """Workers who lose the tasks with flight 13 in them so many times, and no other."""
-
-    def __init__(self, slots, losses):
-        super().__init__(slots)
-        self._left = losses
-
-    def outcomes(self, timeout_s):
-        unlucky = any(case.run == 13 for case in self._tasks[0].cases)
-        if unlucky and self._left:
-            self._left -= 1
-            return [Outcome(self._tasks.pop(0), None)]
-        task = self._tasks.pop(0)
-        return [Outcome(task, [{"run": case.run, "status": "flown"} for case in task.cases])]
-
-
-@pytest.mark.parametrize(("losses", "status"), [(4, "flown"), (5, "crashed")])
-def test_a_flight_is_given_up_only_when_lost_alone_three_times(losses, status):
-    """Twice among others, then alone: the third time alone is the fifth loss."""
-    source = fly(Numbers(40, 20), Unlucky(1, losses))
-    assert {row["run"]: row["status"] for row in source.rows}[13] == status
-    assert sum(row["status"] == "crashed" for row in source.rows) == (status == "crashed")
-
-
-def test_in_rounds_a_case_that_ends_its_process_has_the_row_that_the_study_gives_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "ThisProcess", lambda work: Unreliable(1, deadly=frozenset({1})))
-    asked = study.Study("s", (), None, lambda rows: None, {}, lost=lost)
-    with study.in_rounds(asked, tmp_path) as fly_round:
-        assert [row["status"] for row in fly_round(0, "abc")] == ["flown", "crashed", "flown"]

@@ -1,7 +1,5 @@
-"""The engine without a second process: files, identities, workers that end as they are told, a made Ray."""
+"""The engine without a second process: files, workers that end as they are told, a made Ray."""
 
-import io
-import json
 import os
 import sys
 from concurrent.futures import Future
@@ -9,13 +7,11 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import ray_workers, store, workers
-from beaver_ftc.studies.engine.store import RowsAsJson
-from beaver_ftc.studies.engine.workers import Batch, Case, LocalWorkers, Outcome, ThisProcess, Work
+from beaver_ftc.studies.engine.workers import Batch, Case, LocalWorkers, Outcome, Work
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
@@ -44,17 +40,6 @@ def double(case):
 
 
 CASES = tuple(Case(run, 10 + run) for run in range(3))
-
-
-def test_this_process_is_one_worker():
-    here = ThisProcess(Work(double))
-    for number in (1, 2):
-        here.submit(Batch(number, CASES[:number]))
-    assert here.slots == 1
-    assert here.outcomes(0.0) == [Outcome(Batch(1, CASES[:1]), [{"run": 0, "is": 20}])]
-    here.close()
-    with pytest.raises(IndexError):
-        here.outcomes(0.0)
 
 
 class Hired:
@@ -120,17 +105,6 @@ def test_a_worker_killed_before_its_first_flight_is_replaced_but_not_for_ever(hi
     with pytest.raises(SimulationFailed, match=says):
         dies(has_begun=False)
     assert len(local._idle) == 1
-
-
-def test_silence_is_on_both_streams_and_ends(capfd):
-    for stream in (1, 2):
-        os.write(stream, b"before ")
-    with workers.silence():
-        for stream in (1, 2):
-            os.write(stream, b"lost ")
-    for stream in (1, 2):
-        os.write(stream, b"after")
-    assert tuple(capfd.readouterr()) == ("before after", "before after")
 
 
 class RayError(Exception):
@@ -217,30 +191,6 @@ def test_tasks_of_a_cluster(ray):
     assert ray.calls[-2:] == [("cancel", True), ("shutdown",)]
 
 
-@pytest.mark.parametrize(
-    ("cpus", "asked", "slots"), [(0, None, 2), (0.5, None, 2), (8.0, None, 16), (8, 5, 5)]
-)
-def test_how_many_tasks_a_cluster_holds(ray, cpus, asked, slots):
-    ray.cpus = cpus
-    assert ray_workers.RayWorkers(Work(double), None, asked).slots == slots
-
-
-def test_what_ray_prints_of_workers_that_die_is_no_part_of_the_output(ray, capsys):
-    there = ray_workers.RayWorkers(Work(double), None, None)
-    there.submit(Batch(1, CASES[:1]))
-    print("(raylet) a worker died")
-    there.submit(Batch(2, CASES[:1]))
-    there.close()
-    print("results")
-    assert capsys.readouterr() == ("results\n", "(raylet) a worker died\n")
-
-
-def test_a_cluster_that_was_there_goes_on(ray):
-    ray.running = True
-    ray_workers.RayWorkers(Work(double), None, 2).close()
-    assert [call[0] for call in ray.calls] == ["remote"]
-
-
 def test_a_node_with_other_versions_does_not_fly():
     same = dict(ray_workers.versions())
     assert ray_workers.fly_task(Work(double), same, CASES[:1]) == [{"run": 0, "is": 20}]
@@ -248,9 +198,3 @@ def test_a_node_with_other_versions_does_not_fly():
         SimulationFailed, match=r"a node of the cluster has numpy .* instead of 0: the table would mix"
     ):
         ray_workers.fly_task(Work(double), same | {"numpy": "0"}, CASES[:1])
-
-
-def test_rows_are_read_as_they_were_written():
-    codec, file = RowsAsJson(dict), io.BytesIO()
-    codec.write([{"a": np.bool_(True), "b": None}], file)
-    assert json.loads(file.getvalue()) == [{"a": True, "b": None}]

@@ -58,22 +58,6 @@ def test_results_are_in_the_order_given_whoever_is_first_and_however_large(two):
         assert [(of[0], len(of)) for of in work.results()] == [(k, 200_000) for k in range(3)]
 
 
-def test_as_many_are_at_work_as_there_are_cores(two, tmp_path):
-    def alone(k):
-        (tmp_path / str(k)).touch()
-        most = 0
-        for _ in range(20):
-            most = max(most, len(list(tmp_path.iterdir())))
-            time.sleep(0.005)
-        (tmp_path / str(k)).unlink()
-        return most
-
-    with Forks() as work:
-        for k in range(6):
-            work.give(lambda k=k: alone(k))
-        assert max(work.results()) == 2
-
-
 def test_what_a_piece_raises_is_raised_and_the_others_are_ended(two):
     began = time.monotonic()
     with Forks() as work:

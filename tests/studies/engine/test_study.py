@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
-from beaver_ftc.studies.engine.store import PACKAGE, differences, hashed_files
+from beaver_ftc.studies.engine.store import PACKAGE, hashed_files
 from beaver_ftc.studies.engine.study import Study, flown, fly_all, run_study
 
 
@@ -152,12 +152,6 @@ def test_two_processes_do_not_fly_the_same_study(tmp_path):
         pytest.raises(SimulationFailed, match="another beaver-ftc"),
     ):
         rows_of(tmp_path / "study", range(2), square)
-
-
-def test_a_key_that_has_gone_is_a_difference():
-    assert differences({"a": 1, "b": 2}, {"a": 1}) == ["b"]
-    assert differences({"a": 1}, {"a": 1, "c": 3}) == ["c"]
-    assert differences({"a": 1}, {"a": 1}) == []
 
 
 ALL_IMPORTED = """

@@ -1,12 +1,8 @@
 """The test that is told the fault, in a flight of the matrix: what it is shown, and what becomes of it."""
 
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
 from beaver_ftc.diagnosis.informed_test import healthy_positions, term_acceleration
@@ -18,7 +14,6 @@ from beaver_ftc.studies.matrix.fault_matrix import AT_S, FaultCase, beside_told,
 from telling import apart
 
 AIRCRAFT = load()
-FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
 
 
 def flown(fault, surface, turbulence="none"):
@@ -83,13 +78,6 @@ def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
     assert seen_when_told(scenario, kept, "elevator")["told_chance"] > 0.99
 
 
-def test_rougher_air_shows_less(lost):
-    scenario, kept = lost
-    rough = scenario.with_({"fdi.bounds.turbulence": "moderate"})
-    still, moved = (seen_when_told(one, kept, "elevator")["told_deflection"] for one in (scenario, rough))
-    assert moved < still
-
-
 def test_what_is_counted():
     def row(surface, chance, verdict):
         return {
@@ -108,34 +96,3 @@ def test_what_is_counted():
     assert found["share"] == pytest.approx(0.4)
     assert found["by_surface"]["elevator"] == {"seen": 3, "named": 2}
     assert beside_told([row("flap", 0.0, "unseen")])["share"] is None
-
-
-def test_an_aircraft_with_signals_of_its_own_keeps_those():
-    """The trainer has no slipstream: the built-in one's `dpt` is not asked of it."""
-    quiet = {"duration_s": 0.5, "faults": [], "expect": {}}
-    scenario = load_scenario(FOLDER / "trainer-flight.yaml").with_(quiet)
-    kept = columns_of(scenario.airframe)
-    fly(scenario, kept)
-    assert "dpt" not in kept
-    for term in scenario.airframe.moments:
-        moved = kept.get(f"{term.surface}_cmd_rad")
-        assert np.isfinite(term_acceleration(scenario.airframe, term, kept, moved)).all()
-
-
-@pytest.mark.parametrize(
-    ("bandwidth", "rate", "expected"),
-    [
-        (0.0, 0.0, [0.2, 0.2, -0.3, -0.1]),
-        (0.0, 20.0, [0.2, 0.2, 0.0, -0.1]),
-        (np.log(2.0) / 0.01, 0.0, [0.1, 0.15, -0.075, -0.0875]),
-        (np.log(2.0) / 0.01, 7.0, [0.07, 0.135, 0.065, -0.005]),
-    ],
-)
-def test_a_healthy_surface_follows_the_command_within_its_travel_lag_and_rate(bandwidth, rate, expected):
-    """From 0 within -0.3 to 0.2 rad, in frames of 10 ms: half of the way, at 20 rad/s 0.2 rad, a frame."""
-    context = SimpleNamespace(
-        surfaces=("flap", "tab"), dt_s=0.01, travel_rad=np.array([[-1.0, -0.3], [1.0, 0.2]]),
-        declared=SimpleNamespace(bandwidth_rad_s=[5.0, bandwidth], rate_limit_rad_s=[0.4, rate]),
-    )  # fmt: skip
-    log = {"tab_cmd_rad": np.array([0.5, 0.25, -1.0, -0.1]), "tab_effective_rad": np.zeros(4)}
-    assert healthy_positions(context, log, "tab") == pytest.approx(expected, abs=1e-12)

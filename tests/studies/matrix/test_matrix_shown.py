@@ -1,8 +1,7 @@
-"""Table, heat map and document of the fault matrix, of rows made by hand; its scenarios; one short row."""
+"""Table, heat map and document of the fault matrix, of rows made by hand; short rows."""
 
 import pytest
 
-from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.matrix import fault_matrix
 from beaver_ftc.studies.matrix.fault_matrix import (
     FAULTS,
@@ -12,8 +11,6 @@ from beaver_ftc.studies.matrix.fault_matrix import (
     document_of,
     fly_case,
     heat_map_of,
-    scenario_of,
-    verdict,
 )
 from beaver_ftc.studies.present.page import contents
 from kept import picture
@@ -100,29 +97,3 @@ def short(monkeypatch):
 )
 def test_a_row(case, short, changed):
     assert not changed(fly_case(case))
-
-
-def test_a_jam_is_off_the_trimmed_deflection():
-    (name,) = [name for name, fault in FAULTS if fault.get("off_deg")][:1]
-    off_deg = dict(FAULTS)[name]["off_deg"]
-    (fault,) = scenario_of(FaultCase(name, "elevator", 45.0), "nominal", -1.5).faults
-    assert fault.position_deg == -1.5 + off_deg
-    assert (
-        -5.0 < fault_matrix.trimmed_deg(52.0, "elevator") - fault_matrix.trimmed_deg(38.0, "elevator") != 0.0
-    )
-
-
-@pytest.mark.parametrize(
-    ("isolation", "said"),
-    [
-        ({"fault": "elevator", "correct": True, "type": None, "candidates": []}, "surface"),
-        ({"fault": "elevator", "correct": True, "type": "stuck", "type_correct": None}, "named"),
-        ({"candidates": ["elevator"]}, "open"),
-        ({"candidates": ["elevator:bias"]}, "WRONG"),
-        ({"fault": "flap", "correct": False, "candidates": ["stuck"]}, "WRONG"),
-    ],
-)
-def test_a_verdict(isolation, said):
-    nothing = {"fault": None, "type": None, "candidates": [], "type_correct": None}
-    document = {"detection": {"detected": True}, "false_alarm": False, "isolation": nothing | isolation}
-    assert verdict(Metrics.of(document), "elevator", "stuck") == said

@@ -114,28 +114,8 @@ def test_ailerons_and_rudder_at_once_and_one_after_the_other(later_s):
     assert found["rudder"] == ("bias", 8.02 + later_s, pytest.approx(3, abs=0.1))
 
 
-def test_a_fault_in_each_plane():
-    loss = fault("elevator", "loss_of_effectiveness", 8, magnitude=0.5)
-    found = named(faults=[loss, {**AILERON_JAM, "at_s": 12}])
-    assert found["elevator"] == ("loss_of_effectiveness", 8.02, pytest.approx(-0.5, abs=0.01))
-    assert found["aileron"] == ("stuck", 12.01, pytest.approx(3, abs=0.1))
-
-
-def test_a_second_fault_in_pitch_is_found_beside_the_first_that_was_known():
-    jam, flap = fault("elevator", "stuck", 8, position_deg=0), fault("flap", "stuck", 16, position_deg=3)
-    found = named(faults=[jam, flap])
-    assert found["elevator"][:2] == (None, 8.02)
-    assert found["flap"] == ("stuck", pytest.approx(16, abs=0.1), pytest.approx(3, abs=0.1))
-
-
 def test_two_faults_of_pitch_at_once_stay_open():
     jam, flap = fault("elevator", "stuck", 8, position_deg=0), fault("flap", "stuck", 8, position_deg=5)
     flight = fly(scenario(duration_s=28, faults=[jam, flap], fdi={"fault_class": "all", "pairs": True}))
     assert flight.isolated is None
     assert "elevator+flap" in flight.candidates
-
-
-def test_a_second_fault_that_is_not_looked_for_is_no_pair():
-    flight = fly(scenario(duration_s=20, faults=[AILERON_JAM, RUDDER_BIAS], fdi={"fault_class": "all"}))
-    assert flight.isolated == "unanticipated"
-    assert flight.faults == ()

@@ -1,14 +1,12 @@
-"""Sources no built-in scenario has yet: turning air, from JSBSim's own turbulence, and erring sensors."""
+"""Turning air as a source, from JSBSim's own turbulence; without columns for it the air does not turn."""
 
 import numpy as np
-import pytest
 
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.mismatch.models import States, air_name, measured_name, states_of
-from beaver_ftc.studies.mismatch.sources import SOURCES, Models, instantaneous
-from beaver_ftc.studies.mismatch.split import split
+from beaver_ftc.studies.mismatch.models import air_name, states_of
+from beaver_ftc.studies.mismatch.sources import Models, instantaneous
 from flying import flown, scenario
 
 PROPERTY = {name: (path, factor) for name, path, factor in TRUTH}
@@ -60,31 +58,3 @@ def test_without_columns_for_it_the_air_does_not_turn_and_sensors_do_not_err():
     states = states_of({name: log[name] for name in log.columns})
     assert np.array_equal(states.x_air, states.x)
     assert np.array_equal(states.y_measured, states.y)
-
-
-@pytest.mark.parametrize(
-    ("column", "error"), [("q_rad_s", 0.01), ("alpha_rad", 0.02), ("qdyn_pa", 30.0), ("dpt", 0.1)]
-)
-def test_an_erring_sensor_shows_as_the_model_at_the_true_state_less_that_at_the_measured(column, error):
-    """With the measurement off by a constant, what sensors add is all that the total has changed by."""
-    _, log = flown(uncertainty={}, duration_s=2)
-    columns = {name: log[name] for name in log.columns}
-    assert measured_name("q_rad_s") == "q_measured_rad_s"
-    plain, _ = split(CALM, [columns])
-    off = columns | {measured_name(column): columns[column] + error}
-    states = states_of(off)
-    designed = Models(CALM).design_model
-    made_of_it = designed.acceleration(states.x_measured, states.y_measured, states.u)
-    for i, axis in enumerate("pqr"):  # what the diagnosis would have logged, one row later
-        off[f"{axis}_design_rad_s2"] = np.concatenate([[0.0], made_of_it[:-1, i]])
-    erring, _ = split(CALM, [off])
-    change = erring.total - plain.total
-    assert np.abs(change).max() > 1e-4
-    assert erring.contributions["sensors"] == pytest.approx(change, abs=1e-9)
-    assert np.abs(erring.unexplained).max() <= ROUNDING
-    assert all(
-        np.array_equal(erring.contributions[name], plain.contributions[name])
-        for name in SOURCES
-        if name not in ("sensors", "integration")
-    )
-    assert isinstance(states, States)

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 import commands
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import read
-from beaver_ftc.studies.mismatch import charts, study
+from beaver_ftc.studies.mismatch import study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.study import VARIANTS, variant_of
-from beaver_ftc.studies.mismatch.tables import _heading
 from flying import loss, scenario
 
 SHORT = """
@@ -82,26 +80,6 @@ def test_the_folder_holds_a_run_and_its_mismatch(flown_folder):
         assert (result / "figures" / f"mismatch-{name}.png").stat().st_size > 10_000
 
 
-def test_a_false_alarm_of_the_published_case_is_said_on_the_page_too():
-    case = {"false_alarm": True, "detection_delay_s": None, "guaranteed_delay_s": 0.01}
-    recommended = {"constant_rad_s2": {"p": 0.1, "q": 0.2, "r": 0.3}, "runs": 1, "settled": False}
-    found = {
-        "scenario": "x", "dominant": None, "false_alarm": True, "detection": {"time_s": 3.0, "axis": "q"},
-        "recommended": recommended, "guarantee": {"declared": case, "recommended": case},
-    }  # fmt: skip
-    heading = _heading(found)
-    assert heading.count("published elevator case with either bound: FALSE ALARM before the fault") == 1
-    assert "FALSE ALARM  at 3.00 s on q" in heading
-    assert "still exceeded when flown" in heading
-    assert "certain within" not in heading
-
-
-def test_a_run_without_mismatch_has_no_such_section(tmp_path):
-    from beaver_ftc.studies.mismatch.tables import mismatch_section
-
-    assert mismatch_section(tmp_path) == ""
-
-
 def test_a_bound_of_nothing_is_no_trouble(tmp_path):
     """A design so good that nothing is admitted: shares of nothing are null, in words `no bound`."""
     nothing = "fdi: {bounds: {constant_rad_s2: {p: 0, q: 0, r: 0}, inertia_coupling: {p: 0, q: 0, r: 0}}}\n"
@@ -155,13 +133,6 @@ def test_a_wrong_variant_is_bad_input_of_one_line(tmp_path, variant, says):
     assert done.stdout == ""
 
 
-def test_an_unknown_scenario_is_bad_input_in_json_too(tmp_path):
-    done = beaver(tmp_path, "mismatch", "no-such-scenario", "--format", "json")
-    assert done.returncode == 2
-    assert json.loads(done.stdout) == {"runs": [], "errors": done.stderr.splitlines()}
-    assert "Traceback" not in done.stderr
-
-
 @pytest.mark.parametrize("name", VARIANTS)
 def test_every_named_variant_is_a_valid_scenario_that_differs_in_its_design_model_alone(name):
     base = scenario(faults=[loss()])
@@ -170,18 +141,6 @@ def test_every_named_variant_is_a_valid_scenario_that_differs_in_its_design_mode
         exclude={"name", "design_model", "expect"}
     )
     assert (found.design_model == base.design_model) == (name == "declared")
-
-
-def test_variants_join():
-    text = "linearised+coefficients.Cm_alpha=0.9+inertia.Ix=1.5+engine_terms=no+mass=1"
-    found = variant_of(scenario(), text)
-    design = found.design_model
-    assert (design.linearised, design.coefficients, design.inertia.Ix) == (True, {"Cm_alpha": 0.9}, 1.5)
-    assert (design.engine_terms, design.mass) == (False, 1.0)
-    assert found.name == f"{scenario().name}-{text.translate(dict.fromkeys(map(ord, '+.='), '-'))}"[:100]
-    for said, value in (("1", 1.0), ("1.5", 1.5), ("true", True), ("no", False)):
-        (found,) = study._changes(f"mass={said}").items()
-        assert (*found, type(found[1])) == ("mass", value, type(value))
 
 
 def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path):
@@ -200,15 +159,3 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     assert (folder / "figures" / "mismatch-map.png").exists()
     with (folder / "mismatch.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 12
-
-
-def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
-    def refuses(case):
-        raise BadInput("no trim")
-
-    monkeypatch.setattr("beaver_ftc.studies.mismatch.study.tally_of_flight", refuses)
-    monkeypatch.setattr(study, "AIRSPEEDS_MPS", (40.0,))
-    monkeypatch.setattr(study, "ALTITUDES_M", (500.0,))
-    entries = study.run_map(tmp_path, scenario(), report=False)
-    assert [entry["worst_ratio"] for entry in entries] == [None] * 3
-    assert charts.map_figure(entries, "x") is not None

@@ -1,15 +1,14 @@
 """The survey as document, rows, words and pictures: of traces made by hand, all that there is of each."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace
-from beaver_ftc.studies.power import shown, survey
-from beaver_ftc.studies.power.probabilities import answers, document_of
+from beaver_ftc.studies.power import shown
+from beaver_ftc.studies.power.probabilities import document_of
 from beaver_ftc.studies.power.survey import (
     BOTH,
     ESTIMATORS,
@@ -18,7 +17,6 @@ from beaver_ftc.studies.power.survey import (
     Condition,
     Watched,
     scenario_of,
-    strikes_at_s,
 )
 from beaver_ftc.studies.present.page import contents
 from kept import in_short, picture
@@ -89,33 +87,6 @@ def test_the_pictures(files, name, changed):
     assert not changed(picture(figure))
 
 
-def test_a_flight_of_the_survey(changed):
-    block = Block(GRID.conditions[1], 5.0, 1002)
-    at_s = strikes_at_s(block)
-    assert 8.0 <= at_s <= 10.0
-    flight = scenario_of(block, 14.0, [survey.loss("rudder", 0.25, at_s)])
-    assert not changed(flight.model_dump(mode="json", exclude_unset=True))
-    assert len(GRID.healthy()) == 2 * 8
-    assert [one.excitation_deg_s for one in GRID.healthy()[:4]] == [2.0, 5.0, 2.0, 5.0]
-    assert [one.seed for one in GRID.healthy()[8:11]] == [1_000_000, 1_000_001, 1_000_002]
-    assert [one.seed for one in GRID.faulted()[:7]] == [0, 1, 2, 1000, 1001, 1002, 0]
-
-
-def test_a_fault_after_which_nothing_was_seen_stands_out_of_nothing():
-    seen = [(SimpleNamespace(t_s=1.0), None)]
-    assert survey.deflections(SimpleNamespace(seen=seen, fault_at_s=1.0), "rudder", 1.0, (0.5, 1.0)) == [
-        0.0,
-        0.0,
-    ]
-
-
-def test_some_conditions_of_a_grid():
-    assert GRID.only("ideal", None).conditions == GRID.only(None, "none").conditions == GRID.conditions[:1]
-    assert GRID.only(None, None) == GRID
-    with pytest.raises(BadInput, match="allowed: ideal, none; tactical-grade, light"):
-        GRID.only("ideal", "light")
-
-
 def test_a_grid_elsewhere_is_of_another_aircraft_and_one_surface():
     there = GRID.elsewhere("beaver-split", 40.0, None, "aileron_right")
     assert there.surfaces == ("aileron_right",)
@@ -124,19 +95,3 @@ def test_a_grid_elsewhere_is_of_another_aircraft_and_one_surface():
     assert GRID.elsewhere(None, None, None, None) == GRID
     with pytest.raises(BadInput, match="--surface 'flap': allowed: aileron, elevator, rudder"):
         GRID.elsewhere(None, None, None, "flap")
-
-
-def test_an_answer_is_a_line_for_each_size():
-    cell = {"sensors": "ideal", "turbulence": "none", "surface": "rudder", "scheme": "both", "flights": 8}
-    within = {
-        "0.5": {"value": 0.25, "low": 0.03, "high": 0.65},
-        "1": {"value": 1.0, "low": 0.63, "high": 1.0},
-    }
-    cell |= {"excitation_deg_s": 3.0, "magnitude": 0.4, "within": within}
-    document = {"cells": [cell, cell | {"scheme": "worst-case"}, cell | {"surface": "elevator"}]}
-    assert answers(document, "rudder") == [
-        "ideal sensors, still air, 3 deg/s: a loss of rudder of 40% is found within 0.5 s in 25% (3 to 65%), "
-        "within 1 s in 100% (63 to 100%) of 8 flights",
-        "In brackets 95 % intervals. `beaver-ftc smallest SCENARIO` finds the size found in 90 % of flights.",
-    ]
-    assert answers(document, "aileron") == []

@@ -1,6 +1,5 @@
 """The survey of detection probability: its flights, its levels, its counts, and what the command writes."""
 
-import json
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,9 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import app
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
@@ -24,12 +21,11 @@ from beaver_ftc.studies.power.probabilities import (
     rows_of,
     summary,
 )
-from beaver_ftc.studies.power.shown import as_text, comparison, run_power
+from beaver_ftc.studies.power.shown import comparison, run_power
 from beaver_ftc.studies.power.survey import (
     BUILT_IN,
     ESTIMATORS,
     GRIDS,
-    WITHIN_S,
     Block,
     Condition,
     Watched,
@@ -69,12 +65,6 @@ class TestFlights:
         assert full.only(None, None) == full
         with pytest.raises(BadInput, match="allowed: tactical-grade, none; tactical-grade, light"):
             GRIDS["quick"].only("ideal", None)
-
-    def test_everything_but_the_fault_follows_from_the_bout(self):
-        block = Block(LIGHT, 3.0, 7)
-        healthy, faulty = scenario_of(block, 12.0), scenario_of(block, 12.0, [loss("rudder", 0.4, 9.0)])
-        assert faulty.model_copy(update={"faults": ()}) == healthy
-        assert scenario_of(block._replace(seed=8), 12.0).reference != healthy.reference
 
     def test_seeds_are_the_same_in_every_condition_and_no_healthy_one_has_a_fault(self):
         for grid in GRIDS.values():
@@ -138,12 +128,6 @@ class TestLevels:
         found = level_at([rising, quiet], 2.0)
         assert (found.alarms, found.hours) == (1, 1.25)
 
-    def test_hours_and_limits_are_those_of_the_flights(self):
-        level = level_for(healthy(*range(20)), 2.0)  # two hours
-        assert (level.alarms, level.hours) == (4, 2.0)
-        assert level.level == 15
-        assert (level.per_h.low, level.per_h.high) == pytest.approx((1.0899 / 2, 10.2416 / 2), rel=1e-3)
-
 
 def watched(seed, **delays):
     """A block with one fault, a scheme a keyword: its delay at the level 2, or None."""
@@ -174,17 +158,6 @@ class TestCounts:
         assert summary(rows, own=True)["within"]["0.5"]["value"] == 1.0
         assert summary([rows[-1]])["flights"] == 0
 
-    def test_an_alarm_before_the_fault_at_the_schemes_own_level_is_no_detection_of_its_own(self):
-        rows = [
-            {"delay_s": 0.9, "false_alarm": False, "own_delay_s": own, "own_false_alarm": early}
-            for own, early in ((0.3, False), (0.7, False), (None, True), (0.1, True), (0.2, True))
-        ]
-        own = summary(rows, own=True)
-        assert own["flights"] == 2
-        assert [own["within"][s]["value"] for s in ("0.5", "1", "5")] == [0.5, 1.0, 1.0]
-        assert own["median_delay_s"] == 0.3
-        assert summary(rows)["flights"] == 5
-
     def test_the_limit_counts_a_flight_once_however_many_schemes_watched_it(self):
         levels = {(*STILL, scheme): level_at(healthy(2.0), 2.0) for scheme in "ab"}
         far = watched(2, a=0.1)
@@ -212,21 +185,6 @@ def replace_traces(one):
 
 
 class TestSurvey:
-    def test_every_scheme_has_watched_every_flight(self, survey):
-        document, folder = survey
-        rows = pq.read_table(folder / "power.parquet").to_pylist()
-        schemes = {*BUILT_IN, "observer-constant"}
-        assert len(rows) == 2 * 2 * 4 * len(schemes)
-        assert {row["scheme"] for row in rows} == schemes
-        assert len(document["cells"]) == 2 * 4 * len(schemes)
-        assert document["failures"] == []
-
-    def test_levels_hold_on_the_flights_they_were_set_on(self, survey):
-        for level in survey[0]["levels"]:
-            assert level["calibration"]["hours"] == pytest.approx(SMALL.healthy_h)
-            assert level["calibration"]["per_h"] <= SMALL.per_h
-            assert level["before_faults"]["hours"] > 0
-
     def test_with_perfect_instruments_and_still_air_ours_finds_every_large_loss(self, survey):
         cells = [
             cell
@@ -241,16 +199,6 @@ class TestSurvey:
         for total in watched:
             shares = [total["within"][s]["value"] for s in ("0.5", "1", "5")]
             assert all(a <= b for a, b in pairwise(shares))
-
-    def test_what_is_written_is_what_was_found(self, survey):
-        document, folder = survey
-        assert json.loads((folder / "power.json").read_text()) == json.loads(json.dumps(document))
-        assert (folder / "power.txt").read_text() == as_text(document) + "\n"
-        names = [*(f"map-{scheme}" for scheme in (*BUILT_IN, "observer-constant"))]
-        names += ["schemes-ideal", "schemes-tactical-grade"]
-        for name in names:
-            assert (folder / "figures" / f"{name}.png").stat().st_size > 10_000
-            assert (folder / "figures" / f"{name}.svg").read_text().startswith("<?xml")
 
     def test_it_is_flown_again_into_the_same_folder_to_the_same_numbers(self, survey):
         document, folder = survey
@@ -299,34 +247,3 @@ class TestContenders:
         assert set(one.traces) == set(BUILT_IN)
         assert len(one.failures) == 1
         assert one.failures[0].startswith(f"{broken}: plug-in {broken}: not registered")
-
-
-def test_the_command_refuses_what_it_does_not_know(tmp_path):
-    done = CliRunner().invoke(app, ["power", "--grid", "huge", "--out", str(tmp_path)])
-    assert done.exit_code == 2
-    done = CliRunner().invoke(app, ["power", "--schemes", "nobody", "--out", str(tmp_path)])
-    assert done.exit_code != 0
-    assert isinstance(done.exception, BadInput)
-    assert not any(tmp_path.iterdir())
-
-
-def test_held_out_alarms_are_counted_at_the_common_level_before_the_faults():
-    """By hand: of four blocks with faults two pass the level 0.8 before the fault, one the own level 1."""
-
-    def watched(before, faults):
-        rises = ((3.0, before),)
-        traces = [Trace(before, (), bool(faults), 9.0, rises=rises) for _ in faults or (None,)]
-        fault_deflections = [[1.0] * len(WITHIN_S) for _ in faults]
-        return Watched(Block(STILL, 3.0, 1), faults, {ESTIMATORS: traces}, fault_deflections)
-
-    healthy = [watched(before, ()) for before in (0.8, 0.3, 0.2)]
-    faulted = [watched(before, (("aileron", 0.5), ("elevator", 0.5))) for before in (0.5, 0.9, 1.2, 0.1)]
-    document, _ = document_of(replace(SMALL, per_h=1e-3), healthy, faulted)
-    (line,) = document["levels"]
-    assert line["level"] == 0.8
-    assert line["calibration"]["alarms"] == 0
-    assert (
-        line["before_faults"]["alarms"] == 2
-    )  # a block's flights are the same until the fault: each counts once
-    assert line["before_faults"]["hours"] == pytest.approx((9.0 + 3.0 + 3.0 + 9.0) / 3600.0)
-    assert line["own_level"]["alarms"] == 0

@@ -12,11 +12,9 @@ from beaver_ftc.studies.present.page import (
     Pictures,
     Table,
     as_html,
-    as_markdown,
     replace_between,
     write_files,
 )
-from beaver_ftc.studies.present.tables import as_csv
 
 
 def drawn():
@@ -49,20 +47,6 @@ def test_a_figure_is_the_same_to_the_byte_each_time(tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-def test_panels_bear_their_labels_at_the_edges_alone():
-    figure, axes = panels(2, 2, 4.0, 4.0)
-    label_edges(axes, "x", ["top", "bottom"], ["left", "right"])
-    assert [[a.get_xlabel() for a in row] for row in axes] == [["", ""], ["x", "x"]]
-    assert [[a.get_ylabel() for a in row] for row in axes] == [["top", ""], ["bottom", ""]]
-    assert [[a.get_title() for a in row] for row in axes] == [["left", "right"], ["", ""]]
-    assert figure.get_size_inches().tolist() == [4.0, 4.0]
-    assert (figure.dpi, panels(1, 1, 3.0, 2.0, dpi=85)[0].dpi, panels(1, 1, 3.0, 2.0, "of it")[0].dpi) == (
-        110,
-        85,
-        110,
-    )
-
-
 def test_what_stands_outside_the_marks_of_a_page_stays(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("before\n<begin>\nold\n<end>\nafter\n")
@@ -89,18 +73,3 @@ def test_whatever_a_page_shows_is_text_and_never_markup(tmp_path):
     assert re.findall("&lt;i&gt;(.)&lt;/i&gt; &amp; &quot;more&quot;", made.partition("</title>")[2]) == [
         str(n) for n in range(9)
     ]
-
-
-def test_each_part_has_its_markdown():
-    parts = [
-        "A sentence.", Heading("Heading"), Table(("a", "b"), [("1", "2|3")]),
-        Bullets("Lead:", ["one", "two"]), Pictures([("First", "one"), ("Second", "two")]),
-    ]  # fmt: skip
-    assert as_markdown(parts, "figures").split("\n\n") == [
-        "A sentence.", "## Heading", "| a | b |\n| --- | --- |\n| 1 | 2\\|3 |", "Lead:", "- one\n- two",
-        "![First](figures/one.png)", "![Second](figures/two.png)\n",
-    ]  # fmt: skip
-
-
-def test_csv_has_a_header_and_nothing_for_none():
-    assert as_csv([{"a": 1, "b": None}, {"a": "x,y", "b": 2.5}]) == 'a,b\n1,\n"x,y",2.5\n'

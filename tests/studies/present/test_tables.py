@@ -26,32 +26,3 @@ def test_units_follow_and_what_is_missing_has_a_word_of_its_own():
     assert tables.seconds(1.234) == "1.23 s"
     assert tables.seconds(None) == "never"
     assert [tables.finite(x) for x in (1.5, float("inf"), "inf", 3)] == [1.5, None, "inf", 3]
-
-
-def test_columns_are_as_wide_as_their_widest_cell():
-    assert tables.aligned([["a", "bb", "c"], ["long", "b", ""]]) == "a     bb  c\nlong  b"
-
-
-def test_a_table_in_markdown_and_html():
-    assert tables.markdown_table(["a", "b|c"], [["1", "2"]]) == "| a | b\\|c |\n| --- | --- |\n| 1 | 2 |"
-    table = tables.html_table(["<a>", "b"], [["✓ yes", "✗ no"], ["1", "2"]], "so & so")
-    assert "<caption>so &amp; so</caption>" in table
-    assert '<th scope="col">&lt;a&gt;</th><th scope="col">b</th>' in table
-    assert '<td class="met">✓ yes</td><td class="missed">✗ no</td>' in table
-    assert "<tr><td>1</td><td>2</td></tr>" in table
-    assert "caption" not in tables.html_table(["a"], [["1"]])
-
-
-def test_names_stand_to_the_left_unbroken_and_numbers_to_the_right():
-    table = tables.plain(
-        "of [b]names[/b]", ["name", "value"], [["a long name", "1.5"], [":smile: [red]b[/red]", "22"]]
-    )
-    text = tables.printed([table], width=60).splitlines()
-    assert text[0] == "of [b]names[/b]"
-    assert [len(line) for line in text[1:]] == [len(text[1])] * 3
-    assert [line[:4] for line in text[1:]] == ["name", "a lo", ":smi"]
-    assert text[3].startswith(":smile: [red]b[/red]")
-    assert "\x1b" not in "".join(text)
-    narrow = tables.plain("", ["name", "value"], [["a long name", "1.5 of a great many"]])
-    assert "a long name" in tables.printed([narrow], width=24)
-    assert "\x1b" in tables.printed([tables.plain("t", ["n"], [["1"]])], width=20, colour=True)

@@ -4,9 +4,8 @@ import json
 from pathlib import Path
 
 from beaver_ftc.studies.present.page import contents
-from beaver_ftc.studies.smallest.shown import FILES, _is_better, as_text, sentences
+from beaver_ftc.studies.smallest.shown import FILES, as_text
 from kept import page
-from telling import alike
 
 
 def row(variant, size, low, high, flights, certain, total=(0.97, 0.91, 0.99, 38, 39)):
@@ -52,14 +51,6 @@ CASES = {
 }  # fmt: skip
 
 
-def test_the_survey_made_by_hand_tells_its_numbers_apart():
-    rows = [CASES["all known"], *COMPARED[:3]]
-    assert not alike(
-        [(each["found"]["size"], each["found"]["low"], each["certain"]["size"]) for each in rows]
-    )
-    assert not alike([each["found"]["flights"] for each in rows])
-
-
 def test_what_is_said_of_every_kind_of_answer(changed):
     assert not changed({name: as_text(of).splitlines() for name, of in CASES.items()})
 
@@ -69,19 +60,3 @@ def test_files_hold_every_row(changed):
     assert json.loads(files["smallest.json"]) == CASES["all known"]
     assert not changed(files["smallest.csv"].splitlines(), "csv")
     assert not changed(page(files["smallest.html"](Path())), "page")
-
-
-def test_what_limits_most_is_the_variant_that_finds_the_smallest():
-    said = list(sentences(CASES["all known"]))
-    assert said[-2] == "What limits it most: without turbulence, it would be 12 % (8 to 16 %)."
-    assert said[-1] == "Which reference would help: with twice the reference, it would be 15 % (11 to 19 %)."
-
-
-def test_smaller_is_what_intervals_that_do_not_overlap_say():
-    base, none = row("", 0.3, 0.25, 0.35, 50, None), row("", None, None, None, 50, None)
-    for low, high, better in ((0.1, 0.24, True), (0.1, 0.25, False), (0.2, 0.34, False), (0.1, None, False)):
-        assert _is_better(row("", 0.2, low, high, 50, None), base) is better
-    assert not _is_better(base, row("", 0.3, None, 0.35, 50, None))
-    for low, better in ((0.992, True), (0.99, False), (0.5, False)):  # where none is found often enough
-        other = row("", None, None, None, 50, None, (0.995, low, 0.999, 39, 39))
-        assert _is_better(other, none) is better

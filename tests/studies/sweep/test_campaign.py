@@ -127,18 +127,6 @@ def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches,
     assert table_of(tmp_path / "short") == table_of(reference[0])
 
 
-def test_a_finished_sweep_is_not_flown_again_when_resumed(reference, tmp_path, small_batches, monkeypatch):
-    options = Options(out=tmp_path, workers=2, report=False)
-    run_sweep(sweep_of(), options)
-    monkeypatch.setattr(
-        "beaver_ftc.studies.sweep.campaign._workers", lambda *_: pytest.fail("nothing is missing")
-    )
-    asked = sweep_of(**{"seed: 3": "seed: 3\nexpect: {detection_rate: {at_least: 0.999, confidence: 0.99}}"})
-    again = run_sweep(asked, Options(out=tmp_path, resume=True, report=False))
-    assert [entry["passed"] for entry in again["expectations"]] == [False]  # 48 flights cannot show that
-    assert again["passed"] is False
-
-
 def test_a_replayed_flight_is_the_flight_in_the_table(reference, tmp_path):
     document = replay(sweep_of(), Options(out=tmp_path, report=False), 11)
     row = pq.read_table(reference[0] / "results.parquet").to_pylist()[11]
@@ -192,11 +180,3 @@ def test_if_nothing_can_be_flown_that_is_a_failure(tmp_path, small_batches):
     with pytest.raises(SimulationFailed, match=r"no flight could be flown: .*20 m/s"):
         run_sweep(nothing, Options(out=tmp_path, workers=2, report=False))
     assert (tmp_path / "short" / "summary.json").exists()
-
-
-def test_a_sweep_without_faults_has_no_detection_to_speak_of(tmp_path, small_batches):
-    healthy = sweep_of("name: healthy\nbase: fault-free\nset: {duration_s: 1, expect: {}}\nruns: 20\n")
-    summary = run_sweep(healthy, Options(out=tmp_path, workers=1))
-    assert summary["detection"]["rate"] is None
-    assert summary["false_alarms"]["hours"] == pytest.approx(20 / 3600)
-    assert summary["confusion"]["counts"] == [[20]]

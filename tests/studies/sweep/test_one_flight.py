@@ -1,15 +1,10 @@
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.results.writer import NotAllWritten
 from beaver_ftc.studies.sweep.one_flight import (
     Keep,
-    columns_of,
-    counts_of_rows,
     fly_one,
-    keep_flight,
     scenario_of,
 )
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
@@ -32,40 +27,6 @@ def test_a_row_says_what_the_flights_metrics_say(short):
     assert row["tracking.post_fault_rms_deg_s.q"] == document["tracking"]["post_fault_rms_deg_s"]["q"]
     assert row["saturation_s.elevator"] == document["saturation_s"]["elevator"]
     assert row["fault_free_s"] == 0.5
-
-
-def test_every_metric_has_a_column(short):
-    """All that metrics.json lists, but for what all flights share; lists have columns of their own."""
-    from beaver_ftc.loop.loop import fly
-
-    document = metrics(fly(scenario_of(short, Plan(short).assignments([0])[0])))
-    paths = {
-        f"{section}.{key}" if isinstance(below, dict) else section
-        for section, below in document.items()
-        for key in (below if isinstance(below, dict) else [""])
-    } - {"scenario", "seed", "versions"}
-    names = set(columns_of(load().surfaces))
-    lists = {
-        "supervisor",
-        "isolation.names",
-        "envelope_exits",
-        "expectations",
-        "departure",
-        "faults",
-        "hints",
-        "changes",
-        "limits",
-        "assumes",
-        "outside_class",
-    }
-    shared = {"flight", "envelope", "profile", "mode_changes_left_out"}  # the flight's own document has them
-    missing = {
-        path
-        for path in paths
-        if not path.startswith("versions.")
-        and not any(name == path or name.startswith(f"{path}.") for name in names)
-    }
-    assert {path for path in missing if path.partition(".")[0] not in shared} <= lists
 
 
 def test_a_flight_that_cannot_be_trimmed_is_a_row_with_its_reason():
@@ -135,33 +96,3 @@ def test_keeping_follows_the_policy(policy, row, wanted):
         "isolation.correct": None,
     }
     assert Keep(policy).wants(full | row) is wanted
-
-
-def test_selected_flights_are_kept_whatever_became_of_them():
-    assert Keep("selected", frozenset({5})).wants({"run": 5})
-
-
-def test_an_alarm_without_a_fault_is_no_detection_among_the_counts():
-    flights = [("flown", "stuck", True)] * 3 + [("departed", "stuck", False), ("flown", None, True)] * 2
-    flights += [("failed", None, None)] * 6
-    rows = [dict(zip(("status", "fault.type", "detection.detected"), one, strict=True)) for one in flights]
-    assert counts_of_rows(rows) == {"done": 13, "failed": 6, "faulted": 5, "detected": 3}
-
-
-@pytest.mark.parametrize("scheme", ["adaptive-estimators", "zhang2005"])
-def test_a_kept_flight_has_its_certificate_where_the_scheme_has_one(monkeypatch, tmp_path, scheme):
-    """Of one whose files cannot all be written log and scenario are kept as they are."""
-    given = []
-
-    def run(scenario, folder, report, certified):
-        given.append((scenario.name, folder, report, certified))
-        raise NotAllWritten("a picture")
-
-    monkeypatch.setattr("beaver_ftc.results.writer.run", run)
-    sweep = sweep_of(SHORT.replace("set: {", f"set: {{fdi: {{scheme: {scheme}}}, "))
-    (flight,) = Plan(sweep).assignments([7])
-    keep_flight(sweep, flight, Keep(folder=tmp_path, certified=True), report=True)
-    keep_flight(sweep, flight, Keep(folder=tmp_path))
-    certified = scheme == "adaptive-estimators"
-    assert given == [("short-0007", tmp_path, True, certified), ("short-0007", tmp_path, False, False)]
-    assert list(tmp_path.iterdir()) == []

@@ -3,15 +3,14 @@
 import json
 import math
 from statistics import NormalDist
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from tools.drawn.rare import ANALYTIC, EXPECTATION, FAR, NEAR, repeated
+from tools.drawn.rare import ANALYTIC, repeated
 from tools.drawn.rare import SWEEP as BIASED
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
@@ -31,17 +30,6 @@ def test_intervals_hold_in_ninety_of_a_hundred_repeats(problem):
 def biased(tmp_path):
     (tmp_path / "biased.yaml").write_text(yaml.safe_dump(BIASED))
     return load_sweep(tmp_path / "biased.yaml")
-
-
-@pytest.mark.parametrize("corner", [(8, -8), (8, 8), (-8, -8), (-8, 8)])
-def test_the_event_that_plain_flights_are_drawn_for_grows_with_the_bias(biased, corner):
-    """At the corners of airspeed and altitude: no event up to FAR, and the score rises with the bias."""
-    scores = [
-        rare.score_of(rare.scenario_at(biased, 0, (bias, *corner)), EXPECTATION)
-        for bias in (0.5, -1.5, 2.5, -FAR, 6.5)
-    ]
-    assert scores == sorted(scores)
-    assert scores[-2] < NEAR
 
 
 def test_the_same_seed_gives_the_same_numbers():
@@ -71,25 +59,6 @@ def test_a_frequent_event_needs_no_levels():
     assert found.low < 0.5 < found.high
     assert (found.plain["events"], found.plain["of"]) == (int((chains.points >= 0.0).sum()), 1760)
     assert found.probability == pytest.approx(found.plain["events"] / 1760)
-
-
-def test_a_score_of_zero_is_an_event_and_a_run_that_has_one_in_ten_flies_no_more():
-    """Of one run every fifth flight is an event, of the other every fiftieth: this one alone flies on."""
-    chains = Chains(1, 3, runs=2, members=100)
-    chains.points[:] = -1.0 - np.arange(200).reshape(2, 100, 1) / 1e3
-    chains.points[0, ::5], chains.points[1, ::50] = 1.0, 1.0
-    rounds = []
-
-    def fly(number, points):
-        rounds.append((number, len(points)))
-        return np.minimum(points[:, 0], 0.0)
-
-    chains.go(fly)
-    assert chains.plain == (22, 200)
-    assert rounds == [(0, 200), *((number, 10) for number in range(1, 10))]
-    assert (chains.levels, chains.flights, chains.share[0]) == (1, 290, 0.2)
-    assert (chains.scores[0] == 0.0).sum() == 20
-    assert chains.share[1] == pytest.approx(0.1 * (chains.scores[1] == 0.0).mean())
 
 
 @pytest.mark.parametrize(
@@ -191,10 +160,6 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     assert len(flown) == whole["flights"] - 12
 
 
-def test_which_expectations_have_a_score(drift):
-    assert scored(drift) == ["detected_within_s", "no_departure", "post_fault_rms_deg_s.q"]
-
-
 def test_an_alarm_or_a_loss_that_is_wanted_has_no_score(tmp_path):
     """What is expected then is the event itself."""
     wanted = {"no_false_alarm": False, "no_departure": False, "post_fault_rms_deg_s": {"p": 3, "r": 2.5}}
@@ -240,81 +205,3 @@ def test_a_score_rises_towards_the_event(drift):
     ]
     assert scores[:3] == sorted(scores[:3])
     assert scores[3:] == sorted(scores[3:])
-
-
-def test_rounds_are_flown_once(tmp_path):
-    flown = []
-
-    def fly_it(case):
-        flown.append(case)
-        return {"x": case}
-
-    def stopped():
-        with study.in_rounds(asked, tmp_path) as fly_round:
-            assert fly_round(0, [1, 2]) == [{"x": 1}, {"x": 2}]
-            raise RuntimeError
-
-    asked = study.Study("s", (), fly_it, lambda rows: None, lambda document: {})
-    with pytest.raises(RuntimeError):
-        stopped()
-    with study.in_rounds(asked, tmp_path) as fly_round:
-        assert fly_round(0, [1, 2]) == [{"x": 1}, {"x": 2}]
-        assert fly_round(1, [3]) == [{"x": 3}]
-    assert flown == [1, 2, 3]
-    assert list(tmp_path.iterdir()) == []
-
-
-NEVER_CAME = {"expected": 0.5, "actual": None}
-
-
-@pytest.mark.parametrize(
-    ("expectation", "of", "score"),
-    [
-        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 9.0}, -0.25),
-        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 15.0}, 0.25),
-        ("post_fault_rms_deg_s.q", {"passed": True, "expected": 12.0, "actual": 12.0}, -1e-12),
-        ("post_fault_rms_deg_s.q", {"passed": False, "expected": 12.0, "actual": 11.9}, 0.0),
-        ("heading_within_deg", {"passed": False, "expected": 2.0, "actual": -5.0}, 1.5),
-        ("detected_within_s", {"passed": False, "expected": 0.0, "actual": 0.75}, 0.75),
-        ("detected_within_s", {"passed": False, **NEVER_CAME}, 3.0),  # 5 s of flight, the fault at 2 s
-        ("no_false_alarm", {"passed": True, "expected": True, "actual": True}, -0.375),
-        ("no_false_alarm", {"passed": False, "expected": True, "actual": False}, 0.0),
-        ("no_departure", {"passed": True, "expected": True, "actual": True}, -0.4),
-        ("no_departure", {"passed": False, "expected": True, "actual": False}, 0.0),
-    ],
-)
-def test_a_score_is_how_near_a_number_came_to_its_limit(monkeypatch, expectation, of, score):
-    """As a share of the limit; of the largest of rates and angles beside what ends a flight."""
-    asked = []
-    limits = {"p_rad_s": 2.0, "alpha_rad": 0.5}
-
-    def fly(scenario, log):
-        asked.append(log)
-        if log is not None:
-            log |= {"p_rad_s": np.array([0.4, -1.0, 0.9]), "alpha_rad": np.array([-0.3, 0.1, 0.2])}
-        return SimpleNamespace(frames=250, worst_residual_ratio=0.625)
-
-    found = [SimpleNamespace(name="other", passed=not of["passed"], expected=1.0, actual=77.0)]
-    found.append(SimpleNamespace(name=expectation, **of))
-    amounts = SimpleNamespace(expectations=found, fault=SimpleNamespace(at_s=2.0))
-    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fly)
-    monkeypatch.setattr("beaver_ftc.plant.sensing.DEPARTURE_LIMITS", limits)
-    monkeypatch.setattr(rare, "measure", lambda flight: amounts)
-    scenario = SimpleNamespace(rate_hz=50.0)
-    assert rare.score_of(scenario, expectation) == pytest.approx(score, abs=1e-15)
-    assert [log is not None for log in asked] == [expectation == "no_departure"]
-    if of.get("actual") is None:
-        amounts.fault = None
-        assert rare.score_of(scenario, expectation) == 5.0
-
-
-def test_a_flight_that_cannot_be_flown_is_no_event(biased, monkeypatch):
-    def broken(scenario, expectation):
-        raise SimulationFailed("it broke")
-
-    flown = []
-    monkeypatch.setattr(rare, "score_of", lambda *given: flown.append(given) or 0.25)
-    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, -1.0])) == {"score": 0.25, "failed": False}
-    assert flown == [(rare.scenario_at(biased, 7, [0.5, 0.0, -1.0]), EXPECTATION)]
-    monkeypatch.setattr(rare, "score_of", broken)
-    assert rare._fly(biased, EXPECTATION, (7, [0.5, 0.0, 0.0])) == {"score": -math.inf, "failed": True}

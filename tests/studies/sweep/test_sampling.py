@@ -5,7 +5,7 @@ from scipy import stats
 from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed, value_at
 
-from .conftest import sweep_of
+from .conftest import SHORT, sweep_of
 
 DRAWN = """\
 base: fault-free
@@ -69,20 +69,6 @@ vary:
     assert flights == [(a, m) for a in ("aileron", "rudder") for m in (0.1, pytest.approx(0.4), 0.7)]
 
 
-def test_linspace_is_gone_through_in_turn_while_others_are_drawn():
-    mixed = """\
-base: elevator-partial-loss
-runs: 10
-vary:
-  faults[0].magnitude: {linspace: [0.2, 1.0, 5]}
-  initial.airspeed_mps: {uniform: [40, 50]}
-"""
-    flights = Plan(sweep_of(mixed)).assignments(range(10))
-    magnitudes = [flight.values["faults[0].magnitude"] for flight in flights]
-    np.testing.assert_allclose(magnitudes, 2 * [0.2, 0.4, 0.6, 0.8, 1.0])
-    assert len({flight.values["initial.airspeed_mps"] for flight in flights}) == 10
-
-
 @pytest.mark.parametrize(
     ("how", "law"),
     [
@@ -110,3 +96,21 @@ def test_flights_have_seeds_of_their_own():
     seeds = {flight_seed(sweep, index) for sweep in (0, 1) for index in range(2000)}
     assert len(seeds) == 4000
     assert all(0 <= seed < 2**63 for seed in seeds)
+
+
+@pytest.mark.parametrize("sampling", ["random", "lhs", "sobol", "grid"])
+def test_what_is_drawn_is_what_it_was(sampling, changed):
+    """A sweep that is resumed goes on with the same flights."""
+    vary = "  duration_s: {linspace: [1, 2, 3]}\n  faults[0].at_s: {loguniform: [0.1, 0.9]}\n"
+    if sampling == "grid":
+        text = SHORT[: SHORT.index("vary")].replace("runs: 48\n", "sampling: grid\n") + (
+            "vary:\n  duration_s: {linspace: [1, 2, 3]}\n  faults[0].actuator: {choice: [aileron, rudder]}\n"
+        )
+    else:
+        text = SHORT.replace("runs: 48", f"runs: 12\nsampling: {sampling}") + vary
+    sweep = sweep_of(text)
+    plan = Plan(sweep)
+    indices = [0, 1, 2, 5]
+    assert not changed([list(flight.values.values()) for flight in plan.assignments(indices)])
+    assert plan.assignments([2, 5]) == plan.assignments(indices)[2:]
+    assert plan.assignments([]) == []

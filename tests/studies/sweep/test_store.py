@@ -83,24 +83,6 @@ def test_a_damaged_identity_loses_nothing(store, short, text, capsys):
         store.begin(identity_of(short), resume=True)
 
 
-def test_a_folder_in_the_place_of_the_results_is_set_aside(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        store.results.mkdir()
-        assert not store.is_compacted(3)
-        assert store.landed(0, range(3)) is None
-        assert not store.results.exists()
-        assert (store.folder / "results.parquet.damaged").is_dir()
-
-
-def test_where_nothing_has_been_flown_there_is_nothing_to_go_on_with(store, short):
-    """And no harm in asking for it."""
-    with store:
-        store.begin(identity_of(short), resume=True)
-        assert store.landed(0, range(3)) is None
-        assert (store.folder / "sweep.json").exists()
-
-
 def test_a_second_process_is_kept_out(store, short):
     other = Store(store.folder, short)
     with store, pytest.raises(SimulationFailed, match="another beaver-ftc is flying"), other:
@@ -146,14 +128,6 @@ def test_an_unfinished_sweep_is_not_thrown_away(store, short):
         assert store.landed(0, range(3)) is None
 
 
-def test_leftovers_of_a_crash_are_swept_away(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        (store.parts.folder / ".000004.parquet.partial").write_bytes(b"half")
-        store.begin(identity_of(short), resume=True)
-        assert list(store.parts.folder.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [("seed: 3", "seed: 4", "seed"), ("0.05", "0.06", "vary"), ("runs: 48", "runs: 49", "runs"),
@@ -167,13 +141,6 @@ def test_another_sweep_is_not_resumed(store, short, old, new, named):
     assert caught.value.exit_code == 2
 
 
-def test_words_and_expectations_may_change(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        changed = sweep_of(**{"seed: 3": "seed: 3\nexpect: {failure_rate: {at_most: 0}}\ndescription: more"})
-        store.begin(identity_of(changed), resume=True)
-
-
 def test_other_versions_are_not_mixed(store, short):
     then = identity_of(short)
     then["versions"]["jsbsim"] = "0.9"
@@ -181,26 +148,6 @@ def test_other_versions_are_not_mixed(store, short):
         store.begin(then, resume=False)
         with pytest.raises(BadInput, match=r"jsbsim 0\.9 then, .* now"):
             store.begin(identity_of(short), resume=True)
-
-
-def test_a_key_that_was_removed_is_another_sweep(store, short):
-    varied_more = sweep_of(**{"seed: 3": "seed: 3\nsampling: sobol"})
-    with store:
-        store.begin(identity_of(varied_more), resume=False)
-        with pytest.raises(BadInput, match=r"has changed since these flights \(sampling\)"):
-            store.begin(identity_of(short), resume=True)
-    without_seed = sweep_of(**{"seed: 3\n": ""})
-    with store:
-        store.begin(identity_of(short), resume=False)
-        with pytest.raises(BadInput, match=r"has changed since these flights \(seed\)"):
-            store.begin(identity_of(without_seed), resume=True)
-
-
-def test_the_lock_goes_with_the_sweep(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        assert (store.folder / ".lock").exists()
-    assert sorted(path.name for path in store.folder.iterdir()) == ["parts", "sweep.json"]
 
 
 def test_a_users_files_in_the_sweeps_folders_stay(store, short):

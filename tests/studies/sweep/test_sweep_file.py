@@ -1,11 +1,9 @@
-from dataclasses import replace
-
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.documents.validation import ScenarioError, UnusableKeyError, parse_key, with_values
+from beaver_ftc.documents.validation import ScenarioError, parse_key, with_values
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.builtin import builtin_sweeps, is_sweep
+from beaver_ftc.scenario.builtin import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import SweepFile, load_sweep, load_sweep_text
 from beaver_ftc.studies.sweep.sampling import Plan
@@ -76,22 +74,6 @@ def test_sections_read_once_make_the_scenario_that_reading_everything_makes(name
     )
 
 
-def test_flights_share_what_they_do_not_vary():
-    sweep = load_sweep("elevator-effectiveness")
-    one, other = (sweep.scenario({"uncertainty.inertia_coupling.p": theta}) for theta in (0.1, 0.2))
-    assert one.control is other.control
-    assert (one.uncertainty.inertia_coupling.p, other.uncertainty.inertia_coupling.p) == (0.1, 0.2)
-    assert sweep.scenario({"control.law": "nominal"}).control.law == "nominal"
-
-
-def test_a_base_that_cannot_fly_is_no_obstacle_to_flights_that_can():
-    sweep = load_sweep("elevator-effectiveness")
-    sweep = replace(sweep, base={**sweep.base, "duration_s": 1.0})  # over before its fault begins
-    with pytest.raises(ValueError, match="contradictory"):
-        sweep.scenario({})
-    assert sweep.scenario({"duration_s": 30.0}).duration_s == 30.0
-
-
 def test_a_base_beside_the_file_brings_its_tables_along(tmp_path):
     (tmp_path / "rates.csv").write_text("t_s,rate_deg_s\n0,0\n1,2\n")
     (tmp_path / "base.yaml").write_text("name: own\nreference: {q: [{csv: {file: rates.csv}}]}\n")
@@ -101,33 +83,6 @@ def test_a_base_beside_the_file_brings_its_tables_along(tmp_path):
     for path in tmp_path.iterdir():
         path.unlink()
     assert sweep.scenario({}).reference.q[0].shape.values_deg_s == (0.0, 2.0)
-
-
-def test_a_part_of_an_ideal_section_can_vary():
-    sweep = load_sweep_text(
-        "base: {actuators: ideal}\nruns: 2\nvary: {actuators.bandwidth_rad_s: {uniform: [5, 20]}}"
-    )
-    scenario = sweep.scenario({"actuators.bandwidth_rad_s": 7.0})
-    assert scenario.actuators.elevator.bandwidth_rad_s == 7.0
-
-
-def test_keys_are_places_and_places_are_keys():
-    assert parse_key("faults[0].magnitude") == ("faults", 0, "magnitude")
-    assert with_values({"a": [{"b": 1}]}, {("a", 0, "b"): 2, ("c", "d"): 3}) == {
-        "a": [{"b": 2}],
-        "c": {"d": 3},
-    }
-    for key in ("", "a..b", "a[", "[x]", "a.b]", "a[-1]"):
-        with pytest.raises(UnusableKeyError):
-            parse_key(key)
-
-
-def test_a_sweep_without_anything_that_varies_is_a_sweep_all_the_same(tmp_path):
-    (tmp_path / "again.yaml").write_text("name: again\nbase: fault-free\nruns: 3\n")
-    (tmp_path / "once.yaml").write_text("name: once\nduration_s: 5\n")
-    assert is_sweep(tmp_path / "again.yaml")
-    assert not is_sweep(tmp_path / "once.yaml")
-    assert load_sweep(tmp_path / "again.yaml").flights == 3
 
 
 @pytest.mark.parametrize(
@@ -143,13 +98,6 @@ def test_a_base_stays_in_the_folder_of_its_sweep(tmp_path, base):
         ScenarioError, match=r"many\.yaml:1: base: .* is outside, allowed: a file in the sweep"
     ):
         load_sweep(folder / "many.yaml")
-
-
-def test_a_base_below_the_folder_is_found(tmp_path):
-    (tmp_path / "below").mkdir()
-    (tmp_path / "below" / "base.yaml").write_text("name: below\nduration_s: 5\n")
-    (tmp_path / "many.yaml").write_text("base: below/base.yaml\nruns: 2\n")
-    assert load_sweep(tmp_path / "many.yaml").base["duration_s"] == 5
 
 
 def _file(**given):

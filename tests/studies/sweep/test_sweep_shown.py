@@ -1,14 +1,9 @@
 """All that a sweep shows, of flights with every kind of key and end: summary, figures, page, worst."""
 
-import shlex
-from pathlib import Path
-
-import numpy as np
 import pytest
 
 from beaver_ftc.scenario.sweeps import load_sweep_text
-from beaver_ftc.studies.sweep import outcomes, pictures
-from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
+from beaver_ftc.studies.sweep.outcomes import worst_flights
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import summarise
 from beaver_ftc.studies.sweep.summary_page import render, summary_text
@@ -79,36 +74,3 @@ def test_the_worst_flights_the_page_and_the_text(shown, changed, tmp_path):
     for name in FIGURES if len(flights) > 12 else ("search", "sensitivity"):
         (tmp_path / "figures" / f"{name}.png").write_bytes(name.encode())
     assert not changed(page(render(summary | {"versions": {"jsbsim": "1"}}, tmp_path)), "page")
-
-
-def test_the_share_explained_is_that_of_an_analysis_of_variance():
-    from scipy.stats import f_oneway
-
-    rng = np.random.default_rng(5)
-    groups, ranks = rng.integers(0, 4, 50), rng.permutation(50).astype(float)
-    f = f_oneway(*(ranks[groups == g] for g in range(4))).statistic
-    n, k = 50, 4
-    assert outcomes._explained(groups, ranks) == pytest.approx(1 - (n - 1) / (f * (k - 1) + n - k))
-    assert outcomes._explained(np.array([0, 2, 2]), np.array([0.0, 1.0, 2.0])) == pytest.approx(0.5)
-    assert outcomes._explained(np.array([0, 1, 2]), np.array([0.0, 1.0, 2.0])) == 0.0
-    assert outcomes._explained(np.zeros(3, int), np.array([0.0, 1.0, 2.0])) == 0.0
-
-
-def test_the_command_that_replays_a_flight():
-    assert shlex.split(replay_command("a b.yaml", Path("o"), "delay")) == [
-        "beaver-ftc", "sweep", "a b.yaml", "--search", "delay", "--out", "o"
-    ]  # fmt: skip
-    assert replay_command("a.yaml", Path("runs")) == "beaver-ftc sweep a.yaml"
-
-
-@pytest.mark.parametrize(
-    ("key", "said"),
-    [
-        ("faults[0].magnitude", "fault 1: magnitude"),
-        ("faults[1].at_s", "fault 2: at (s)"),
-        ("reference.q[0].amplitude_deg_s", "reference: q[0]: amplitude (deg/s)"),
-        ("initial.airspeed_mps", "initial: airspeed (m/s)"),
-    ],
-)
-def test_a_key_in_words(key, said):
-    assert pictures.in_words(key) == said

@@ -11,7 +11,9 @@ from beaver_ftc.results.views import (
     Panel,
     Trace,
     View,
+    estimators,
     series_of,
+    surfaces,
     views,
 )
 
@@ -23,6 +25,21 @@ MORE = (
     "airspeed_limited_mps", "manifold_pressure_inhg",
 )  # fmt: skip
 EVERY = COLUMNS + MORE
+ALL = {view.name: view for view in views(EVERY, power=True)}
+
+
+def test_which_views_a_log_allows():
+    assert list(ALL) == [
+        "tracking", "profile", "surfaces", "detection", "watch", "likelihood", "candidates", "isolation",
+        "ratio", "effectiveness", "supervisor", "engine", "states",
+    ]  # fmt: skip
+    assert "engine" not in {view.name for view in views(EVERY)}
+    assert "profile" not in {view.name for view in views(set(EVERY) - {"bank_command_rad"})}
+    unlimited = {view.name: view for view in views([c for c in EVERY if c != "airspeed_limited_mps"])}
+    assert [len(panel.traces) for panel in unlimited["profile"].panels] == [2, 3, 2, 2, 1]
+    assert estimators(EVERY) == ("aileron", "elevator", "rudder")
+    assert surfaces(EVERY) == ("aileron", "elevator", "rudder", "flap")
+    assert views(["t_s"]) == ()
 
 
 def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it():

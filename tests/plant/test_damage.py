@@ -69,6 +69,12 @@ def test_what_no_damage_is(written, fault, says):
         written({"type": "damage", "at_s": 0.1} | fault)
 
 
+@pytest.mark.parametrize(("name", "right"), [("unanticipated", True), ("rudder", True), ("aileron", False)])
+def test_right_is_outside_of_every_class_or_a_surface_that_went_with_it(written, name, right):
+    flight = replace(fly(written(CASE)), isolated=name, isolation_time_s=0.5)
+    assert metrics(flight)["isolation"]["correct"] is right
+
+
 @pytest.mark.parametrize(("kind", "right"), [("loss_of_effectiveness", True), ("stuck", False), (None, None)])
 def test_a_surface_that_is_gone_has_lost_all_its_effect(written, kind, right):
     flight = replace(fly(written(CASE)), isolated="rudder", isolation_type=kind, isolation_time_s=0.5)

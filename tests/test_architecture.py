@@ -182,18 +182,6 @@ def defined_in(folder: str) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", ["plant.Plant", "load", "compiled.kernel", "scenario.faults.TYPES"])
-def test_names_that_are_public(name):
-    assert is_public(name)
-
-
-@pytest.mark.parametrize(
-    "name", ["plant.adapter.Plant", "plant.adapter", "compiled.compile_into", "plant._Plant", "loop.frame"]
-)
-def test_names_that_are_not_public(name):
-    assert not is_public(name)
-
-
 @pytest.mark.parametrize(
     "folder", [name for name, path in modules().items() if path.name == "__init__.py" and name]
 )

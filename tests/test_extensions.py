@@ -3,7 +3,6 @@
 import sys
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
@@ -91,26 +90,3 @@ def test_of_a_module_that_is_there_already_it_is_called_at_once(package):
 
     plugins.watch_imports()
     assert sys.modules["counting"].seen == [7]
-
-
-def test_the_folders_of_those_who_offer_something():
-    found = plugins.folders(plugins.SERVICES)
-    named = {target.partition(".")[0] for target in plugins.entries(plugins.SERVICES).values()}
-    assert {folder.name for folder in found} == named
-    assert all((folder / "__init__.py").is_file() for folder in found)
-
-
-def test_where_a_module_is_without_importing_it(monkeypatch, tmp_path):
-    """In a package a folder is its own __init__.py; of what is not installed only the name is known."""
-    (tmp_path / "found" / "inner").mkdir(parents=True)
-    for name in ("found/__init__.py", "found/inner/__init__.py", "found/inner/part.py", "alone.py"):
-        (tmp_path / name).write_text("raise RuntimeError")
-    monkeypatch.syspath_prepend(tmp_path)
-    places = {
-        "found": "found/__init__.py", "found.inner": "found/inner/__init__.py",
-        "found.inner.part": "found/inner/part.py", "alone": "alone.py",
-    }  # fmt: skip
-    assert {name: commands._source(name) for name in places} == {
-        name: tmp_path / place for name, place in places.items()
-    }
-    assert commands._source("not_there.part") == Path("not_there.part")

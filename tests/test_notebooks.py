@@ -34,10 +34,6 @@ def test_what_the_web_site_is_made_into_leaves_the_clone_clean():
         assert (ignored.returncode, kept.stdout) == (0, b""), made
 
 
-def test_there_are_four():
-    assert {path.stem for path in NOTEBOOKS} == set(SHOWN)
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_what_is_stored_is_whole_and_small(path):
     stored = nbformat.read(path, as_version=4)
@@ -66,14 +62,6 @@ def test_it_shows_what_is_stored(path):
     assert notebooks.pictures(again) == notebooks.pictures(stored)
 
 
-def test_a_text_that_a_notice_parts_is_one_text():
-    """As when code is compiled between two lines that a cell prints."""
-    parts = (("stdout", "one\n"), ("stderr", "compiling\n"), ("stdout", "two\n"))
-    cell = nbformat.v4.new_code_cell("")
-    cell.outputs = [nbformat.v4.new_output("stream", name=name, text=text) for name, text in parts]
-    assert notebooks.texts(notebooks.slim(nbformat.v4.new_notebook(cells=[cell]))) == ["one\ntwo\n"]
-
-
 def differences(stored, shown):
     """Outputs that differ in a word, or in a number by more than another processor rounds."""
     assert len(stored) == len(shown)
@@ -88,16 +76,3 @@ def _same(one, other):
     words, numbers = pairs[::2], pairs[1::2]
     near = all(isclose(float(a), float(b), rel_tol=1e-6, abs_tol=1e-9) for a, b in numbers)
     return near and all(a == b for a, b in words)
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
-    [
-        ("0.1234567891 s", "0.1234567892 s", True),
-        ("0.12 s", "0.13 s", False),
-        ("2 s", "2 m", False),
-        ("a", "a 1", False),
-    ],
-)
-def test_texts_are_compared_word_by_word(one, other, same):
-    assert (differences([one], [other]) == []) is same

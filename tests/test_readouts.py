@@ -130,14 +130,3 @@ class Outsider:
 )
 def test_a_field_is_seen_to_be_read(text):
     assert len(fields_read(text)) == 1
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "def f(document):\n    return document['fdi']['bounds']",
-        "def f(loop):\n    return FrameReadout(loop.frames[0]).k",
-    ],
-)
-def test_documents_and_readouts_are_no_records(text):
-    assert fields_read(text) == []

@@ -4,7 +4,6 @@ import sys
 
 import pytest
 
-import beaver_ftc as bf
 from beaver_ftc import plugins
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, Registered, refusal, register, registered
@@ -117,15 +116,6 @@ def test_what_cannot_be_made():
             plugins.made(LAWS, name)
 
 
-def test_what_cannot_be_made_is_said_in_one_line(monkeypatch):
-    def refuse():
-        raise ValueError("two\n   lines")
-
-    monkeypatch.setattr(plugins, "plugin_class", lambda group, name: refuse)
-    with pytest.raises(BadInput, match=r"^plug-in mine: cannot be made: ValueError: two lines$"):
-        plugins.made(LAWS, "mine")
-
-
 def test_a_broken_one_says_so_where_it_is_listed():
     entry = Registered(LAWS, "gone", "nowhere:Gone", "a-package")
     assert entry.description() == "broken: plug-in gone: not registered" + plugins.suggestion(
@@ -147,22 +137,6 @@ def test_a_broken_one_says_so_where_it_is_listed():
 def test_what_is_said_of_a_name(group, name, says):
     found = refusal(group, name)
     assert found is None if says is None else found.startswith(says)
-
-
-def test_a_long_text_is_cut():
-    with pytest.raises(BadInput, match=rf"^--plugin: '{'-' * 200}' is no class"):
-        register("-" * 300)
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("MyDetector", "my-detector"), ("AugmentedEKFMonitor", "augmented-ekf-monitor"), ("L1", "l1"),
-        ("A2B", "a2-b"),
-    ],
-)  # fmt: skip
-def test_a_class_in_words(name, words):
-    assert plugins._hyphenated(name) == words
 
 
 def test_what_is_compiled_in():
@@ -208,35 +182,6 @@ def test_what_packages_register_comes_after_ours_and_never_in_their_place(monkey
     )
     assert known["zeta"].description() == "Commands nothing."
     assert not plugins.is_compiled(LAWS, "zeta")
-
-
-def test_public_names_are_found_where_they_are_said_to_be():
-    for name in bf.__all__:
-        assert getattr(bf, name) is not None
-    assert bf.scenarios.__name__ == "builtin_names"
-    assert bf.Simulation.__name__ == "Simulation"
-    assert bf.aircraft("beaver").name == "beaver"
-    with pytest.raises(AttributeError, match="module 'beaver_ftc' has no attribute 'flight'"):
-        bf.flight  # noqa: B018
-    assert set(dir(bf)) >= set(bf.__all__)
-
-
-def test_a_folder_is_the_last_place_to_find_a_plug_in_in(tmp_path, monkeypatch):
-    """Nothing there can take the place of an installed module, and it is added once."""
-    (tmp_path / "their_detector.py").write_text(
-        "class RollWatch:\n def reset(self, context): pass\n def step(self, measured, command): pass\n"
-    )
-    (tmp_path / "json.py").write_text("raise RuntimeError\n")
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.chdir(tmp_path)
-    for given, name in (
-        ("their_detector:RollWatch", "roll-watch"),
-        ("mine=their_detector:RollWatch", "mine"),
-    ):
-        found = plugins._read(given)
-        assert (found.group, found.name) == (plugins.DETECTORS, name)
-        assert sys.path[-1] == str(tmp_path)
-    assert sys.path.count(str(tmp_path)) == 1
 
 
 # As plugins.yaml has them: with options and limits of tuning, without, and with a class.
@@ -313,12 +258,3 @@ def test_limits_of_tuning_that_are_none(limits):
         plugins._range("mine", "gain", limits)
     says = 'allowed: (low, high) with 0 < low < high, or (low, high, "odds") below 1'
     assert str(refused.value) == f"mine: tunable gain: {limits!r:.60}; {says}"
-
-
-def test_a_class_is_found_by_its_own_name_unless_something_is_registered_by_that(rows):
-    register("MyLaw=own_plugins:Explains")
-    register("mine-too=own_plugins:MyLaw")
-    assert plugins._entry(LAWS, "MyLaw").target == "own_plugins:Explains"
-    assert plugins._entry(LAWS, "Explains").name == "MyLaw"
-    assert plugins._entry(LAWS, "mine-too").target == "own_plugins:MyLaw"
-    assert plugins._entry(DETECTORS, "MyLaw") is None

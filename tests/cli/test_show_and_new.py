@@ -1,10 +1,5 @@
 """Built-in scenarios to look at, and new ones to begin with."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 from typer.testing import CliRunner
 
@@ -13,8 +8,6 @@ from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_swe
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
 from commands import beaver
-
-BEAVER = Path(sys.executable).with_name("beaver-ftc")
 
 
 def _beaver(*arguments):
@@ -45,14 +38,3 @@ def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
     refused = beaver("new", "mine", cwd=tmp_path)
     assert (refused.returncode, refused.stderr) == (2, "new: mine.yaml exists, allowed: another name\n")
     assert (tmp_path / "mine.yaml").read_text() == "precious"
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_shell_is_told_commands_and_scenarios(shell):
-    asked = {
-        "_BEAVER_FTC_COMPLETE": f"complete_{shell}",
-        "COMP_WORDS": "beaver-ftc run elevator-p", "COMP_CWORD": "2",
-        "_TYPER_COMPLETE_ARGS": "beaver-ftc run elevator-p", "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-    }  # fmt: skip
-    done = subprocess.run([BEAVER], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
-    assert "elevator-partial-loss" in done.stdout

@@ -31,17 +31,6 @@ def nowhere(monkeypatch, tmp_path):
     compiled.cache_folder.cache_clear()
 
 
-def test_the_users_cache_comes_first(nowhere, tmp_path):
-    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert compiled.cache_folder().parent == tmp_path / "beaver-ftc"
-
-
-def test_numbas_own_setting_beats_it(nowhere, tmp_path):
-    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    nowhere.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
-    assert compiled.cache_folder().parent == tmp_path / "numba"
-
-
 def test_with_nowhere_to_write_nothing_is_kept(nowhere):
     assert compiled.cache_folder() is None
 

@@ -137,10 +137,6 @@ CPUCodeLibrary.finalize = lambda library: usual(library)
 """
 
 
-def test_a_replaced_part_would_be_seen():
-    assert outcome()["seen"] == ["numba.core.codegen.CPUCodeLibrary.finalize"]
-
-
 def test_both_find_their_own_implementation_of_a_function_of_numpy_in_any_order():
     """Numba notes one for all targets, that of whoever asked last; each type of number is compiled anew."""
 

@@ -11,7 +11,6 @@ from tools.fdc_check import (
     derivatives,
     flight_state,
     read_table,
-    report,
     response_agreement,
 )
 
@@ -50,10 +49,3 @@ def test_the_check_sees_a_wrong_sign(beaver):
         np.mean((np.array(found) - table["rdot_rad_s2"]) ** 2) / np.mean(table["rdot_rad_s2"] ** 2)
     )
     assert error > 0.01
-
-
-def test_report_names_every_signal_and_bar():
-    text = report(DATA)
-    assert "pdot_rad_s2" in text
-    assert "elevator doublet, 20 s, 1000 Hz" in text
-    assert text.count("bar 0.01") == 24

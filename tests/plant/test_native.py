@@ -74,12 +74,6 @@ def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wro
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 
-@needs_native
-def test_a_missing_function_is_recognised(monkeypatch):
-    monkeypatch.setattr(addresses, "GETTER", "_ZNK9NoSuchName")
-    assert not addresses._sizes_fit(addresses.LAYOUT)
-
-
 ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}
 
 

@@ -171,17 +171,6 @@ def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
     assert conditions.borrowed(100.0, 1, aircraft) is not plant
 
 
-def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
-    scenario = scenario_of({"faults": [], "initial": {"airspeed_mps": 41.5}})
-    plant, first = ready(Truth.of(scenario))
-    conditions.give_back(plant)
-    flown(scenario_of({"faults": [], "initial": {"airspeed_mps": 50.0}}))
-    monkeypatch.setattr(conditions, "_trims", {})
-    plant, again = ready(Truth.of(scenario))
-    conditions.give_back(plant)
-    assert first == again
-
-
 @needs.service("derive")
 def test_an_aircraft_with_engines_flies_alike_whether_its_trim_is_known_or_searched_for(monkeypatch):
     flight = load({"name": "again", "aircraft": "jsbsim:c172p", "duration_s": 1.5})

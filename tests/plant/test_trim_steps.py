@@ -1,9 +1,7 @@
 """The steps of trim one by one, what is said where there is none, and the truth's slopes about it."""
 
-import sys
 from dataclasses import replace
 from math import cos
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import trim as steps
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import trimmed
-from beaver_ftc.plant.linear import LinearModel, differences, own
+from beaver_ftc.plant.linear import differences, own
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.schema import load as load_scenario
 
@@ -60,18 +58,3 @@ def test_slopes_by_jsbsim_itself_are_those_by_differences():
         said(own, scenario, point, error=SimulationFailed)
         == "JSBSim linearises rightly only with no sideslip"
     )
-
-
-def test_a_linear_model_as_python_control_is_given_it(monkeypatch):
-    model = LinearModel(np.diag([1.0, 2.0]), np.array([[3.0], [4.0]]), ("alpha", "airspeed"), ("flap",))
-    given = []
-    monkeypatch.setitem(
-        sys.modules, "control", SimpleNamespace(ss=lambda *of, **names: given.append((of, names)))
-    )
-    model.state_space()
-    ((matrices, names),) = given
-    assert [of.tolist() for of in matrices] == [[[1, 0], [0, 2]], [[3], [4]], [[1, 0], [0, 1]], [[0], [0]]]
-    states = ["alpha_rad", "airspeed_mps"]
-    assert names == {"states": states, "inputs": ["flap_rad"], "outputs": states}
-    monkeypatch.setitem(sys.modules, "control", None)  # as where it is not installed
-    assert said(model.state_space).startswith("python-control is not installed, allowed: pip install")

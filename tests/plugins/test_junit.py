@@ -73,14 +73,3 @@ def test_a_sweep_is_a_suite_and_each_of_its_bounds_a_case(tmp_path):
     ]  # fmt: skip
     assert suite[0].find("failure").get("message") == "expected ≥ 1, actual 0 of 2 flights"
     assert 0 < float(suite.get("time")) < took_s
-
-
-def test_what_xml_cannot_hold_is_escaped(tmp_path):
-    said = "plug-in x: \x00 \x1b[31mred \ufffe \udcff\nsecond line"
-    missed = Expectation("isolated_as", False, "a\x07b", None)
-    write_junit([Judged("a", error=said), Judged("b", expectations=(missed,))], tmp_path / "j")
-    message = ElementTree.parse(tmp_path / "j").find(".//error").get("message")
-    assert message == r"plug-in x: \x00 \x1b[31mred \ufffe \udcff" + "\nsecond line"
-    assert (
-        ElementTree.parse(tmp_path / "j").find(".//failure").get("message") == r"expected a\x07b, actual None"
-    )

@@ -147,23 +147,6 @@ def test_a_bad_law_is_named(name, says):
     assert says in str(failed.value)
 
 
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ("culprits:NoStep", "culprits:NoStep lacks step, allowed: a class with reset and step"),
-        ("culprits:Nobody", "cannot load culprits:Nobody: AttributeError"),
-        ("leaves:Anything", "cannot load leaves:Anything: SystemExit: 0"),
-        ("nowhere:Anything", "cannot load nowhere:Anything: ModuleNotFoundError"),
-        ("culprits:Odd", r"step\(self\) is neither, allowed: step\(measured, command\) of a detector"),
-        ("culprits", "is no class, allowed: MODULE:CLASS or NAME=MODULE:CLASS"),
-        ("lqr=culprits:Hold", "there is a lqr already, allowed: NAME=MODULE:CLASS"),
-    ],
-)
-def test_a_class_that_is_no_plug_in_is_bad_input(given, says):
-    with pytest.raises(BadInput, match=says):
-        register(given)
-
-
 @pytest.mark.parametrize("name", ["culprits:Teller", "leaves:Anything", "os.path:join"])
 def test_a_scenario_is_data_and_names_no_module(name):
     for key in ("fdi: {scheme: ", "control: {law: "):

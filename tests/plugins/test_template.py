@@ -39,16 +39,6 @@ def _beaver(site, folder, *arguments):
     )
 
 
-def test_it_is_under_forty_lines():
-    assert len((TEMPLATE / "src/my_detector/__init__.py").read_text().splitlines()) <= 40
-
-
-def test_it_is_listed(site, tmp_path):
-    done = _beaver(site, tmp_path, "list", "--format", "json")
-    schemes = {entry["name"]: entry["description"] for entry in json.loads(done.stdout)["schemes"]}
-    assert schemes["my-cusum"].endswith("[my-detector]")
-
-
 def test_it_flies_by_name_and_by_class(site, tmp_path):
     for name, scheme in (("a", "my-cusum"), ("b", "mine")):
         (tmp_path / f"{name}.yaml").write_text(

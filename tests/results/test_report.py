@@ -130,8 +130,8 @@ ENDS = """((course, climb) => {
 })"""
 
 
-@pytest.mark.parametrize("course_deg", [0, 80, 135, 210, 350])
-@pytest.mark.parametrize("climb_m", [-300, -20, 20])
+@pytest.mark.parametrize("course_deg", [0, 135, 350])
+@pytest.mark.parametrize("climb_m", [-300, 20])
 def test_a_path_that_descends_goes_down_on_the_screen(page, course_deg, climb_m):
     """Whatever its course, from left to right; what is to the right of the aircraft is nearer."""
     start, end, middle, right = page.evaluate(f"{ENDS}({np.radians(course_deg)}, {climb_m})")

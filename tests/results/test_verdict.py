@@ -73,25 +73,6 @@ def flown(**changes):
     }  # fmt: skip
 
 
-def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
-    both = {"pre_fault_rms_deg_s": {"p": 0.5, "q": 0.6, "r": 0.7}, "post_fault_rms_deg_s": None}
-    text = verdict.verdict_text(Metrics.of(flown(tracking=flown()["tracking"] | both)), "runs/a-flight")
-    assert text.splitlines()[0] == "a-flight: FAILED"
-    assert "tracking RMS  p 0.5  q 0.6  r 0.7 deg/s before the fault" in text
-    assert "expected      met    no false alarm" in text
-    assert "expected      MISSED detection delay ≤ 0.5 s, got none" in text
-    assert text.splitlines()[-1] == " results       runs/a-flight"
-    assert "\x1b" not in text
-    for what, how in verdict.verdict_lines(Metrics.of(flown())):
-        assert f" {what:13} {how}" in text
-    after = verdict.verdict_text(Metrics.of(flown()), "runs/a-flight")
-    assert "tracking RMS  p 0.1  q 0.25  r 1 deg/s after the fault" in after
-    assert "certificate" not in after
-    certified = Metrics.of(flown(certificate={"statements": 1, "without": 0}))
-    row = " certificate   1 statement; check: beaver-ftc check runs/x"
-    assert row in verdict.verdict_text(certified, "runs/x").splitlines()
-
-
 def test_markup_in_a_name_is_no_markup():
     text = verdict.verdict_text(Metrics.of(flown(scenario="[red]x[/red] :smile:")), "runs/[bold]x")
     assert "[red]x[/red] :smile:" in text

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from tools.docs.tables.chosen import (
     ORIGINS,
-    TUNED_DRAWS,
     choices,
     draws_of,
     not_chosen_constants,
@@ -63,12 +62,3 @@ def test_no_page_prints_logs_that_a_constant_was_chosen_on():
     printed = {int(seed) for page in pages for seed in re.findall(command, page)}
     assert printed
     assert not printed & chosen
-
-
-def test_the_sets_of_the_benchmark_are_read_and_apart():
-    tuned = CHOICES[0]
-    seeds = [seed for _, seed in sorted(draws_of(tuned["results"]))]
-    assert len(seeds) > 15
-    sets = {*range(201, 206), *range(211, 217)}
-    flown = {seed + 1000 * draw for seed in sets for draw in TUNED_DRAWS}
-    assert {seed for _, seed in draws_of(tuned["flights"])} == flown

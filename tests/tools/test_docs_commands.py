@@ -14,7 +14,6 @@ from tools.docs.constants import constants
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted
 
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plugins import LAWS, options_of
 
 
@@ -101,14 +100,6 @@ def test_a_changed_gain_turns_the_page_that_cites_it_red(monkeypatch):
     assert changes() == []
     monkeypatch.setitem(options_of(LAWS, "zhang2005")["network_gain"], "default", 41.0)
     assert ['stands "40", printed "41"' in str(change) for change in changes()] == [True]
-
-
-def test_pages_are_named_as_one_likes():
-    (found,) = pages.chosen(["detection"])
-    assert pages.chosen(["docs/explanation/detection.md", "detection.md"]) == [found, found]
-    assert pages.chosen([])[0].name == "README.md"
-    with pytest.raises(BadInput, match=r"did you mean docs/explanation/detection\.md"):
-        pages.chosen(["docs/explanation/detecton.md"])
 
 
 def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read(tmp_path, monkeypatch):

@@ -5,9 +5,8 @@ from functools import cache
 
 import pytest
 import yaml
-from tools.docs.reference import PAGES, columns, commands, keys, page
+from tools.docs.reference import columns, commands, keys, page
 from tools.docs.reference.schema import ITEM, NAME, Sections
-from tools.docs.tables import python_names
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load

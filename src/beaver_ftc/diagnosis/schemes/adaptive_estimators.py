@@ -183,11 +183,10 @@ def exclude_or_wait(fdi, fie, possible, t):
     that contradicts it, and the attitude shows that a frame late. While a gyro may be the cause of the alarm,
     what excludes a fault is only kept.
     """
-    if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
-        fie.pending = max(fie.pending, not possible)
-    elif not possible or fie.pending:
-        isolated = fdi.verdict.from_s[fie.surface] >= 0.0
-        isolation.exclude_fault(fie, t, fdi.sensor_monitor.config.enabled and isolated)
+    if not possible or fie.pending:
+        monitor, isolated = fdi.sensor_monitor, fdi.verdict.from_s[fie.surface] >= 0.0
+        doubted = sensor_monitor.doubts_gyros(monitor)
+        isolation.exclude_fault(fie, t, monitor.config.enabled and isolated, doubted)
 
 
 @kernel

@@ -376,9 +376,9 @@ def fault_possible(iso, fie, bank, nu_max, abrupt, x, started):
 
 
 @kernel
-def exclude_fault(fie, t, waits, doubted):
-    """Exclude a fault from t s on; if `waits`, from the next frame on; if `doubted`, once that is over."""
-    if doubted or (waits and not fie.pending):
+def exclude_fault(fie, t, waits, in_doubt):
+    """Exclude a fault from t s on; if `waits`, from the next frame on; if `in_doubt`, once that is over."""
+    if in_doubt or (waits and not fie.pending):
         fie.pending = 1
     elif not fie.excluded:
         fie.excluded, fie.excluded_at_s = 1, t

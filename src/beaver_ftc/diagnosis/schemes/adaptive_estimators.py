@@ -185,8 +185,8 @@ def exclude_or_wait(fdi, fie, possible, t):
     """
     if not possible or fie.pending:
         monitor, isolated = fdi.sensor_monitor, fdi.verdict.from_s[fie.surface] >= 0.0
-        doubted = sensor_monitor.doubts_gyros(monitor)
-        isolation.exclude_fault(fie, t, monitor.config.enabled and isolated, doubted)
+        in_doubt = sensor_monitor.doubts_gyros(monitor)
+        isolation.exclude_fault(fie, t, monitor.config.enabled and isolated, in_doubt)
 
 
 @kernel

@@ -93,7 +93,6 @@ TABLE = (
     ),
     Exempt(r"beaver-ftc compare --sweep examples/gtm/.*|beaver-ftc import gtm .*", "needs NASA's data"),
     Exempt(r"beaver-ftc run left-wing-tip-lost\.yaml", "flies the GTM, which is made from NASA's data"),
-    Exempt(r"python -m tools\.docs reference \S+", "in a checkout; tests/tools prints every such page"),
     Exempt(
         r"(beaver-ftc live(?: (?!--open)\S+)*)( --open)?",
         "flies until it is ended, which the page's test does (tests/products/live/page): its address",

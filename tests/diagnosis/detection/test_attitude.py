@@ -98,3 +98,23 @@ def test_a_broken_sensor_is_named_and_is_no_surface(sensor, magnitude):
     assert not {"elevator", "rudder", "aileron", "flap"} & {*isolation["names"]}
     assert isolation["fault"] == f"sensor {sensor}"
     assert isolation["delay_s"] < 5.0
+
+
+@pytest.mark.parametrize("pairs", [False, True])
+def test_nothing_is_concluded_while_a_gyro_may_be_the_cause(pairs):
+    """A gyro that reads a fifth too much, and an attitude so noisy that it never shows which of both it is."""
+    noisy = {angle: {"noise_std_deg": 0.3} for angle in ("phi", "theta", "psi")}
+    scenario = bf.load(
+        {
+            "name": "gyro-in-doubt",
+            "duration_s": 12,
+            "seed": 79,
+            "reference": {axis: [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.25}}] for axis in "pqr"},
+            "sensors": noisy,
+            "faults": [{"sensor": "q", "type": "scale", "magnitude": 0.207, "at_s": 5}],
+            "fdi": {"fault_class": "all", "pairs": pairs, "bounds": {"sensors": noisy}},
+        }
+    )
+    metrics = bf.fly(scenario).metrics
+    assert metrics["detection"]["detected"]
+    assert metrics["isolation"]["names"] == []

@@ -252,15 +252,17 @@ def decide_type(fdi, t, started):
     types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_exclusions(types.surface, layout, fies)
-    if types.pair.enabled:
+    in_pairs = types.pair.enabled
+    if in_pairs:
         pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
-        conclusion.record_decision(found, pairs.decide_pairs(types, found, layout, t))
-        return
-    if started or fdi.isolation.config.reach:
+    elif started or fdi.isolation.config.reach:
         registry.observe_frame(types, layout, fies, bank.output.innovation, bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
-    conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
+    if in_pairs:
+        conclusion.record_decision(found, pairs.decide_pairs(types, found, layout, t))
+    else:
+        conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
 
 
 @apart

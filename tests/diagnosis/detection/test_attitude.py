@@ -102,7 +102,7 @@ def test_a_broken_sensor_is_named_and_is_no_surface(sensor, magnitude):
 
 @pytest.mark.parametrize("pairs", [False, True])
 def test_nothing_is_concluded_while_a_gyro_may_be_the_cause(pairs):
-    """A gyro that reads a fifth too much, and an attitude so noisy that it never shows which of both it is."""
+    """A gyro reads a fifth too much, and the attitude is too noisy to show whether the aircraft turned."""
     noisy = {angle: {"noise_std_deg": 0.3} for angle in ("phi", "theta", "psi")}
     scenario = bf.load(
         {

@@ -61,7 +61,7 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     """The comparison of attitude and rates, for the capacity of a block of the rates."""
     n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
     return record(
-        enabled=int, alarmed=int, level=float,  # level of both sums, standard deviations
+        enabled=int, level=float,  # level of both sums, standard deviations
         D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; leaks per frame
         P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
@@ -98,17 +98,11 @@ def restart(att):
     """Forget what was compared: the attitude shows no turn now."""
     att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
     att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
-    att.z[:], att.z_j[:], att.T[:], att.E[:] = 0.0, 0.0, 0.0, 0.0
-    forget_losses(att)
+    att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    att.T[:], att.E[:] = 0.0, 0.0
     for i in range(3):
         for k in range(3):
             att.P[i, k, k] = att.P_start[k]
-
-
-@kernel
-def forget_losses(att):
-    """Begin the correlations with losses again."""
-    att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0
 
 
 @kernel
@@ -124,14 +118,11 @@ def compare_attitude(att, blocks, eta, with_Z, x, dt, detected):
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
     they can decide anything: after an alarm of the rates, `detected`, or if a turn is beyond its level.
     """
-    if detected and not att.alarmed:
-        att.alarmed = 1
-        forget_losses(att)
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
     for i in range(3):
         blk = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
-        advance_axis(att, i, blk, i // 2, eta[i], with_Z, dt)
+        advance_axis(att, i, blk, i // 2, eta[i], with_Z, dt, detected)
     att.score, att.gyro = 0.0, -1
     if detected or max(att.turn_score[0], att.turn_score[1], att.turn_score[2]) > 1.0:
         fill_score(att, blocks)
@@ -177,8 +168,8 @@ def find_gyro(att):
 
 
 @kernel
-def advance_axis(att, i, blk, row, eta, with_Z, dt):
-    """Advance filter, responses and sums of axis i, in this row of its block."""
+def advance_axis(att, i, blk, row, eta, with_Z, dt, detected):
+    """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`."""
     K0, K1, K2, S = advance_P(att, i, blk, row, dt)
     D, a, n = att.D[i, i], blk.a, blk.n_Z if with_Z else 0
     att.n[i] = n + N_FURTHER
@@ -201,6 +192,8 @@ def advance_axis(att, i, blk, row, eta, with_Z, dt):
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
+            if not detected:
+                continue
             att.N[i, h] = att.b * att.N[i, h] + g_s * g
             att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
             for j in range(att.n[i]):

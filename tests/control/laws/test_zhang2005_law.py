@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
@@ -13,6 +13,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce.choices import scenario as published
 from flying import Memory, flown, loss
 from law_records import new_control
+from samples import samples
 
 UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12.0}
 TRAVEL = np.array([[-0.5] * 4, [0.5] * 4])
@@ -68,6 +69,32 @@ def test_effectiveness_follows_the_gradient_and_stays_in_its_set():
     assert ((kept >= 0.1) & (kept <= 1.0)).all()
     assert np.isfinite(beyond).all()
     assert ((beyond < 0.1) | (beyond > 1.0)).any()
+
+
+@settings(max_examples=samples(15))
+@given(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
+def test_the_lyapunov_function_falls(unknown, e0):
+    """e' = -Kp e - Ki int e + fhat - phi, phi constant, in small steps: V with the weights in it."""
+    control, dt = law(network_gain=60.0, rate_weight=20.0), 1e-3
+    q, Gamma, network = 20.0, 60.0, control.zhang2005.network
+    network.memory.basis[:, 0] = 1.0
+    A = np.array([[0.0, 1.0], [-1.0, -2.0]])
+    P = solve_continuous_lyapunov(A.T, -np.diag([1.0, q]))
+    e, integral, before = e0, 0.0, np.inf
+    for k in range(3000):
+        control.zhang2005.feedback.memory.integral[1] = integral
+        missed = network.memory.weights[1, 0] - unknown
+        z = np.array([integral, e])
+        V = z @ P @ z / P[1, 1] + missed**2 / Gamma
+        if k % 100 == 0:
+            assert before + 1e-12 >= V * (1.0 - 2e-3)
+            before = V
+        adapt(control, (0.0, e, 0.0), u=np.zeros(4), dt=dt)
+        e, integral = (
+            e + dt * (-2.0 * e - integral + network.memory.weights[1, 0] - unknown),
+            integral + dt * e,
+        )
+    assert abs(e) < 0.05 * (1.0 + abs(unknown) + abs(e0))
 
 
 def test_the_network_alone_keeps_the_unanticipated_case():

@@ -117,15 +117,17 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
     flights, model = fitting.fit_parts([frozen]), small.model()
 
-    def tests(*of):
+    def held_out(*of):
         return [{"samples": n, "explained": dict(zip("pqr", shares, strict=True))} for n, *shares in of]
 
     says = (
         r"explains less of p, r than the mean does \(p -17\.375, r -0\.350\).* than these 1\.9 min.*follows; "
     )
     with pytest.raises(BadInput, match=says + "q_rad_s: stands still for 600 s$"):
-        identification.check_explained(tests((100, -71, 0.5, 0.1), (300, 0.5, -0.1, -0.5)), flights, model)
-    identification.check_explained(tests((300, 0.5, -0.1, 0.1), *[(300, 0.5, 0.2, 0.1)] * 3), flights, model)
+        identification.check_explained(held_out((100, -71, 0.5, 0.1), (300, 0.5, -0.1, -0.5)), flights, model)
+    identification.check_explained(
+        held_out((300, 0.5, -0.1, 0.1), *[(300, 0.5, 0.2, 0.1)] * 3), flights, model
+    )
 
 
 def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):

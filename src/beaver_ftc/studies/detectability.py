@@ -581,8 +581,10 @@ class Detectability(StudyCommand):
     Examples:
       beaver-ftc detectability elevator-partial-loss --surface elevator --airspeed 45 --altitude 1000
 
-    airspeed: Airspeed, m/s. Default: 36, 40, 44, 48 and 52 for the Beaver.
-    altitude: Altitude above sea level, m. Default: 0, 1000, 2000 and 3000 for the Beaver.
+    airspeed: Airspeed, m/s. Default: 36, 40, 44, 48 and 52 for the Beaver, otherwise 0.9, 1 and 1.1
+    times the airspeed at the start.
+    altitude: Altitude above sea level, m. Default: the altitude at the start in the aircraft file,
+    otherwise 0, 1000, 2000 and 3000.
     aircraft: Aircraft instead of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER.
     surface: Only this surface.
     out: Folder for the results.

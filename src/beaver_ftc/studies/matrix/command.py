@@ -36,7 +36,8 @@ class Matrix(StudyCommand):
       beaver-ftc matrix --declared --turbulence light --airspeed 45
 
     out: Folder for the results.
-    airspeed: Airspeed, m/s. Default: 38, 45 and 52 for the Beaver.
+    airspeed: Airspeed, m/s. Default: 38, 45 and 52 for the Beaver, otherwise shares of the airspeed at
+    the start.
     pitch_lost: Instead, fail elevator and flap together, with and without control by engine power.
     declared: Simulate and declare tactical-grade sensors, servos and, if possible, coefficient errors of
     5 %.

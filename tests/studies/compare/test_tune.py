@@ -61,7 +61,12 @@ def test_no_value_that_ships_is_on_the_edge_of_its_range(row):
         assert max(places) < 1.0 - EDGE
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS if row.values[0]["again"]])
+def tuned_since(row):
+    """Whether the values that ship were tuned again: a search that found them says nothing of them."""
+    return row["again"] and row["again"][-1]["draw"] != row.get("draw")
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if tuned_since(row.values[0])])
 def test_a_method_that_is_tuned_again_gains_at_most_5_percent(row):
     """On flights that chose neither the values that ship nor those that the second tuning finds."""
     *adopted, last = row["again"]

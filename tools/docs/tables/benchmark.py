@@ -69,14 +69,19 @@ def benchmark_gains() -> str:
     finds other values, as the record of the searches has it."""
     rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
     found = [(row, again) for row in rows for again in row["again"] if again.get("gain")]
-    last = {f"`{row['name']}` on `{row['grade']}`": row["again"][-1] for row in rows if row["again"]}
+    last = {
+        f"`{row['name']}` on `{row['grade']}`": row["again"][-1]
+        for row in rows
+        if row["again"] and row["again"][-1]["draw"] != row.get("draw")
+    }
     kept = sum(again.get("gain") == 0.0 for again in last.values())
     none = [pair for pair, again in last.items() if "gain" not in again]
+    drawn = [f"`{row['name']}` on `{row['grade']}` (draw {row['draw']})" for row in rows if "draw" in row]
     says = (
         f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
-        f"grade, {len(last)} were tuned again. The last search found no better values for {kept}, no "
-        f"admissible values for {', '.join(none)}, and values that were not adopted for "
-        f"{len(last) - kept - len(none)}."
+        f"grade, {len(last)} were tuned again after their last change. The last search found no better "
+        f"values for {kept}, no admissible values for {', '.join(none)}, and values that were not adopted "
+        f"for {len(last) - kept - len(none)}. A second tuning found the values of {', '.join(drawn)}."
     )
     table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"

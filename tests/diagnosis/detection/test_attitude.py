@@ -87,6 +87,20 @@ def test_a_loss_is_named_in_turbulence_with_sensors_in_doubt(surface, magnitude)
     assert bf.fly(scenario(loss, seed=3)).metrics["isolation"]["fault"] == surface
 
 
+@pytest.mark.parametrize("seed", [5, 9])
+def test_a_small_loss_is_told_from_the_flap_with_accelerometers_in_doubt(seed):
+    loss = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.41}
+    flight = bf.fly(scenario(loss, seed=seed).with_({"fdi.fault_class": "all"}))
+    assert flight.metrics["isolation"]["names"] == ["elevator"]
+
+
+@pytest.mark.parametrize("seed", [12, 19])
+def test_a_frozen_accelerometer_is_no_flap(seed):
+    freeze = {"type": "freeze", "sensor": "az"}
+    flight = bf.fly(scenario(freeze, seed=seed).with_({"fdi.fault_class": "all"}))
+    assert "flap" not in flight.metrics["isolation"]["names"]
+
+
 BROKEN = [(gyro, size) for gyro in "pqr" for size in (0.5, 2.0)] + [("alpha", 2.0), ("beta", 2.0)]
 
 

@@ -80,7 +80,12 @@ DOUBT_HEAD = (
     "wrongly named",
     "median time to the name, s",
 )
-DOUBTED, OF_DOUBT = ("elevator", "rudder", "aileron"), {"sound": "never", "in doubt": "always"}
+DOUBTED = ("elevator", "rudder", "aileron")
+OF_DOUBT = {
+    "sound": {"sensor_monitor": "never"},
+    "in doubt": {"sensor_monitor": "always"},
+    "in doubt, all fault types": {"fault_class": "all"},
+}
 BIASED = {"gyro, bias of 0.5 deg/s": ("pqr", 0.5), "vane, bias of 2 deg": (("alpha", "beta"), 2.0)}
 
 
@@ -94,7 +99,9 @@ def robustness_doubt() -> str:
 def _of_doubt(part: str, sensors: str, count: int) -> tuple[str, ...]:
     sweep = load_sweep("robust-elevator-all")
     drawn = [
-        one._replace(values=_with_fault(one, part) | {"fdi.sensor_monitor": OF_DOUBT[sensors]})
+        one._replace(
+            values=_with_fault(one, part) | {f"fdi.{key}": is_ for key, is_ in OF_DOUBT[sensors].items()}
+        )
         for one in Plan(sweep).assignments(range(count))
     ]
     rows = fly_all(partial(fly_one, sweep), drawn, 2)

@@ -118,10 +118,10 @@ def fill_vaneless_y(forces, w, y):
 
 
 @kernel
-def drop_forces(forces, gust, inertial):
+def drop_forces(forces, gust, vaneless, vaned):
     """Stop using forces, and estimate the gust without accelerometers."""
     drop_accelerometers(gust)
-    inertial.output.gusty = 0
+    vaneless.output.gusty = vaned.output.gusty = 0
     forces.in_use = 0
 
 

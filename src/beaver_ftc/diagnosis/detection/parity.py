@@ -28,9 +28,10 @@ uses a vane, it excludes a surface only after a view that is insensitive to the 
 view across the column of the vane, with the gust estimated from the forces, or a view of the force at the
 flow angle that integrated inertial motion gives.
 
-A broken accelerometer changes a force and no rate. If accelerometers may break (air.output.read is 0), a
-force raises no alarm and gives no gust estimate; it only counts after an alarm of the rates. Forces that are
-known or suspected to be wrong are not used.
+A broken accelerometer changes a force and no rate. If accelerometers may break, a force raises no alarm, and
+the rates use no gust estimate that rests on accelerometers. An alarm of the rates then shows that another
+part is broken, and after it the views count as usual. Forces that are known or suspected to be wrong are not
+used.
 
 *Oscillation tests.* They use the spectrum of a view's whitened innovation g at the frequencies of a grid.
 

@@ -218,7 +218,7 @@ def configure_statistics(
         )
         if declared.uses_accelerometers:
             configure_forces(fdi, declared, trim, jacobian(model, *trim)[3], dt_s)
-            _configure_vaneless(stat, declared)
+            _configure_view_gusts(stat, declared)
         configure_parity_views(stat, aircraft)
     _configure_lengths(stat, V, rate_hz)
     monitor = fdi["sensor_monitor"]["config"]
@@ -241,15 +241,17 @@ def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: f
     cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
 
 
-def _configure_vaneless(stat: np.void, declared: Declared) -> None:
-    """Fill the gust estimate of the views that use the accelerometers in place of the vanes."""
-    gust = stat["gust"]
-    # the monitor of the sensors may find the accelerometers broken
-    gust["output"]["uses_accelerometers"] = not declared.monitors_sensors
-    stat["vaneless"] = gust
-    vaneless = stat["vaneless"]
-    vaneless["output"]["gusty"] *= gust["output"]["uses_accelerometers"]
+def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
+    """Fill the gust estimates of the views: by accelerometers in place of the vanes, and by both.
+
+    The rates use the latter, too, unless accelerometers may break.
+    """
+    gust, vaneless = stat["gust"], stat["vaneless"]
+    gust["output"]["uses_accelerometers"] = 1
+    stat["vaneless"] = stat["vaned"] = gust
     vaneless["memory"]["share"] = np.minimum(np.add(MIN_UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0)
+    gust["output"]["uses_accelerometers"] = not declared.monitors_sensors
+    stat["vaned"]["output"]["gusty"] *= declared.monitors_sensors
 
 
 def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
@@ -504,7 +506,7 @@ def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
         test=TESTING_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
         block=(block_dtype(size.rate_size), N_FILTER_BLOCKS), n_views=int,
         views=(view_dtype(size.view_size), size.n_views), tone_test_config=TONE_RECORD, forces=FORCES_RECORD,
-        gust=GUST_RECORD, vaneless=GUST_RECORD, attitude=attitude_dtype(size.rate_size),
+        gust=GUST_RECORD, vaneless=GUST_RECORD, vaned=GUST_RECORD, attitude=attitude_dtype(size.rate_size),
     )  # fmt: skip
 
 

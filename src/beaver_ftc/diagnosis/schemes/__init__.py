@@ -76,7 +76,7 @@ def prepare_takeover(fdi: np.void, earlier: np.void, in_flight: bool) -> None:
     fdi["statistical"]["alarm"]["peak"] = earlier["statistical"]["alarm"]["peak"]
     if fdi["bank"]["config"]["n_filters"] == earlier["bank"]["config"]["n_filters"]:
         fdi["bank"]["output"]["peak"] = earlier["bank"]["output"]["peak"]
-    for name in ("gust", "vaneless"):
+    for name in ("gust", "vaneless", "vaned"):
         fdi["statistical"][name]["config"]["starts_in_flight"] = in_flight
     fdi["sensor_monitor"]["memory"]["substep"] = 0
 

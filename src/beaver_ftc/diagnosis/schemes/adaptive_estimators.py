@@ -172,7 +172,7 @@ def parity_excludes(fdi, fie):
     j = fdi.layout.position[fie.surface]
     views = stat.views[: stat.n_views]
     G = fdi.isolation.estimator[j].effect.regressor
-    return parity.views_exclude(views, stat.test, stat.forces, stat.gust, fie.surface, G)
+    return parity.views_exclude(views, stat.test, stat.forces, gust_of_views(stat), fie.surface, G)
 
 
 @kernel
@@ -320,12 +320,13 @@ def update_tests(fdi, prediction, measured, k, t):
     gust = stat.gust
     force = stat.forces
     views = stat.views[: stat.n_views]
-    vaneless = stat.vaneless
+    vaneless, view_gust = stat.vaneless, gust_of_views(stat)
     means = prediction.means
     nu, dt = fdi.bank.output.innovation, fdi.config.dt
     gusts.finish_gust(gust, prediction.w)
-    if vaneless.output.gusty:
-        gusts.finish_gust(vaneless, prediction.w)
+    for own in (vaneless, stat.vaned):
+        if own.output.gusty:
+            gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
     fill_block_signatures(blocks, means.Gu_old, unanticipated_pitch(prediction.design, y, 1.0))
     alarmed = stat.alarm.detected_at_s >= 0.0
@@ -336,8 +337,10 @@ def update_tests(fdi, prediction, measured, k, t):
         attitude.compare_attitude(att, blocks, eta, cfg.regress, measured.x, dt, detected)
         if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
-    parity.turn_views(views, force, gust, fdi.bound, means.G_old, means.Gu_old)
-    parity.project_innovation(views, cfg.regress, stat.noise, blocks, force, gust, vaneless, nu, y[AIRSPEED])
+    parity.turn_views(views, force, view_gust, fdi.bound, means.G_old, means.Gu_old)
+    parity.project_innovation(
+        views, cfg.regress, stat.noise, blocks, force, view_gust, vaneless, nu, y[AIRSPEED]
+    )
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
     statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)
@@ -349,7 +352,7 @@ def update_tests(fdi, prediction, measured, k, t):
 def prepare_gusts(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
-    update_gusts(stat.gust, stat.vaneless, stat.forces, prediction, measured, k, dt)
+    update_gusts(stat.gust, stat.vaneless, stat.vaned, stat.forces, prediction, measured, k, dt)
     statistical.prepare_tests(
         stat.test, stat.noise, stat.block, stat.gust, fdi.bound, prediction.design, measured, prediction.u, dt
     )
@@ -366,30 +369,38 @@ def add_gust_instant(fdi, prediction, measured):
 
 
 @kernel
-def update_gusts(gust, vaneless, force, pred, meas, k, dt):
+def update_gusts(gust, vaneless, vaned, force, pred, meas, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.gusty:
         gusts.set_intensity(gust, meas.altitude)
         gusts.step_gust(gust, meas.y, meas.attitude, pred.w * dt, k)
     if (force.in_use or gust.output.uses_accelerometers) and not meas.inertial:
-        forces.drop_forces(force, gust, vaneless)
+        forces.drop_forces(force, gust, vaneless, vaned)
     if force.in_use or gust.output.uses_accelerometers:
         gusts.store_accelerometer_reading(gust, meas.force)
     if force.in_use:
-        update_forces(gust, vaneless, force, pred, meas, k, dt)
+        forces.update_both_forces(force, gust, meas, pred.u, dt)
+        if vaneless.output.gusty:
+            forces.fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
+            step_view_gust(vaneless, force.y_free, pred, meas, k, dt)
+        if vaned.output.gusty:
+            step_view_gust(vaned, meas.y, pred, meas, k, dt)
 
 
 @kernel
-def update_forces(gust, vaneless, force, pred, meas, k, dt):
-    """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
-    forces.update_both_forces(force, gust, meas, pred.u, dt)
-    if vaneless.output.gusty:
-        forces.fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
-        gusts.store_accelerometer_reading(vaneless, meas.force)
-        gusts.set_intensity(vaneless, meas.altitude)
-        gusts.step_gust(vaneless, force.y_free, meas.attitude, dt, k)
-        gusts.fill_gust_effect(vaneless, pred.design, meas.x, force.y_free, pred.u)
-        gusts.begin_gust_sums(vaneless, force.y_free[AIRSPEED], dt)
+def step_view_gust(gust, y, pred, meas, k, dt):
+    """Update a gust estimate by accelerometers that the views alone use; y (5,) with its flow angles."""
+    gusts.store_accelerometer_reading(gust, meas.force)
+    gusts.set_intensity(gust, meas.altitude)
+    gusts.step_gust(gust, y, meas.attitude, dt, k)
+    gusts.fill_gust_effect(gust, pred.design, meas.x, y, pred.u)
+    gusts.begin_gust_sums(gust, y[AIRSPEED], dt)
+
+
+@kernel
+def gust_of_views(stat):
+    """The gust estimate of the views that use vanes: their own, or that of the rates."""
+    return stat.vaned if stat.vaned.output.gusty else stat.gust
 
 
 @apart

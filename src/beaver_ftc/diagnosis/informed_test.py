@@ -18,6 +18,9 @@ through the same filter as R c. The part of the fault that they can explain is n
 
 with s and R scaled by S^-1/2 and the frames stacked.
 
+If sensors are in doubt, a gyro may have any error. The evidence that no gyro causes the flight is the
+least deflection of the three tests that each do without one gyro, and use the attitude instead.
+
 The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
 first-order process of the same power with a memory of UNEXPLAINED_MEMORY_S.
 """
@@ -36,7 +39,7 @@ from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 
 UNEXPLAINED_MEMORY_S = 0.1
-MIN_GYRO_STD_RAD_S = 1e-5  # what perfect instruments are taken for
+MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # what perfect instruments are taken for
 _SETTLING_FRAMES = 400
 
 
@@ -44,40 +47,47 @@ FlightColumns = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
 
 
 class WhiteningFilter:
-    """The Kalman filter of rates, air and the unexplained, (9,) in this order, once it has settled."""
+    """The settled Kalman filter of rates, attitude, air and the unexplained, (12,) in this order.
 
-    def __init__(self, context: Context) -> None:
+    It measures the rates, H (m, 12). If gyro `broken` may have any error, it measures the two other rates and
+    the attitude, which moves with the rates as in level flight.
+    """
+
+    def __init__(self, context: Context, broken: int | None = None) -> None:
         declared, dt = context.declared, context.dt_s
         tau = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_MEMORY_S)))
         sigma = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
         a = np.exp(-dt / tau)
-        self.F = np.eye(9)
-        self.F[:3, 3:6], self.F[:3, 6:] = dt * declared.gust_effect, dt * np.eye(3)
-        self.F[range(3, 9), range(3, 9)] = a
-        self.dt = dt
-        self.R = np.diag(declared.rate_variance(MIN_GYRO_STD_RAD_S))
-        Q_x = (dt * declared.model_rad_s2) ** 2
-        Q = np.diag(np.concatenate((Q_x, (1.0 - a**2) * sigma**2)))
-        P = np.diag(np.concatenate((np.diagonal(self.R), sigma**2)))
+        self.F, self.dt = np.eye(12), dt
+        self.F[3:6, :3] = self.F[:3, 9:] = dt * np.eye(3)
+        self.F[:3, 6:9] = dt * declared.gust_effect
+        self.F[range(6, 12), range(6, 12)] = a
+        measured = [i for i in range(3 if broken is None else 6) if i != broken]
+        attitude = np.hypot(declared.further_noise, declared.further_resolution / np.sqrt(12.0))[:3]
+        variance = np.concatenate(
+            (declared.rate_variance(MIN_GYRO_STD_RAD_S), attitude**2 + MIN_ATTITUDE_STD_RAD**2)
+        )
+        self.H, R = np.eye(12)[measured], np.diag(variance[measured])
+        Q = np.diag(np.concatenate(((dt * declared.model_rad_s2) ** 2, np.zeros(3), (1.0 - a**2) * sigma**2)))
+        P = np.diag(np.concatenate((variance, sigma**2)))
         for _ in range(_SETTLING_FRAMES):
-            K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
-            P = self.F @ (P - K @ P[:3]) @ self.F.T + Q
-        self.S = P[:3, :3] + self.R
-        self.K = np.linalg.solve(self.S, P[:3]).T
+            self.S = self.H @ P @ self.H.T + R
+            self.K = np.linalg.solve(self.S, self.H @ P).T
+            P = self.F @ (P - self.K @ self.H @ P) @ self.F.T + Q
 
     def whitened_response(self, phi: np.ndarray) -> np.ndarray:
-        """The effect g (n, 3, ...) of phi (n, 3, ...) rad/s2 on the innovations, scaled to variance one.
+        """The effect g (n, m, ...) of phi (n, 3, ...) rad/s2 on the innovations, scaled to variance one.
 
         g = W H delta,  W' W = S^-1      delta <- A delta + dt phi,  A = F (1 - K H)
         """
-        A = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
-        W = np.linalg.cholesky(np.linalg.inv(self.S)).T
-        delta = np.zeros((9, *phi.shape[2:]))
-        g = np.empty_like(phi)
+        A = self.F @ (np.eye(12) - self.K @ self.H)
+        W = np.linalg.cholesky(np.linalg.inv(self.S)).T @ self.H
+        delta = np.zeros((12, *phi.shape[2:]))
+        g = np.empty((len(phi), len(W), *phi.shape[2:]))
         for k, phi_k in enumerate(phi):
-            delta = A @ delta
+            delta = np.tensordot(A, delta, 1)
             delta[:3] += self.dt * phi_k
-            g[k] = W @ delta[:3]
+            g[k] = np.tensordot(W, delta, 1)
         return g
 
     def deflection_by_frame(self, phi: np.ndarray) -> np.ndarray:

@@ -49,6 +49,37 @@ def covariance(context, n):
     return rates.reshape(3 * n, 3 * n)
 
 
+@pytest.mark.parametrize("broken", range(3))
+def test_without_a_gyro_as_with_all_readings_at_once(context, broken):
+    """The attitude sums the rates; its noise and where it began are known as well as it is measured."""
+    n, before = 60, 150
+    phi = np.cumsum(np.random.default_rng(6).normal(size=(n, 3)), axis=0) * [0.02, 0.01, 0.01]
+    gyro = context.declared.gyro_rad_s**2 + 1e-10
+    angle = (
+        context.declared.further_noise[:3] ** 2 + context.declared.further_resolution[:3] ** 2 / 12 + 1e-10
+    )
+    rates = covariance(context, before + n).reshape(3, before + n, 3, before + n)
+    true = rates - np.einsum("ij,kl,i->ikjl", np.eye(3), np.eye(before + n), gyro)
+    summed = DT * np.tril(np.ones((before + n, before + n)), -1)
+    both = np.zeros((2, 3, before + n, 2, 3, before + n))
+    both[0, :, :, 0] = rates
+    both[0, :, :, 1] = np.einsum("ikjl,ml->ikjm", true, summed)
+    both[1, :, :, 0] = np.einsum("mk,ikjl->imjl", summed, true)
+    both[1, :, :, 1] = np.einsum("mk,ikjn->imjn", summed, both[0, :, :, 1])
+    for i in range(3):
+        both[1, i, :, 1, i] += angle[i] * (np.eye(before + n) + 1.0)
+    mean = np.zeros((2, 3, before + n))
+    mean[0, :, before:] = DT * np.cumsum(phi, axis=0).T
+    mean[1] = mean[0] @ summed.T
+    kept = [row for row in range(6) if row != broken]
+    C = both.reshape(6, before + n, 6, -1)[kept][:, :, kept].reshape(5 * (before + n), -1)
+    mean = mean.reshape(6, -1)[kept].ravel()
+    expected = np.sqrt(mean @ np.linalg.solve(C, mean))
+    found = WhiteningFilter(context, broken).deflection_by_frame(phi)[-1]
+    assert found == pytest.approx(expected, rel=0.01)
+    assert found < WhiteningFilter(context).deflection_by_frame(phi)[-1]
+
+
 def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     """Constants are noise of covariance R diag(sigma^2) R', added to that of the rates."""
     n, sigma = 120, np.array([0.3, 0.5])

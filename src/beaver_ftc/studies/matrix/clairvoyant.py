@@ -20,6 +20,7 @@ from beaver_ftc.diagnosis.informed_test import (
 )
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.declared import Declared
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -36,7 +37,10 @@ def columns_of(aircraft: Aircraft) -> Columns:
 
 
 def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
-    """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time."""
+    """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time.
+
+    If sensors are in doubt, of telling it from the error of any gyro.
+    """
     assert scenario.fdi.statistical is not None
     aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)
     at_s = scenario.faults[0].at_s
@@ -50,7 +54,8 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     regressors = [term_acceleration(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
-    d = WhiteningFilter(context).deflection_with_unknowns(phi, beside, sigma)
+    gyros = range(3) if Declared.of(scenario).monitors_sensors else (None,)  # which may have any error
+    d = min(WhiteningFilter(context, gyro).deflection_with_unknowns(phi, beside, sigma) for gyro in gyros)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}
 

@@ -18,7 +18,7 @@ the two halves of a single flight in turn, or each of several flights in turn.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple, TypeVar
 
@@ -34,12 +34,11 @@ from beaver_ftc_logs.filtering import (
     bank_posterior,
     fault_evidence,
     page_cusum,
-    quick_power,
-    quick_scale,
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import FitPart, Innovations
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
@@ -123,18 +122,6 @@ _COVERAGE_GOAL = 0.93
 Cached = TypeVar("Cached")
 
 
-@dataclass(frozen=True)
-class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
-    results that were computed from this flight and others."""
-
-    samples: Samples
-    is_usable: NDArray[np.bool_]
-    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
-        default_factory=dict, repr=False, compare=False
-    )
-
-
 def _once(parts: Sequence[FitPart], key: tuple[object, ...], compute: Callable[[], Cached]) -> Cached:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
     cache = parts[0].result_cache
@@ -190,17 +177,14 @@ def _with_inflation(model: Model, inflation: dict[tuple[float, ...], float]) -> 
     return model.model_copy(update={"noise_models": models})
 
 
-def _folds(
-    parts: Sequence[FitPart], model: Model, tied: list[float]
-) -> Iterator[tuple[Model, Sequence[FitPart]]]:
-    """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
-    held-out flights. tied: of all flights, as in `FittedRanges`."""
-    for fitted, rest in _splits(parts):
-        fold = refit(fitted, model)
-        fit = fit_order(fitted, model.vehicle, model.n_rate_lags, model.n_command_lags)
-        gain_sd = group_gain_sd(fit, model).tolist()
+def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
+    """For each part that is left out, a model fitted to others, with the standard errors of its gains, and
+    this part."""
+    tied = trust.tied_shares(parts, model).tolist()
+    for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
+        gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield fold.model_copy(update={"fitted_ranges": ranges}), rest
+        yield refit(fitted, model).model_copy(update={"fitted_ranges": ranges}), held_out
 
 
 def choose_order(parts: Sequence[FitPart], vehicle: Vehicle) -> tuple[int, int]:
@@ -240,6 +224,11 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> list[int]:
     return [*range(1 + 3 * h), *range(signal, signal + n * vehicle.n_signal_lags(h)), *commands]
 
 
+def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
+    """Least squares of a model's order over all flights."""
+    return fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+
+
 def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     """Least squares of given order over all flights."""
     key = ("order", vehicle.model_dump_json(), h, L)
@@ -269,13 +258,11 @@ def stack_data(
     most = max(RATE_LAGS + COMMAND_LAGS)
     Z, y, stretches = [], [], []
     for i, part in enumerate(parts):
-        samples = part.samples
-        X, U, ok = regression.build_regressors(samples, groups, h, L, True, vehicle.n_signal_lags(h))
-        used = part.is_usable & ok
+        X, U, used = part.regressors(groups, h, L, vehicle.n_signal_lags(h))
         used[:most] = False
-        n = len(X)
-        Z.append(samples.fit_weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
-        y.append(samples.fit_weight * samples.rates[used])
+        n, weight = len(X), part.samples.fit_weight
+        Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
+        y.append(weight * part.samples.rates[used])
         stretches.append(np.cumsum(np.diff(np.flatnonzero(used), prepend=0) > 1) + 1_000_000 * i)
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
@@ -312,38 +299,36 @@ def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> 
 
 def _fit_noise_models(parts: Sequence[FitPart], model: Model) -> list[NoiseModel]:
     """The colours that flights are whitened by, with the noise of each."""
-    models = []
-    for ma in sorted({part.samples.noise_ma_coefficients for part in parts} - {()}):
-        pairs = [one_step_residual(model, part) for part in parts if part.samples.noise_ma_coefficients == ma]
-        models.append(_fit_noise_model(list(ma), pairs))
-    return models
+    colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
+    return [
+        _fit_noise_model(list(ma), [part.innovations(model) for part in _parts_in(parts, ma)])
+        for ma in colours
+    ]
 
 
 def _with_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise with how far a model may misread the groups' effects in it, and their usual quickness."""
-    shares, power = hidden_errors(parts, model, noise), usual_quick_power(parts, model, noise)
-    return noise.model_copy(update={"misread_shares": shares, "usual_quick_power": power})
+    """The noise with how far a model may misread the groups' effects in it, and with their usual quickness:
+    the power of the quick part of the responses that its flights exceed in a tenth of their samples, in
+    variances of this noise."""
+    flights = [part.innovations(model) for part in _parts_in(parts, noise.ma_coefficients)]
+    powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
+    return noise.model_copy(
+        update={
+            "misread_shares": hidden_errors(parts, model, noise),
+            "usual_quick_power": float(np.quantile(powers, _USUAL_SHARE)),
+        }
+    )
 
 
-def _parts_in(parts: Sequence[FitPart], noise: NoiseModel) -> list[FitPart]:
-    """The parts that are whitened by this noise."""
-    return [part for part in parts if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients]
-
-
-def usual_quick_power(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> float:
-    """The power of the quick part of the responses that the flights of one noise exceed in a tenth of their
-    samples, in variances of this noise."""
-    R = np.array(noise.residual_covariance)
-    responses = [whitened_residual(model, part)[2] for part in _parts_in(parts, noise)]
-    powers = [quick_power(F, R, model.rate_hz) for F in responses]
-    return float(np.quantile(np.concatenate(powers), _USUAL_SHARE))
+def _parts_in(parts: Sequence[FitPart], ma: Sequence[float]) -> list[FitPart]:
+    """The parts that are whitened by this moving average."""
+    return [part for part in parts if part.samples.noise_ma_coefficients == tuple(ma)]
 
 
 def quick_error_share(parts: Sequence[FitPart], model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    pairs = [(fitted, held_out) for fitted, rest in _splits(parts) for held_out in rest]
-    squares = [_squared_quick_error(refit(fitted, model), held_out) for fitted, held_out in pairs]
+    squares = [_squared_quick_error(fold, held_out) for fold, held_out in held_out_folds(parts, model)]
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
@@ -355,16 +340,13 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
     with the variance r of the noise of this flight and the power of the quick responses.
     """
-    ma = held_out.samples.noise_ma_coefficients
-    _, e, F = whitened_residual(fold, held_out)
-    R = fold.covariance_of_noise(ma)
-    power = quick_power(F, R, fold.rate_hz)
-    unusual = power > fold.usual_quick_power(ma)
+    flight = held_out.innovations(fold)
+    power = flight.quick_power(fold.rate_hz)
+    unusual = power > fold.usual_quick_power(flight.ma)
     if unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
-    squares = ((e - np.median(e, axis=0)) @ W) ** 2
-    r = max(trust.residual_scale(squares), 1.0)
+    squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
+    r = max(regression.noise_scale(squares), 1.0)
     ratio = squares[unusual].mean(axis=1) / r
     return float(((ratio - 1.0) / power[unusual]).mean())
 
@@ -378,9 +360,9 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
     axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
     """
-    own = _parts_in(parts, noise)
-    e = np.vstack([one_step_residual(model, flight)[1] for flight in own])
-    powers = [_centred(whitened_residual(model, flight)[2]) ** 2 for flight in own]
+    own = _parts_in(parts, noise.ma_coefficients)
+    e = one_step_residuals(own, model)
+    powers = [_centred(part.innovations(model).F) ** 2 for part in own]
     r = np.diag(np.array(noise.residual_covariance))
     p = np.vstack(powers).mean(axis=0) / r
     q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
@@ -388,10 +370,10 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     return (most / np.sqrt(3.0)).tolist()
 
 
-def _fit_noise_model(ma: list[float], pairs: Sequence[tuple[NDArray[np.int64], Floats]]) -> NoiseModel:
+def _fit_noise_model(ma: list[float], flights: Sequence[Innovations]) -> NoiseModel:
     """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
     and the remaining noise; without a predictor where too few do."""
-    runs = [e[begin:end] for rows, e in pairs for begin, end in _row_runs(rows)]
+    runs = [flight.e[begin:end] for flight in flights for begin, end in _row_runs(flight.rows)]
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
@@ -473,18 +455,16 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    pairs = [(part.samples, part.is_usable) for part in parts]
     total = n = float(len(model.groups))
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
+    for fold, held_out in held_out_folds(parts, model):
         known = np.array(trust.known_effects(fold))
-        for held_out in rest:
-            F, e = _standardized(fold, held_out)
-            if not len(e):  # a part without a residual shows no gain
-                continue
-            S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-            error, rank = _error_and_rank(F.sum(axis=3)[:, :, known].reshape(e.size, -1), e.ravel(), S)
-            total = total + error
-            n = n + rank
+        F, e = _standardized(fold, held_out)
+        if not len(e):  # a part without a residual shows no gain
+            continue
+        S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
+        error, rank = _error_and_rank(F.sum(axis=3)[:, :, known].reshape(e.size, -1), e.ravel(), S)
+        total = total + error
+        n = n + rank
     return total / n
 
 
@@ -493,12 +473,10 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
     windows: dict[tuple[float, ...], list[float]] = {}
-    pairs = [(part.samples, part.is_usable) for part in parts]
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
-        others = [flight for flight in parts if all(flight is not held_out for held_out in rest)]
-        for held_out in rest:
-            found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
-            found.extend(_window_inflations(fold, held_out, others))
+    rest = validation_folds(parts, _MAX_SPLITS)
+    for (fold, held_out), (fitted, _, _) in zip(held_out_folds(parts, model), rest, strict=True):
+        found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
+        found.extend(_window_inflations(fold, held_out, fitted if len(parts) > 1 else parts))
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
     if model.vehicle.other_laws:
         # a gyro's noise takes from the next sample what it added to one
@@ -537,11 +515,10 @@ def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> floa
 
     def scale(flight: FitPart) -> float:
         _, e = _standardized(fold, flight)
-        scales = recent_scale(e, np.ones(len(e), dtype=bool), np.eye(3), fold.rate_hz)
+        scales = recent_scale(e, np.ones(len(e), dtype=bool), fold.rate_hz)
         return float(scales.mean()) if len(scales) else 1.0
 
-    ma = held_out.samples.noise_ma_coefficients
-    scales = [scale(flight) for flight in others if flight.samples.noise_ma_coefficients == ma]
+    scales = [scale(flight) for flight in _parts_in(others, held_out.samples.noise_ma_coefficients)]
     return max(scale(held_out) / max([1.0, *scales]), 1.0)
 
 
@@ -568,13 +545,10 @@ def _error_and_rank(F: Floats, e: Floats, S: Floats) -> tuple[float, int]:
 def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
     """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
     those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
-    _, e, F = whitened_residual(model, held_out)
-    ma = held_out.samples.noise_ma_coefficients
-    q = np.sqrt(quick_scale(F, model, ma))
-    R = model.with_noise_of(ma).residual_covariance
-    W = np.linalg.inv(np.linalg.cholesky(np.array(R))).T
-    Fw = np.einsum("nga,ab->nbga", F, W)
-    return _centred(Fw) / q[:, None, None, None], _centred(e @ W) / q[:, None]
+    flight = held_out.innovations(model)
+    sd = np.sqrt(flight.inflation * flight.quick_scale(model))[:, None]
+    F = np.einsum("nga,ab->nbga", flight.F, flight.W)
+    return _centred(F) / sd[:, :, None, None], _centred(flight.e @ flight.W) / sd
 
 
 def _centred(values: Floats) -> Floats:
@@ -591,17 +565,14 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     sums = np.zeros((2, 3))
     counts = np.zeros(2)
     spans = np.round(np.array(_TRIM_SPANS_S) * model.rate_hz)
-    for fitted, rest in _splits(parts):
-        fold = refit(fitted, model)
-        for held_out in rest:
-            rows, e, _ = whitened_residual(fold, held_out)
-            R = np.array(fold.with_noise_of(held_out.samples.noise_ma_coefficients).residual_covariance)
-            g = e / np.sqrt(np.maximum(np.diag(R), MIN_DIVISOR))
-            for begin, end in _row_runs(rows):
-                for i, n in enumerate(spans.astype(int).tolist()):
-                    means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
-                    sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
-                    counts[i] += max(len(means) - 1, 0)
+    for fold, held_out in held_out_folds(parts, model):
+        flight = held_out.innovations(fold)
+        g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
+        for begin, end in _row_runs(flight.rows):
+            for i, n in enumerate(spans.astype(int).tolist()):
+                means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
+                sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
+                counts[i] += max(len(means) - 1, 0)
     usual = np.array(FilterSettings().trim_step_sd)
     if not counts.all():
         return usual.tolist()
@@ -623,13 +594,21 @@ def _label_levels(part: FitPart, i: int) -> list[float]:
     return [round(level, 6) for level, _ in groupby(labels[np.isfinite(labels)].tolist())]
 
 
-def validation_folds(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], FitPart, str]]:
-    """Return the fitted flights, the held-out one and its name, for each fold."""
-    if len(parts) > 1:
-        return [([part for part in parts if part is not one], one, one.samples.name) for one in parts]
-    (whole,) = parts
-    first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
-    return [([first], second, "second half"), ([second], first, "first half")]
+def validation_folds(
+    parts: Sequence[FitPart], most: int | None = None
+) -> list[tuple[list[FitPart], FitPart, str]]:
+    """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
+    more than `most` every so many at once."""
+    if len(parts) == 1:
+        (whole,) = parts
+        first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
+        return [([first], second, "second half"), ([second], first, "first half")]
+    n = min(len(parts), most or len(parts))
+    return [
+        ([part for i, part in enumerate(parts) if i % n != k], one, one.samples.name)
+        for k in range(n)
+        for one in parts[k::n]
+    ]
 
 
 def _split_in_halves(part: FitPart) -> tuple[FitPart, FitPart]:
@@ -641,58 +620,35 @@ def _split_in_halves(part: FitPart) -> tuple[FitPart, FitPart]:
 
 
 def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
-    """The model with what it was fitted on, and how it did on parts that were left out: at which evidence of
-    a fault they would alarm as often as declared."""
-    pairs = [(part.samples, part.is_usable) for part in parts]
-    held_out = _test_held_out(parts, model, pairs)
-    fit = fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    variance = np.zeros(len(model.groups))
+    """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
+    evidence of a fault they would alarm as often as declared."""
+    misread = 0.0
+    peaks = list[extremes.PeaksAndHours]()
+    deviations = list[Floats]()
+    for fold, held_out in held_out_folds(parts, model):
+        if len(peaks) < _N_MISTAKE_TESTS:
+            misread = max(misread, _misread_gain(fold, held_out))
+        peaks.append(_healthy_peaks(fold, held_out))
+        if len(parts) > 1 and model.vehicle.other_laws:
+            deviations.append(_squared_deviations(fold, held_out))
+    variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
-        variance = _gain_variance_between_laws(_max_gain_bias(parts, model), held_out.squared_gain_deviations)
-    gain_sd = np.minimum(np.sqrt(group_gain_sd(fit, model) ** 2 + variance), _GAIN_SD_CAP)
-    tail = extremes.fit_peak_tail(held_out.peaks_and_hours)
-    ranges = trust.compute_fitted_ranges(pairs, model, gain_sd).model_copy(
-        update={"alarm_peak_tail": tail, "misread_gain": held_out.misread_gain}
+        # how far another flight's gains may be before any is left out counts as one flight
+        variance += np.nanmean([_max_gain_bias(parts, model) ** 2, *deviations], axis=0)
+    gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
+    tail = extremes.fit_peak_tail(peaks)
+    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
+        update={"alarm_peak_tail": tail, "misread_gain": misread}
     )
-    rate, threshold = _alarm_rate_and_threshold(model, tail, held_out.peaks_and_hours)
+    rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
     alarm = {"false_alarms_per_hour": rate, "alarm_threshold": threshold}
     return model.model_copy(
         update={
             "fitted_ranges": ranges,
             "settings": model.settings.model_copy(update=alarm),
-            "identification_results": dict(_cross_validate(held_out.peaks_and_hours, rate, model)),
+            "identification_results": dict(_cross_validate(peaks, rate, model)),
         }
     )
-
-
-class _HeldOut(NamedTuple):
-    """How models of parts of the flights did on the parts that were left out.
-
-    misread_gain: largest gain, a sample, of reading the columns by mistake.
-    peaks_and_hours: peaks of the evidence of a fault, and hours of health, of each part.
-    squared_gain_deviations: of each part (G,), beyond what noise explains; empty under one law.
-    """
-
-    misread_gain: float
-    peaks_and_hours: list[extremes.PeaksAndHours]
-    squared_gain_deviations: list[Floats]
-
-
-def _test_held_out(
-    parts: Sequence[FitPart], model: Model, pairs: Sequence[tuple[Samples, NDArray[np.bool_]]]
-) -> _HeldOut:
-    """Fit the model without each part of the flights in turn, and test it on that part."""
-    misread = 0.0
-    peaks = list[extremes.PeaksAndHours]()
-    deviations = list[Floats]()
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
-        for held_out in rest:
-            if len(peaks) < _N_MISTAKE_TESTS:
-                misread = max(misread, _misread_gain(fold, held_out))
-            peaks.append(_healthy_peaks(fold, held_out))
-            if len(parts) > 1 and model.vehicle.other_laws:
-                deviations.append(_squared_deviations(fold, held_out))
-    return _HeldOut(misread, peaks, deviations)
 
 
 def _alarm_rate_and_threshold(
@@ -721,13 +677,13 @@ def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
         return np.zeros(len(model.groups))
     share = 0.0
     for noise in model.noise_models:
-        e = np.vstack([one_step_residual(model, part)[1] for part in _parts_in(parts, noise)])
+        e = one_step_residuals(_parts_in(parts, noise.ma_coefficients), model)
         chance = 3.0 * AR_ORDER / len(e) if noise.ar_coefficients else 0.0
         log_det = np.linalg.slogdet(np.array(noise.residual_covariance))[1]
         log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
         share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
-    power = trust.untied_power([(part.samples, part.is_usable) for part in parts], model)
-    return np.minimum(np.sqrt(3.0 * share / np.maximum(power, MIN_DIVISOR)), _GAIN_SD_CAP)
+    untied = trust.effect_powers(parts, model)[1]
+    return np.minimum(np.sqrt(3.0 * share / np.maximum(untied, MIN_DIVISOR)), _GAIN_SD_CAP)
 
 
 def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
@@ -743,15 +699,6 @@ def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     if known.any():  # a part without a residual shows the effect of no group
         squares[known] = np.maximum(g**2 - np.diag(P) * max(float((e**2).mean()), 1.0), 0.0)
     return squares
-
-
-def _gain_variance_between_laws(prior: Floats, deviations: Sequence[Floats]) -> Floats:
-    """Variance of each group's gain from a flight to one of another law, (G,).
-
-    prior: how far another flight's gains may be before any is left out, which counts as one flight;
-    deviations: squares of how far those of flights left out were.
-    """
-    return np.asarray(np.nanmean([prior**2, *deviations], axis=0))
 
 
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
@@ -804,14 +751,6 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in _row_runs(rows)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
-
-
-def _splits(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], list[FitPart]]]:
-    """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
-    if len(parts) == 1:
-        return [(fitted, [held_out]) for fitted, held_out, _ in validation_folds(parts)]
-    n = min(len(parts), _MAX_SPLITS)
-    return [([part for i, part in enumerate(parts) if i % n != k], list(parts[k::n])) for k in range(n)]
 
 
 def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
@@ -892,17 +831,12 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     }
 
 
-def whitened_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Places (n,) of the samples in use, the unpredicted part e (n, 3) of the residual, and the answers F
-    (n, G, 3) as they show in it."""
-    ok, y, F = regression.whitened_rates(part.samples, model, labelled=True)
-    rows = np.flatnonzero(part.is_usable & ok)
-    intercept = model.whitened_intercept(part.samples.noise_ma_coefficients)
-    return rows, (y - F.sum(axis=1) - intercept)[rows], F[rows]
-
-
 def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:
-    """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    ok, y, F = regression.unexplained_rates(part.samples, model, labelled=True)
-    rows = np.flatnonzero(part.is_usable & ok)
-    return rows, (y - F.sum(axis=1) - np.array(model.intercept))[rows]
+    """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
+    flight = part.innovations(model.model_copy(update={"noise_models": []}))
+    return flight.rows, flight.e
+
+
+def one_step_residuals(parts: Sequence[FitPart], model: Model) -> Floats:
+    """The same of several flights, one after the other, (n, 3)."""
+    return np.vstack([one_step_residual(model, part)[1] for part in parts])

@@ -88,7 +88,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     for ma in UNFITTED_MA:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
-            e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+            e = fitting.one_step_residuals(parts, model)
             models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
     for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
@@ -323,14 +323,14 @@ def regressor_names(model: Model) -> list[str]:
 
 def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    fit = fitting.fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    fit = fitting.fit_of(parts, model)
     first = len(fit.standard_error_inflation) - len(model.groups) * model.n_command_lags
     return dict(zip("pqr", np.median(fit.standard_error_inflation[first:], axis=0).tolist(), strict=True))
 
 
 def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+    e = fitting.one_step_residuals(parts, model)
     f, density = spectral_density(e, 1.0 / model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []

@@ -19,8 +19,8 @@ the two halves of a single flight in turn, or each of several flights in turn.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
-from typing import Any, NamedTuple, TypeVar
+from itertools import groupby, pairwise, product
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ from beaver_ftc_logs.filtering import (
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import FitPart, Innovations
+from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
@@ -156,8 +156,8 @@ def usable_mask(samples: Samples) -> NDArray[np.bool_]:
 
 def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
-    h, L = choose_order(parts, vehicle)
-    model = _model_of_order(parts, vehicle, h, L)
+    bic = bic_by_order(parts, vehicle)
+    model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
     return _with_inflated_noise(parts, model) if model.noise_models else model
 
@@ -165,13 +165,13 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
 def refit(parts: Sequence[FitPart], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
     refitted = _model_of_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    inflation = {tuple(noise.ma_coefficients): noise.covariance_inflation for noise in model.noise_models}
-    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), inflation)
+    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), model.inflation_of)
 
 
-def _with_inflation(model: Model, inflation: dict[tuple[float, ...], float]) -> Model:
+def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
+    """The model with so many times as wide a noise of each moving average."""
     models = [
-        noise.model_copy(update={"covariance_inflation": inflation.get(tuple(noise.ma_coefficients), 1.0)})
+        noise.model_copy(update={"covariance_inflation": inflation_of(noise.ma_coefficients)})
         for noise in model.noise_models
     ]
     return model.model_copy(update={"noise_models": models})
@@ -187,12 +187,6 @@ def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Mod
         yield refit(fitted, model).model_copy(update={"fitted_ranges": ranges}), held_out
 
 
-def choose_order(parts: Sequence[FitPart], vehicle: Vehicle) -> tuple[int, int]:
-    """Past samples of rates and commands by the Bayesian information criterion."""
-    bic = bic_by_order(parts, vehicle)
-    return min(bic, key=lambda order: bic[order])
-
-
 def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
@@ -205,23 +199,21 @@ def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, 
     Zy = (Z / rms).T @ y
     yy = y.T @ y
     bic = {}
-    for h in RATE_LAGS:
-        for L in COMMAND_LAGS:
-            cols = _order_columns(vehicle, h, L)
-            C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
-            log_det = np.linalg.slogdet((yy - Zy[cols].T @ C) / len(y))[1]
-            bic[h, L] = len(y) * log_det + 3 * len(cols) * np.log(len(y))
+    for h, L in product(RATE_LAGS, COMMAND_LAGS):
+        cols = _order_columns(vehicle, h, L)
+        C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
+        log_det = np.linalg.slogdet((yy - Zy[cols].T @ C) / len(y))[1]
+        bic[h, L] = len(y) * log_det + 3 * len(cols) * np.log(len(y))
     return bic
 
 
-def _order_columns(vehicle: Vehicle, h: int, L: int) -> list[int]:
+def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
     """Columns of the largest design that an order has."""
-    signal = 1 + 3 * max(RATE_LAGS)
-    n = len(vehicle.regressor_columns)
-    command = signal + n * vehicle.n_signal_lags(max(RATE_LAGS))
-    firsts = [command + g * max(COMMAND_LAGS) for g in range(len(regression.group_surfaces(vehicle)))]
-    commands = [first + lag for first in firsts for lag in range(L)]
-    return [*range(1 + 3 * h), *range(signal, signal + n * vehicle.n_signal_lags(h)), *commands]
+    n, most = len(vehicle.regressor_columns), max(RATE_LAGS)
+    rates = np.arange(1 + 3 * most) < 1 + 3 * h
+    signals = np.arange(n * vehicle.n_signal_lags(most)) < n * vehicle.n_signal_lags(h)
+    commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
+    return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
 
 def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
@@ -290,31 +282,22 @@ def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> 
         response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
         noise=fit.residual_covariance.tolist(),
     )
-    model = model.model_copy(update={"noise_models": _fit_noise_models(parts, model)})
-    if not vehicle.other_laws:
-        return model
-    models = [_with_errors(parts, model, noise) for noise in model.noise_models]
-    return model.model_copy(update={"noise_models": models})
-
-
-def _fit_noise_models(parts: Sequence[FitPart], model: Model) -> list[NoiseModel]:
-    """The colours that flights are whitened by, with the noise of each."""
     colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
-    return [
-        _fit_noise_model(list(ma), [part.innovations(model) for part in _parts_in(parts, ma)])
-        for ma in colours
-    ]
+    noises = [_fit_noise_model(_parts_in(parts, ma), model, list(ma)) for ma in colours]
+    model = model.model_copy(update={"noise_models": noises})
+    if vehicle.other_laws:
+        noises = [_with_errors(_parts_in(parts, noise.ma_coefficients), model, noise) for noise in noises]
+    return model.model_copy(update={"noise_models": noises})
 
 
-def _with_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise with how far a model may misread the groups' effects in it, and with their usual quickness:
-    the power of the quick part of the responses that its flights exceed in a tenth of their samples, in
-    variances of this noise."""
-    flights = [part.innovations(model) for part in _parts_in(parts, noise.ma_coefficients)]
-    powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
+def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise of some flights with how far a model may misread the groups' effects in it, and with their
+    usual quickness: the power of the quick part of the responses that the flights exceed in a tenth of their
+    samples, in variances of this noise."""
+    powers = np.concatenate([part.innovations(model).quick_power(model.rate_hz) for part in own])
     return noise.model_copy(
         update={
-            "misread_shares": hidden_errors(parts, model, noise),
+            "misread_shares": hidden_errors(own, model, noise),
             "usual_quick_power": float(np.quantile(powers, _USUAL_SHARE)),
         }
     )
@@ -351,7 +334,7 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     return float(((ratio - 1.0) / power[unusual]).mean())
 
 
-def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
+def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
     """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
     standard deviation of an error that is anywhere below the largest.
 
@@ -360,7 +343,6 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
     axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
     """
-    own = _parts_in(parts, noise.ma_coefficients)
     e = one_step_residuals(own, model)
     powers = [_centred(part.innovations(model).F) ** 2 for part in own]
     r = np.diag(np.array(noise.residual_covariance))
@@ -370,9 +352,10 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     return (most / np.sqrt(3.0)).tolist()
 
 
-def _fit_noise_model(ma: list[float], flights: Sequence[Innovations]) -> NoiseModel:
-    """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
-    and the remaining noise; without a predictor where too few do."""
+def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> NoiseModel:
+    """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
+    where samples follow one another; without a predictor where too few do."""
+    flights = [part.innovations(model) for part in own]
     runs = [flight.e[begin:end] for flight in flights for begin, end in _row_runs(flight.rows)]
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
@@ -387,62 +370,33 @@ def _fit_noise_model(ma: list[float], flights: Sequence[Innovations]) -> NoiseMo
 
 def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
-    moving = model.vehicle.moving_air
-    delays_s = [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]
-    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if model.vehicle.other_laws else {}
-    if model.vehicle.other_laws and model.noise_models:
+    moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
+    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
+    if other_laws and model.noise_models:
         extra |= {"quick_error": quick_error_share(parts, model)}
-    labelled = _count_labelled_faults(parts, model)
-    if not labelled.levels:
-        return _unlabelled_settings(parts, model, extra, delays_s)
-    # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-    changes = (labelled.changes + 1) / labelled.hours
-    return FilterSettings(
-        levels=labelled.levels,
-        changes_per_hour=float(np.sqrt(changes * FilterSettings().effectiveness_changes_per_hour)),
-        **(_OTHER_DAYS | extra),
-        delays_s=delays_s,
-        repair_share=(labelled.repairs + _N_PRIOR_CHANGES / 2) / (labelled.changes + _N_PRIOR_CHANGES),
-        power=_POWER_LABELLED,
-    )
+    extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
+    surfaces = list(model.vehicle.surfaces)
+    alone = [group[0] for group in model.groups if len(group) == 1]
+    labelled = {name: _label_levels(parts, surfaces.index(name)) for name in alone}
+    faults = {name: {level for one in each for level in one if level < 1} for name, each in labelled.items()}
+    if levels := {name: sorted(seen) for name, seen in faults.items() if seen}:
+        changed_to = [level for each in labelled.values() for one in each for level in one[1:]]
+        n, hours = len(changed_to), sum(part.is_usable.sum() * part.samples.dt_s for part in parts) / 3600.0
+        # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
+        rate = np.sqrt((n + 1) / hours * FilterSettings().effectiveness_changes_per_hour)
+        repair_share = (changed_to.count(1.0) + _N_PRIOR_CHANGES / 2) / (n + _N_PRIOR_CHANGES)
+        seen = {"levels": levels, "changes_per_hour": float(rate), "repair_share": repair_share}
+        return FilterSettings(**(_OTHER_DAYS | extra | seen), power=_POWER_LABELLED)
+    extra |= {"trim_walk": _estimate_trim_walk(parts, model)}
+    drifting = model.model_copy(update={"settings": FilterSettings(**extra)})
+    most = (1.0 if moving else _POWER_OTHER_LAWS) if other_laws else _POWER_UNLABELLED
+    return FilterSettings(**extra, power=min(most, 1.0 / gain_overdispersion(parts, drifting)))
 
 
-class _LabelledFaults(NamedTuple):
-    """What the labels of the flights say: levels of effectiveness below 1 seen of each group that is a single
-    surface, how often a level changed, how often to 1, and the hours of usable rows."""
-
-    levels: dict[str, list[float]]
-    changes: int
-    repairs: int
-    hours: float
-
-
-def _count_labelled_faults(parts: Sequence[FitPart], model: Model) -> _LabelledFaults:
-    levels = dict[str, list[float]]()
-    changes = 0
-    repairs = 0
-    names = list(model.vehicle.surfaces)
-    for group in model.groups:
-        if len(group) > 1:
-            continue
-        sequences = [_label_levels(part, names.index(group[0])) for part in parts]
-        faults = {level for sequence in sequences for level in sequence if level < 1.0}
-        if faults:
-            levels[group[0]] = sorted(faults)
-        changes += sum(max(len(sequence) - 1, 0) for sequence in sequences)
-        repairs += sum(int(level == 1.0) for sequence in sequences for level in sequence[1:])
-    usable_s = sum(part.is_usable.sum() * part.samples.dt_s for part in parts)
-    return _LabelledFaults(levels, changes, repairs, float(usable_s / 3600.0))
-
-
-def _unlabelled_settings(
-    parts: Sequence[FitPart], model: Model, extra: dict[str, Any], delays_s: list[float]
-) -> FilterSettings:
-    walk = _estimate_trim_walk(parts, model)
-    drifting = model.model_copy(update={"settings": FilterSettings(trim_walk=walk, **extra)})
-    most = (1.0 if model.vehicle.moving_air else _POWER_OTHER_LAWS) if extra else _POWER_UNLABELLED
-    power = min(most, 1.0 / gain_overdispersion(parts, drifting))
-    return FilterSettings(**extra, power=power, trim_walk=walk, delays_s=delays_s)
+def _label_levels(parts: Sequence[FitPart], i: int) -> list[list[float]]:
+    """The levels of one surface's label in their order, edges left out, of each flight."""
+    labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
+    return [[round(level, 6) for level, _ in groupby(one[np.isfinite(one)].tolist())] for one in labels]
 
 
 def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
@@ -482,7 +436,7 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
         # a gyro's noise takes from the next sample what it added to one
         factors = {ma: _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR for ma in inflation}
         inflation = {ma: value * factors[ma] for ma, value in inflation.items()}
-    return _with_inflation(model, inflation)
+    return _with_inflation(model, lambda ma: inflation.get(tuple(ma), 1.0))
 
 
 def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> list[float]:
@@ -586,12 +540,6 @@ def _row_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Begin and end of what of increasing places follows one another."""
     edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
     return list(pairwise(edges))
-
-
-def _label_levels(part: FitPart, i: int) -> list[float]:
-    """The levels of one surface's label in their order, edges left out."""
-    labels = part.samples.labels[:, i][part.is_usable]
-    return [round(level, 6) for level, _ in groupby(labels[np.isfinite(labels)].tolist())]
 
 
 def validation_folds(

@@ -37,7 +37,7 @@ from beaver_ftc_logs.diagnose import (
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import expand_groups, group_indices, innovations
+from beaver_ftc_logs.regression import expand_groups, group_indices, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import without_dead_rows
 
@@ -82,10 +82,7 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
         from scipy.signal import lfilter
 
         return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0))
-    sums = np.cumsum(x, axis=0)
-    n = round(LEAST_SQUARES_MEMORY_S / dt_s)
-    sums[n:] = sums[n:] - sums[:-n].copy()
-    return sums
+    return trailing_sums(x, LEAST_SQUARES_MEMORY_S / dt_s)[0]
 
 
 def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> LogRows:

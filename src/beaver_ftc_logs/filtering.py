@@ -39,7 +39,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Innovations, innovations
+from beaver_ftc_logs.regression import Innovations, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples, whiten_samples
 
 _EVIDENCE_MEMORY_S = 600.0
@@ -175,17 +175,12 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
-    sums = np.cumsum(np.vstack([np.zeros((1, 3)), g]), axis=0)
-    counts = np.concatenate([[0], np.cumsum(ok)])
-    end = np.arange(1, len(g) + 1)
     ratio = np.zeros(len(g))
     for span_s in _SUM_SPANS_S:
-        begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
-        n = np.maximum(counts[end] - counts[begin], 1)
-        squares = ((sums[end] - sums[begin]) ** 2).sum(axis=1) / (3.0 * n)
-        total = np.concatenate([[0.0], np.cumsum(squares)])
-        start = np.maximum(end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
-        ratio = np.maximum(ratio, (total[end] - total[start]) / (end - start))
+        sums, _ = trailing_sums(np.column_stack([g, ok]), span_s * rate_hz)
+        squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(sums[:, 3], 1.0))
+        total, n = trailing_sums(squares, _VARIANCE_WINDOW_S * rate_hz)
+        ratio = np.maximum(ratio, total / n)
     return ratio
 
 
@@ -202,10 +197,8 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     N = len(states.initial_mean)
     last = H - 1
     p = bank.prior_probability.copy()
-    x = np.zeros((H, N))
-    P = np.zeros((H, N, N))
-    x[:] = states.initial_mean
-    P[:] = states.initial_covariance
+    x = np.zeros((H, N)) + states.initial_mean
+    P = np.zeros((H, N, N)) + states.initial_covariance
     lo = states.initial_mean - states.max_deviation
     hi = states.initial_mean + states.max_deviation
     post = np.zeros((n, H))
@@ -220,16 +213,14 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
         P[last] = states.initial_covariance
         if ok[k]:
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
-            for h in range(H):  # bounded, so that no hypothesis adapts to a fault
-                x[h] = np.minimum(np.maximum(x[h], lo), hi)
+            x[:] = np.minimum(np.maximum(x, lo), hi)  # bounded, so that no hypothesis adapts to a fault
             r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
             r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
         else:
             p = prior
         post[k] = p
         scales[k] = r
-        for h in range(H):
-            means[k] += p[h] * x[h]
+        means[k] = p @ x
     return post, means, scales, ll
 
 
@@ -242,23 +233,15 @@ def _mix(p, x, P, bank, walk):
     """
     H, N = x.shape
     change = bank.change_probability_per_sample
-    share = bank.transition_share
-    stay = 1.0 - change
-    m = np.zeros(N)
+    kept = (1.0 - change) * p
+    prior = kept + change * bank.transition_share
+    m = p @ x
     M = np.zeros((N, N))
     for h in range(H):
-        m += p[h] * x[h]
+        M += p[h] * (P[h] + np.outer(x[h] - m, x[h] - m))
     for h in range(H):
-        for i in range(N):
-            for j in range(N):
-                M[i, j] += p[h] * (P[h, i, j] + (x[h, i] - m[i]) * (x[h, j] - m[j]))
-    prior = np.empty(H)
-    total = 0.0
-    for h in range(H):
-        prior[h] = stay * p[h] + change * share[h]
-        total += prior[h]
-        _merge(stay * p[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
-    return prior / total
+        _merge(kept[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
+    return prior / prior.sum()
 
 
 @kernel
@@ -271,13 +254,12 @@ def _merge(w, x, P, m, M, offset, walk):
     x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
     change to this hypothesis; walk (N,): variance added a sample.
     """
-    v, N = 1.0 - w, len(x)
-    for i in range(N):
-        for j in range(N):
-            P[i, j] = w * P[i, j] + v * M[i, j] + w * v * ((x[i] - m[i]) * (x[j] - m[j]))
+    v = 1.0 - w
+    d = x - m
+    P[:] = w * P + v * M + (w * v) * np.outer(d, d)
+    x[:] = w * x + v * m
+    for i in range(len(walk)):
         P[i, i] += walk[i]
-    for i in range(N):
-        x[i] = w * x[i] + v * m[i]
     for i in range(len(offset)):
         P[i, i] += v * offset[i]
 
@@ -290,11 +272,8 @@ def _relax(x, P, states):
     """
     m = states.initial_mean
     a = states.deviation_retention
-    for h in range(len(x)):
-        for i in range(len(a)):
-            x[h, i] = m[i] + a[i] * (x[h, i] - m[i])
-            for j in range(len(a)):
-                P[h, i, j] *= a[i] * a[j]
+    x[:] = m + a * (x - m)
+    P *= np.outer(a, a)
 
 
 @kernel
@@ -322,9 +301,7 @@ def _correct(prior, x, P, y, F, bank, noise, r):
     p = np.maximum(prior * np.exp(ll - top), _MIN_PROBABILITY)
     total = p.sum()
     p /= total
-    mean = 0.0
-    for h in range(H):
-        mean += p[h] * min(noise.covariance_inflation * d2[h], 3.0 * _SQUARE_CLIP)
+    mean = p @ np.minimum(noise.covariance_inflation * d2, 3.0 * _SQUARE_CLIP)
     return p, mean, top + np.log(total)
 
 
@@ -350,35 +327,16 @@ def _update(x, P, y, C, R, noise):
     Returns d2 and log(det S). K is reduced for a residual in the tail of the t distribution, and 0 above
     max_squared_residual.
     """
-    N, nu = len(x), noise.t_degrees_of_freedom
-    D = np.zeros((N, 3))
-    S = R.copy()
-    e = y.copy()
-    for i in range(N):
-        for j in range(3):
-            e[j] -= x[i] * C[i, j]
-            for k in range(N):
-                D[i, j] += P[i, k] * C[k, j]
-    for i in range(N):
-        for j in range(3):
-            for k in range(3):
-                S[j, k] += C[i, j] * D[i, k]
-    S_inv, det = _invert(S)
-    K = np.zeros((N, 3))
-    d2 = 0.0
-    for j in range(3):
-        for k in range(3):
-            d2 += e[j] * S_inv[j, k] * e[k]
-            for i in range(N):
-                K[i, j] += D[i, k] * S_inv[k, j]
+    nu = noise.t_degrees_of_freedom
+    D = P @ C
+    e = y - x @ C
+    S_inv, det = _invert(R + C.T @ D)
+    d2 = e @ S_inv @ e
+    K = D @ S_inv
     K *= min(1.0, (nu + 3.0) / (nu + d2)) if d2 < noise.max_squared_residual else 0.0
-    for j in range(3):
-        for i in range(N):
-            x[i] += K[i, j] * e[j]
-            # symmetric by construction: an asymmetry from rounding would grow without bound
-            for k in range(i + 1):
-                P[i, k] -= K[i, j] * D[k, j]
-                P[k, i] = P[i, k]
+    x += K @ e
+    P -= K @ D.T
+    P[:] = 0.5 * (P + P.T)  # an asymmetry from rounding would grow without bound
     return d2, np.log(det)
 
 
@@ -387,9 +345,8 @@ def _invert(S):
     """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
     A = np.empty((3, 3))
     for i in range(3):
+        a, b = S[i - 2], S[i - 1]  # the next rows, cyclically
         for j in range(3):
-            i1, i2 = (i + 1) % 3, (i + 2) % 3
-            j1, j2 = (j + 1) % 3, (j + 2) % 3
-            A[j, i] = S[i1, j1] * S[i2, j2] - S[i1, j2] * S[i2, j1]
-    det = S[0, 0] * A[0, 0] + S[0, 1] * A[1, 0] + S[0, 2] * A[2, 0]
+            A[i, j] = a[j - 2] * b[j - 1] - a[j - 1] * b[j - 2]
+    det = S[0] @ A[0]
     return A / det, det

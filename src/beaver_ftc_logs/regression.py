@@ -189,11 +189,9 @@ class Innovations:
     def quick_power(self, rate_hz: float) -> Floats:
         """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
         difference from their mean over the last half second."""
-        end = np.arange(1, len(self.F) + 1)
-        begin = np.maximum(end - max(round(_QUICK_SPAN_S * rate_hz), 1), 0)
-        sums = np.concatenate([np.zeros((1, *self.F.shape[1:])), np.cumsum(self.F, axis=0)])
-        slow = (sums[end] - sums[begin]) / (end - begin)[:, None, None]
-        return np.asarray((((self.F - slow) @ self.W) ** 2).sum(axis=(1, 2)) / 3.0)
+        sums, n = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
+        quick = (self.F - sums / n[:, None, None]) @ self.W
+        return np.asarray((quick**2).sum(axis=(1, 2)) / 3.0)
 
     def quick_scale(self, model: Model) -> Floats:
         """Variance q of the residual over that of the noise, (n,): above 1 where the responses are quicker
@@ -288,6 +286,14 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
+
+
+def trailing_sums(x: Floats, n: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
+    end = np.arange(1, len(x) + 1)
+    begin = np.maximum(end - max(round(n), 1), 0)
+    sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+    return sums[end] - sums[begin], end - begin
 
 
 def noise_scale(e2: Floats) -> float:

@@ -413,11 +413,8 @@ def _in_range(values: Floats, lo: float, hi: float) -> Mask:
 
 def _mostly_recently(held: Mask, samples: Samples) -> Mask:
     """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
-    n = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
-    sums = np.concatenate([[0], np.cumsum(held)])
-    end = np.arange(1, len(held) + 1)
-    begin = np.maximum(end - n, 0)
-    return np.asarray(sums[1:] - sums[begin] > _MIN_OUTSIDE_SHARE * (end - begin))
+    sums, n = regression.trailing_sums(held, _RANGE_WINDOW_S / samples.dt_s)
+    return np.asarray(sums > _MIN_OUTSIDE_SHARE * n)
 
 
 def _rate_columns(model: Model) -> list[str]:

@@ -29,7 +29,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_bank, build_states
-from beaver_ftc_logs.diagnose import LogRows, rows_of_posterior
+from beaver_ftc_logs.diagnose import rows_of_posterior
 from beaver_ftc_logs.filtering import (
     bank_posterior,
     fault_evidence,
@@ -409,17 +409,43 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    total = n = float(len(model.groups))
+    errors = [(float(len(model.groups)), len(model.groups))]
     for fold, held_out in held_out_folds(parts, model):
-        known = np.array(trust.known_effects(fold))
-        F, e = _standardized(fold, held_out)
-        if not len(e):  # a part without a residual shows no gain
-            continue
-        S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-        error, rank = _error_and_rank(F.sum(axis=3)[:, :, known].reshape(e.size, -1), e.ravel(), S)
-        total = total + error
-        n = n + rank
-    return total / n
+        errors += _gain_errors(fold, held_out)
+    return sum(error for error, _ in errors) / sum(n for _, n in errors)
+
+
+def _gain_errors(
+    fold: Model, held_out: FitPart, window_s: float | None = None, loudness: float = 1.0
+) -> list[tuple[float, int]]:
+    """Squares of the errors g of the groups' gains that a part left out tells, in their covariance and what
+    the filter leaves free, S, and how many gains there are; of each window, with a gain for each axis of an
+    answer, where there are windows. loudness: variance of the noise, where the filter itself widens it.
+
+        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
+    """
+    known = np.array(trust.known_effects(fold))
+    F, e = _standardized(fold, held_out)
+    if not len(e):  # a part without a residual shows no gain
+        return []
+    P = build_states(fold, held_out.samples.noise_ma_coefficients).initial_covariance[3:, 3:]
+    S = np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
+    F, n = F[:, :, known], 1
+    if window_s is None:
+        F = F.sum(axis=3)
+    else:
+        F, S = F.reshape(*e.shape, -1), np.kron(S, np.ones((3, 3)))
+        n = max(round(len(e) * held_out.samples.dt_s / window_s), 1)
+    errors = []
+    for rows in np.array_split(np.arange(len(e)), n):
+        Fw, ew = (_centred(values[rows]) / np.sqrt(loudness) for values in (F, e))
+        Fw = Fw.reshape(ew.size, -1)
+        FF, Fe = Fw.T @ Fw, Fw.T @ ew.ravel()
+        g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+        A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
+        error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
+        errors.append((error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))))
+    return errors
 
 
 def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
@@ -432,10 +458,9 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
         found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
         found.extend(_window_inflations(fold, held_out, fitted if len(parts) > 1 else parts))
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
-    if model.vehicle.other_laws:
+    for ma in inflation if model.vehicle.other_laws else ():
         # a gyro's noise takes from the next sample what it added to one
-        factors = {ma: _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR for ma in inflation}
-        inflation = {ma: value * factors[ma] for ma, value in inflation.items()}
+        inflation[ma] *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
     return _with_inflation(model, lambda ma: inflation.get(tuple(ma), 1.0))
 
 
@@ -443,22 +468,8 @@ def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]
     """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
     filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
     others (`recent_scale`): what it widens by itself is not counted again."""
-    known = np.array(trust.known_effects(fold))
-    F, e = _standardized(fold, held_out)
-    if not len(e):  # a part without a residual shows no gain
-        return []
-    S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-    S3 = np.asarray(np.kron(S, np.ones((3, 3))), dtype=float)
-    F = F[:, :, known].reshape(*e.shape, -1)
-    loudness = _loudness(fold, held_out, others)
-    n = max(round(len(e) * held_out.samples.dt_s / _GAIN_WINDOW_S), 1)
-    inflations = []
-    for rows in np.array_split(np.arange(len(e)), n):
-        Fw = _centred(F[rows]) / np.sqrt(loudness)
-        ew = _centred(e[rows]) / np.sqrt(loudness)
-        error, rank = _error_and_rank(Fw.reshape(ew.size, -1), ew.ravel(), S3)
-        inflations.append(min(error / max(rank, 1), _MAX_INFLATION))
-    return inflations
+    errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, _loudness(fold, held_out, others))
+    return [min(error / max(n, 1), _MAX_INFLATION) for error, n in errors]
 
 
 def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> float:
@@ -474,26 +485,6 @@ def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> floa
 
     scales = [scale(flight) for flight in _parts_in(others, held_out.samples.noise_ma_coefficients)]
     return max(scale(held_out) / max([1.0, *scales]), 1.0)
-
-
-def _prior_covariance(model: Model, known: NDArray[np.bool_], ma: tuple[float, ...]) -> Floats:
-    """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    P = build_states(model, ma).initial_covariance[3:, 3:]
-    return np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
-
-
-def _error_and_rank(F: Floats, e: Floats, S: Floats) -> tuple[float, int]:
-    """Square of the error g of the gains that a residual e (m,) tells by F (m, G), in their covariance and
-    what lies between flights, and how many gains there are:
-
-        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
-    """
-    FF = F.T @ F
-    Fe = F.T @ e
-    g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
-    A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
-    error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
-    return error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))
 
 
 def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
@@ -607,7 +598,7 @@ def _alarm_rate_and_threshold(
     requested = model.vehicle.false_alarms_per_hour
     target = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.likely_levels else requested
     if tail is None and requested is not None:
-        minutes = _healthy_minutes(peaks)
+        minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
         allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
         raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
@@ -666,10 +657,6 @@ def _misread_gain(model: Model, held_out: FitPart) -> float:
     return max(0.0, *gains.values()) if gains else 0.0
 
 
-def _healthy_minutes(peaks: Sequence[extremes.PeaksAndHours]) -> float:
-    return 60.0 * sum(hours for _, hours in peaks)
-
-
 def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
@@ -678,12 +665,11 @@ def _cross_validate(
     tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
     if target is None or len(flights) < 2 or not all(tails):
         return {}
-    thresholds = [_choose_threshold(tail, target, model) for tail in tails if tail]
-    pairs = zip(flights, thresholds, strict=True)
-    counts = [int((peaks >= threshold).sum()) for (peaks, _), threshold in pairs]
+    pairs = zip(flights, tails, strict=True)
+    counts = [int((peaks >= _choose_threshold(tail, target, model)).sum()) for (peaks, _), tail in pairs]
     return {
         "parts": len(flights),
-        "minutes": _healthy_minutes(flights),
+        "minutes": 60.0 * sum(hours for _, hours in flights),
         "alarmed": sum(n > 0 for n in counts),
         "alarms": sum(counts),
     }
@@ -709,22 +695,23 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     Responses z with errors of covariance C tell their factor with the variance 1 / (z' C^-1 z), both in the
     standard errors s (L, 3) of the coefficients; b (3,) is the sum over lags, in sd of the noise.
     """
-    n = len(model.groups)
-    L = model.n_command_lags
+    n, L = len(model.groups), model.n_command_lags
     first = len(fit.coefficients) - n * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
-    relative = np.zeros(n)
-    information = np.full(n, MIN_DIVISOR)
+    gain_sd = np.zeros(n)
     for g in range(n):
         rows = slice(first + g * L, first + (g + 1) * L)
         C = fit.coefficient_error_correlation[rows, rows]
         s = fit.standard_errors[rows] / sd
-        b = fit.coefficients[rows].sum(axis=0) / sd
-        v = np.einsum("la,lm,ma->a", s, C, s)
-        relative[g] = np.sqrt(b**2 @ np.maximum(v, 0.0)) / max(float(b @ b), MIN_DIVISOR)
-        z = fit.coefficients[rows] / sd / np.maximum(s, MIN_DIVISOR)
-        information[g] += np.einsum("la,lm,ma->", z, np.linalg.pinv(C, rcond=_RANK_TOLERANCE), z)
-    return np.minimum(1.0 / np.sqrt(information) if model.vehicle.other_laws else relative, _GAIN_SD_CAP)
+        if model.vehicle.other_laws:
+            z = fit.coefficients[rows] / sd / np.maximum(s, MIN_DIVISOR)
+            information = np.einsum("la,lm,ma->", z, np.linalg.pinv(C, rcond=_RANK_TOLERANCE), z)
+            gain_sd[g] = 1.0 / np.sqrt(MIN_DIVISOR + information)
+        else:
+            b = fit.coefficients[rows].sum(axis=0) / sd
+            v = np.einsum("la,lm,ma->a", s, C, s)
+            gain_sd[g] = np.sqrt(b**2 @ np.maximum(v, 0.0)) / max(float(b @ b), MIN_DIVISOR)
+    return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
 def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
@@ -737,32 +724,30 @@ def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
 
 def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
-    entries: list[Document] = []
+    entries = fold_qualities(parts, model)
+    usual = model.settings.credible_mass
     coverage: list[list[float]] = []
-    for fitted, held_out, name in validation_folds(parts):
-        fold = refit(fitted, model)
-        entry: Document = {"left_out": name, **prediction_quality(fold, held_out)}
+    for entry, (fitted, held_out, _) in zip(entries, validation_folds(parts), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            rows = _rows_by_mass(fold, held_out)
-            entry["score"] = score_against_labels(rows[model.settings.credible_mass], labels)
-            scores = [score_against_labels(rows[mass], labels) for mass in _CREDIBLE_MASSES]
-            coverage.append([score["held_by_bounds"] for score in scores])
-        entries.append(entry)
+            scores = _scores_by_mass(refit(fitted, model), held_out, labels)
+            entry["score"] = scores[usual]
+            coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
     if not coverage:
-        return entries, model.settings.credible_mass
+        return entries, usual
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
 
 
-def _rows_by_mass(model: Model, held_out: FitPart) -> dict[float, LogRows]:
+def _scores_by_mass(model: Model, held_out: FitPart, labels: Floats) -> dict[float, Document]:
     bank = build_bank(model)
     p, _, _ = bank_posterior(held_out.samples, model, bank)
-    rows = {}
+    scores = {}
     for mass in {*_CREDIBLE_MASSES, model.settings.credible_mass}:
         settings = model.settings.model_copy(update={"credible_mass": mass})
         candidate = model.model_copy(update={"settings": settings})
-        rows[mass] = rows_of_posterior(held_out.samples, candidate, bank, p)
-    return rows
+        rows = rows_of_posterior(held_out.samples, candidate, bank, p)
+        scores[mass] = score_against_labels(rows, labels)
+    return scores
 
 
 def prediction_quality(model: Model, held_out: FitPart) -> Document:

@@ -173,14 +173,13 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         return
     most = _UNIT_FACTOR_ROOT**2
     for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        fits = None
-        if 1.0 / most < ratio / per_rad < most:
-            fits = f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"
-        elif 1.0 / most < ratio * per_rad < most:
-            fits = f"{per_rad:.4g} fits: the model's own were in {unit}?"
-        if fits:
+        hints = {
+            ratio / per_rad: f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits",
+            ratio * per_rad: f"{per_rad:.4g} fits: the model's own were in {unit}?",
+        }
+        for hint in (hint for factor, hint in hints.items() if 1.0 / most < factor < most):
             spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {fits}")
+            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
 
 
 def refuse_command_unit(
@@ -191,10 +190,10 @@ def refuse_command_unit(
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    rate_ratios = _spans(central_ranges(rates)) / np.maximum(_spans(ranges.rate_ranges_rad_s), MIN_DIVISOR)
+    rate_ratios = _relative_motion(rates, ranges.rate_ranges_rad_s)
     alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
     allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
-    ratios = _spans(central_ranges(commands)) / np.maximum(_spans(ranges.command_ranges), MIN_DIVISOR)
+    ratios = _relative_motion(commands, ranges.command_ranges)
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
@@ -284,11 +283,14 @@ def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, 
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
     mistakes = {}
-    known = known_gains(model)
+    known, surfaces, ranges = known_gains(model), list(model.vehicle.surfaces), model.fitted_ranges
+    motions = np.zeros(len(surfaces))
+    if ranges is not None and ranges.command_ranges:
+        motions = _relative_motion(samples.commands, ranges.command_ranges)
     highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
     for group, sure, hi, lo in zip(model.groups, known, highest, lowest, strict=True):
         name = "+".join(group)
-        motion = _relative_motion(samples, model, group)
+        motion = max(motions[surfaces.index(surface)] for surface in group)
         command = f"the command of {name}"
         moves = f"{command} moves {motion:.3g} times as much as in the flights of the model, and does"
         if hi < MAX_REVERSED_GAIN:
@@ -351,100 +353,69 @@ def _likelihoods(samples: Samples, model: Model) -> Floats:
     return np.array(-np.inf) if found is None else found.likelihood
 
 
-def _relative_motion(samples: Samples, model: Model, group: list[str]) -> float:
-    """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
-    not known."""
-    if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
-        return 0.0
-    fitted = np.maximum(_spans(model.fitted_ranges.command_ranges), MIN_DIVISOR)
-    ratios = _spans(central_ranges(samples.commands)) / fitted
-    return max(float(ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
-
-
-def _spans(ranges: Sequence[Sequence[float]]) -> Floats:
-    return np.ptp(np.array(ranges, dtype=float).reshape(-1, 2), axis=1)
+def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
+    """Return how many times as far as in the model's flights each column of values (n, S) moves, (S,)."""
+    spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
+    return np.asarray(spans[0] / np.maximum(spans[1], MIN_DIVISOR))
 
 
 def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
-    reasons: dict[str, Mask] = {}
-    for name, limit_s in _max_still_s(samples, model).items():
-        reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = samples.unchanged_s[name] > limit_s
+    reasons: dict[str, Mask] = _still_rows(samples, model)
     if samples.is_rate_clipped is not None:
-        clipped = _clipped_recently(samples.is_rate_clipped, samples.dt_s)
-        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = clipped
+        recent, _ = regression.trailing_sums(
+            samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
+        )
+        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
     if model.fitted_ranges is not None:
         reasons |= _rows_out_of_range(samples, model, model.fitted_ranges)
     return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
-def _clipped_recently(clipped: Mask, dt_s: float) -> Mask:
-    """Whether a condition held in the last half minute."""
-    k = np.arange(len(clipped))
-    since = k - np.maximum.accumulate(np.where(clipped, k, -len(clipped) - round(_CLIPPING_MEMORY_S / dt_s)))
-    return np.asarray(since * dt_s <= _CLIPPING_MEMORY_S)
-
-
 def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
+    """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
+    flight so far, by reason."""
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
         *zip(commands, samples.commands.T, ranges.command_ranges, strict=False),
         *zip(_rate_columns(model), samples.rates.T, ranges.rate_ranges_rad_s, strict=False),
     ]
+    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
+        channels.append(("airspeed", samples.airspeed, ranges.airspeed_range_mps))
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        outside = ~_in_range(values, lo - margin, hi + margin)
-        reasons[_outside_text(name, lo, hi)] = _mostly_recently(outside, samples)
-    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
-        lo, hi = ranges.airspeed_range_mps
-        outside = ~_in_range(samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * lo, (1.0 + _AIRSPEED_MARGIN) * hi)
-        reasons[_outside_text("airspeed", lo, hi)] = _mostly_recently(outside, samples)
+        margins = (_AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi) if name == "airspeed" else (margin, margin)
+        outside = (values < lo - margins[0]) | (values > hi + margins[1])
+        reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
+        sums, n = regression.trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
+        reasons[reason] = np.asarray(sums > _MIN_OUTSIDE_SHARE * n)
     return reasons
-
-
-def _outside_text(name: str, lo: float, hi: float) -> str:
-    return f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
-
-
-def _in_range(values: Floats, lo: float, hi: float) -> Mask:
-    return np.asarray(~np.isfinite(values) | ((values >= lo) & (values <= hi)))
-
-
-def _mostly_recently(held: Mask, samples: Samples) -> Mask:
-    """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
-    sums, n = regression.trailing_sums(held, _RANGE_WINDOW_S / samples.dt_s)
-    return np.asarray(sums > _MIN_OUTSIDE_SHARE * n)
 
 
 def _rate_columns(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
-    """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
-    flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
+def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+    """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
+    thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
     fitted = model.fitted_ranges.longest_still_s if model.fitted_ranges else {}
     rates = _rate_columns(model)
-    limits_s = {}
-    for name in samples.unchanged_s:
+    reasons = {}
+    for name, unchanged_s in samples.unchanged_s.items():
         still_s = fitted.get(name, 0.0 if name in rates else np.inf)
         least_s = MIN_STILL_S / 3.0 if name in fitted and name in rates else MIN_STILL_S
-        limits_s[name] = max(least_s, _MAX_STILL_FACTOR * still_s)
-    return limits_s
-
-
-def dead_rows(samples: Samples, model: Model) -> Mask:
-    """Samples with a signal that does not live: what the filter is not to learn from."""
-    dead = np.zeros(len(samples.t_s), dtype=bool)
-    for name, limit_s in _max_still_s(samples, model).items():
-        dead |= samples.unchanged_s[name] > limit_s
-    return dead if samples.is_rate_clipped is None else dead | samples.is_rate_clipped
+        limit_s = max(least_s, _MAX_STILL_FACTOR * still_s)
+        reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = unchanged_s > limit_s
+    return reasons
 
 
 def without_dead_rows(samples: Samples, model: Model) -> Samples:
-    """The flight with nothing known where a signal does not live."""
-    dead = dead_rows(samples, model)
+    """The flight with nothing known where a signal does not live: the filter is not to learn from it."""
+    dead = np.any([*_still_rows(samples, model).values(), np.zeros(len(samples.t_s), dtype=bool)], axis=0)
+    if samples.is_rate_clipped is not None:
+        dead |= samples.is_rate_clipped
     if not dead.any():
         return samples
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))

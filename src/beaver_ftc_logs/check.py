@@ -125,13 +125,8 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     named = [angle if angle and angle.column in columns else None for angle in (angles.pitch, angles.yaw)]
-    roll = _column_in_si(columns, angles.roll)
-    pitch, yaw = (None if angle is None else _column_in_si(columns, angle) for angle in named)
-    fits = [
-        physics.fit_roll(gyros, roll, pitch),
-        physics.fit_pitch(gyros, roll, pitch) if pitch else None,
-        physics.fit_yaw(gyros, roll, pitch, yaw) if yaw else None,
-    ]
+    in_si = [angle and _column_in_si(columns, angle) for angle in (angles.roll, *named)]
+    fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
     rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
@@ -300,7 +295,8 @@ def _guess_rate_unit(
     rates, named = [log.columns[name] for name in rate_names], rate_names[0].lower()
     found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
     if roll is not None:
-        fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
+        in_rad = replace(roll, values=roll.values * rad_per_roll_unit)
+        fit = physics.fit_angle(rates, (in_rad, None, None), 0)
         if fit is not None and abs(fit.correlation) > _MIN_CORRELATION:
             found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
     largest = max(_largest_magnitude(rate.values) for rate in rates)

@@ -33,12 +33,11 @@ from beaver_ftc_logs.diagnose import (
     check_log_fits_model,
     diagnose,
     finish_rows,
-    healthy_residual,
     join_names,
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import expand_groups, group_indices, unexplained_rates
+from beaver_ftc_logs.regression import expand_groups, group_indices, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.trust import without_dead_rows
 
@@ -70,14 +69,11 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
 
 def _whitened_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
-    """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3),
-    both times W with W R W' = 1, R the covariance of the residual."""
-    known, y, F = unexplained_rates(samples, model)
-    R = model.as_arrays()[3]
-    W = np.linalg.inv(np.linalg.cholesky(R))
-    trim = np.broadcast_to(np.diag(np.sqrt(np.diag(R))), (len(known), 3, 3))
-    X = np.where(known[:, None, None], np.concatenate([trim, F.transpose(0, 2, 1)], axis=2), 0.0)
-    return np.einsum("ab,nbi->nai", W, X), healthy_residual(model, known, y, F)
+    """Regressors (n, 3, 3 + G) of trim, in standard deviations, and of lost effectiveness, and what a healthy
+    vehicle leaves, (n, 3), both whitened."""
+    flight = innovations(samples, model)
+    sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]
+    return np.where(flight.is_known[:, None, None], flight.columns() * sd, 0.0), flight.e @ flight.W
 
 
 def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
@@ -86,10 +82,7 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
         from scipy.signal import lfilter
 
         return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0))
-    sums = np.cumsum(x, axis=0)
-    n = round(LEAST_SQUARES_MEMORY_S / dt_s)
-    sums[n:] = sums[n:] - sums[:-n].copy()
-    return sums
+    return trailing_sums(x, LEAST_SQUARES_MEMORY_S / dt_s)[0]
 
 
 def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> LogRows:
@@ -164,16 +157,14 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
             f"{model.vehicle.name}: {len(members)} groups of surfaces, allowed for a "
             f"detector of the loop: at most {len(LOOP_SURFACES)}"
         )
-    known, y, F = unexplained_rates(samples, model)
-    c, dt_s = model.as_arrays()[0], 1.0 / model.rate_hz
+    flight, dt_s = innovations(samples, model), 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     before = np.vstack([rates[:1], rates[:-1]])
-    predicted = rates - np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
-    expected = (predicted - before) / dt_s
+    expected = (rates - flight.e - before) / dt_s
     Z = np.zeros((len(rates), 3, _N_LOOP))
     u = np.zeros((len(rates), _N_LOOP))
     for g, places in enumerate(members):
-        Z[:, :, g] = np.where(known[:, None], F[:, g], 0.0) / dt_s
+        Z[:, :, g] = np.where(flight.is_known[:, None], flight.F[:, g], 0.0) / dt_s
         u[:, g] = np.nan_to_num(samples.commands[:, places].sum(axis=1))
     sd, t_s = _model_error_sd_rad_s2(model), samples.t_s.tolist()
     frames = [

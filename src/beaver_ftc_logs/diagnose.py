@@ -22,7 +22,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import expand_groups, unexplained_rates
+from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -203,9 +203,9 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
 
     r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
     """
-    r = healthy_residual(model, *unexplained_rates(samples, model))
-    _, _, F, R = model.as_arrays()
-    m = np.linalg.solve(np.linalg.cholesky(R), F.sum(axis=1).T)
+    flight = innovations(samples, model)
+    r = flight.e @ flight.W
+    m = (np.array(model.command_response).sum(axis=1) @ flight.W).T
     norms = np.linalg.norm(m, axis=0)
     p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
     total = np.cumsum(p, axis=0)
@@ -218,14 +218,6 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
         wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
     names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
     return replace(rows.without_estimate(wrong), isolated_surfaces=names)
-
-
-def healthy_residual(model: Model, known: NDArray[np.bool_], y: Floats, F: Floats) -> Floats:
-    """Residual y - c - sum_g F_g of a healthy vehicle by `unexplained_rates`, in standard deviations of the
-    noise, (n, 3); 0 where no sample can be predicted."""
-    c, _, _, R = model.as_arrays()
-    r = np.where(known[:, None], y - c - F.sum(axis=1), 0.0)
-    return np.asarray(r @ np.linalg.inv(np.linalg.cholesky(R)).T)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:

@@ -37,18 +37,16 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
-from beaver_ftc_logs.model import Model, NoiseModel
+from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import whitened_rates
-from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
+from beaver_ftc_logs.regression import Innovations, innovations, trailing_sums
+from beaver_ftc_logs.samples import Samples, whiten_samples
 
 _EVIDENCE_MEMORY_S = 600.0
 _MIN_PROBABILITY = 1e-15
 _SQUARE_CLIP = 3.0
 _SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
-_QUICK_SPAN_S = 0.5
-"""A response is quick if it differs from its mean over so many seconds."""
 _MEAN_SQUARE = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 _MIN_NOISE_WEIGHT = 1e-3
@@ -62,62 +60,48 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tupl
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
 
     All are averages over the command delays of the model's settings and, if the flight is not yet whitened,
-    over its noise models. The weights are their probabilities given the last minutes.
+    over its noise models. The weights are their probabilities given the last minutes. A noise model is run up
+    to the last sample at which its weight is not negligible: within a second most become far less likely than
+    another, and stay so.
     """
-    if model.noise_models and not samples.noise_ma_coefficients:
-        return _average_noises(samples, model, bank)
-    noisy = model.with_noise_of(samples.noise_ma_coefficients)
-    delays = model.settings.command_delays_s
-    runs = [_run_flight(_with_command_delay(samples, delay_s), noisy, bank) for delay_s in delays]
-    return _average_runs(list(_model_weights([run[3] for run in runs], model.rate_hz)), runs)
-
-
-def _average_noises(samples: Samples, model: Model, bank: HypothesisBank) -> tuple[Floats, Floats, Floats]:
-    """The average over the noise models. The bank is run with each up to the last sample at which its weight
-    is not negligible: within a second most become far less likely than another, and stay so."""
-    pairs = [
-        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
-        for noise in model.noise_models
+    if not model.noise_models or samples.noise_ma_coefficients:
+        delays = model.settings.command_delays_s
+        flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
+        runs = [run_flight(flight, model, bank) for flight in flights]
+        return _average_runs(list(model_weights([run[3] for run in runs], model.rate_hz)), runs)
+    models = [model.with_single_noise(noise) for noise in model.noise_models]
+    flights = [
+        innovations(whiten_samples(samples, one.noise_models[0].ma_coefficients), one) for one in models
     ]
-    ll = [_noise_likelihood(flight, one, one.noise_models[0]) for flight, one in pairs]
-    p = _model_weights(ll, model.rate_hz)
-    kept = np.where(np.asarray(p) < _MIN_NOISE_WEIGHT, 0.0, p)
+    pairs = list(zip(flights, models, strict=True))
+    p = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
+    kept = np.where(p < _MIN_NOISE_WEIGHT, 0.0, p)
     kept /= kept.sum(axis=0)
     counts = [int(np.flatnonzero(w).max(initial=-1)) + 1 for w in kept]
-    runs = [
-        _run_flight(first_samples(flight, n), one.with_noise_of(flight.noise_ma_coefficients), bank)
-        for (flight, one), n in zip(pairs, counts, strict=True)
-        if n
-    ]
+    used = [(flight.at(slice(n)), one) for (flight, one), n in zip(pairs, counts, strict=True) if n]
+    runs = [run_flight(*pair, bank) for pair in used]
     return _average_runs([w for w, n in zip(kept, counts, strict=True) if n], runs)
 
 
 def _average_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[Floats, Floats, Floats]:
     """Weighted average of runs; weights (n,) each. A run may be shorter than n where its weight stays 0."""
     averages: list[Floats] = []
-    for i in range(3):
-        shape = (len(weights[0]), *runs[0][i].shape[1:])
-        mean = np.zeros(shape)
-        for w, run in zip(weights, runs, strict=True):
-            output = run[i]
-            mean[: len(output)] += w[: len(output)].reshape(-1, *[1] * (output.ndim - 1)) * output
+    for outputs in list(zip(*runs, strict=True))[:3]:
+        mean = np.zeros((len(weights[0]), *outputs[0].shape[1:]))
+        for w, output in zip(weights, outputs, strict=True):
+            mean[: len(output)] += (w[: len(output)] * output.T).T
         averages.append(mean)
     return averages[0], averages[1], averages[2]
 
 
-def _noise_likelihood(flight: Samples, model: Model, noise: NoiseModel) -> Floats:
-    """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
-    the covariance of the fit, without its inflation. The filter multiplied the samples by the sum of `ma`."""
-    ma = noise.ma_coefficients
-    ok, y, F = whitened_rates(flight, model)
-    e = np.nan_to_num(y - F.sum(axis=1) - model.whitened_intercept(ma))
-    R = np.array(noise.residual_covariance)
-    q = quick_scale(np.nan_to_num(F), model, ma)
-    d2 = np.einsum("na,ab,nb->n", e, np.linalg.inv(R), e) / q
+def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
+    """Log likelihood (n,) of the model's noise for a flight that is whitened by it, with all surfaces
+    healthy; by the covariance of the fit, without its inflation."""
+    q = flight.quick_scale(model)
+    d2 = ((flight.e @ flight.W) ** 2).sum(axis=1) / q
     nu = model.settings.t_degrees_of_freedom
-    log_det = np.linalg.slogdet(R)[1] + 3.0 * np.log(q)
-    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + log_det) + 3.0 * np.log(sum(ma))
-    return np.where(ok, model.settings.effective_sample_share * ll, 0.0)
+    ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + 3.0 * np.log(q)) - flight.log_size
+    return np.where(flight.is_known, model.settings.effective_sample_share * ll, 0.0)
 
 
 def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
@@ -158,7 +142,7 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     return replace(samples, commands=(1.0 - a) * u + a * other)
 
 
-def _model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
+def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
     """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods ll
     (n,), forgotten exponentially within minutes."""
     from scipy.signal import lfilter
@@ -169,66 +153,34 @@ def _model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
     return np.asarray(p / p.sum(axis=0))
 
 
-def _run_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRun:
+def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
     """The result of `run_bank` for one flight."""
-    ma = samples.noise_ma_coefficients
-    ok, *rest = whitened_rates(samples, model)
-    y, F = (np.ascontiguousarray(np.nan_to_num(v)) for v in rest)
-    noise = build_noise(model, ma)
-    q = quick_scale(F, model, ma)
-    r_min = np.zeros(len(ok))
+    noisy = model.with_noise_of(flight.ma)
+    q = flight.quick_scale(model)
+    r_min = np.zeros(len(q))
     if model.vehicle.other_laws:
-        e = np.where(ok[:, None], y - noise.intercept_rad_s - F.sum(axis=1), 0.0) / np.sqrt(q[:, None])
-        r_min = recent_scale(e, ok, noise.covariance, model.rate_hz)
-    run: BankRun = run_bank(y, F, ok, bank, build_states(model, ma), noise, r_min, q)
+        white = flight.e @ flight.W / np.sqrt(flight.inflation * q[:, None])
+        r_min = recent_scale(white, flight.is_known, model.rate_hz)
+    y, F = (np.ascontiguousarray(values) for values in (flight.y, flight.F))
+    states, noise = build_states(noisy, flight.ma), build_noise(noisy, flight.ma)
+    run: BankRun = run_bank(y, F, flight.is_known, bank, states, noise, r_min, q)
     return run
 
 
-def quick_scale(F: Floats, model: Model, ma: Sequence[float]) -> Floats:
-    """Return the variance q of the residual over that of the noise, (n,): above 1 where the responses F are
-    quicker than usual in the fit, since a share of the quick part may be missing, or be too much.
-
-    Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step is no
-    noise: it has the same sign in many samples.
-    """
-    power = quick_power(F, model.covariance_of_noise(ma), model.rate_hz)
-    excess = np.maximum(power - model.usual_quick_power(ma), 0.0)
-    return np.asarray(1.0 + model.settings.quick_error_share**2 * excess)
-
-
-def quick_power(F: Floats, R: Floats, rate_hz: float) -> Floats:
-    """Return the power of the quick part of the responses F an axis, in variances of the noise, (n,).
-
-    The quick part is the difference from the mean over the last half second.
-    """
-    end = np.arange(1, len(F) + 1)
-    begin = np.maximum(end - max(round(_QUICK_SPAN_S * rate_hz), 1), 0)
-    sums = np.concatenate([np.zeros((1, *F.shape[1:])), np.cumsum(F, axis=0)])
-    slow = (sums[end] - sums[begin]) / (end - begin)[:, None, None]
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
-    return np.asarray((((F - slow) @ W) ** 2).sum(axis=(1, 2)) / 3.0)
-
-
-def recent_scale(e: Floats, ok: np.ndarray, R: Floats, rate_hz: float) -> Floats:
-    """Return the ratio of the variance of a flight's residual e (n, 3) in the last seconds to that of the
-    fitted noise, (n,): of single samples, or of sums of several if that is larger. ok (n,): which samples
-    count.
+def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
+    """Return the ratio of the variance of a flight's residual g (n, 3), in standard deviations of the fitted
+    noise, in the last seconds to that of this noise, (n,): of single samples, or of sums of several if that
+    is larger. ok (n,): which samples count.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
-    g = e @ np.linalg.inv(np.linalg.cholesky(R)).T
-    sums = np.cumsum(np.vstack([np.zeros((1, 3)), g]), axis=0)
-    counts = np.concatenate([[0], np.cumsum(ok)])
-    end = np.arange(1, len(g) + 1)
     ratio = np.zeros(len(g))
     for span_s in _SUM_SPANS_S:
-        begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
-        n = np.maximum(counts[end] - counts[begin], 1)
-        squares = ((sums[end] - sums[begin]) ** 2).sum(axis=1) / (3.0 * n)
-        total = np.concatenate([[0.0], np.cumsum(squares)])
-        start = np.maximum(end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
-        ratio = np.maximum(ratio, (total[end] - total[start]) / (end - start))
+        sums, _ = trailing_sums(np.column_stack([g, ok]), span_s * rate_hz)
+        squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(sums[:, 3], 1.0))
+        total, n = trailing_sums(squares, _VARIANCE_WINDOW_S * rate_hz)
+        ratio = np.maximum(ratio, total / n)
     return ratio
 
 
@@ -245,10 +197,8 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     N = len(states.initial_mean)
     last = H - 1
     p = bank.prior_probability.copy()
-    x = np.zeros((H, N))
-    P = np.zeros((H, N, N))
-    x[:] = states.initial_mean
-    P[:] = states.initial_covariance
+    x = np.zeros((H, N)) + states.initial_mean
+    P = np.zeros((H, N, N)) + states.initial_covariance
     lo = states.initial_mean - states.max_deviation
     hi = states.initial_mean + states.max_deviation
     post = np.zeros((n, H))
@@ -263,16 +213,14 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
         P[last] = states.initial_covariance
         if ok[k]:
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
-            for h in range(H):  # bounded, so that no hypothesis adapts to a fault
-                x[h] = np.minimum(np.maximum(x[h], lo), hi)
+            x[:] = np.minimum(np.maximum(x, lo), hi)  # bounded, so that no hypothesis adapts to a fault
             r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
             r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
         else:
             p = prior
         post[k] = p
         scales[k] = r
-        for h in range(H):
-            means[k] += p[h] * x[h]
+        means[k] = p @ x
     return post, means, scales, ll
 
 
@@ -285,23 +233,15 @@ def _mix(p, x, P, bank, walk):
     """
     H, N = x.shape
     change = bank.change_probability_per_sample
-    share = bank.transition_share
-    stay = 1.0 - change
-    m = np.zeros(N)
+    kept = (1.0 - change) * p
+    prior = kept + change * bank.transition_share
+    m = p @ x
     M = np.zeros((N, N))
     for h in range(H):
-        m += p[h] * x[h]
+        M += p[h] * (P[h] + np.outer(x[h] - m, x[h] - m))
     for h in range(H):
-        for i in range(N):
-            for j in range(N):
-                M[i, j] += p[h] * (P[h, i, j] + (x[h, i] - m[i]) * (x[h, j] - m[j]))
-    prior = np.empty(H)
-    total = 0.0
-    for h in range(H):
-        prior[h] = stay * p[h] + change * share[h]
-        total += prior[h]
-        _merge(stay * p[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
-    return prior / total
+        _merge(kept[h] / prior[h], x[h], P[h], m, M, bank.rate_offset_variance[h], walk)
+    return prior / prior.sum()
 
 
 @kernel
@@ -314,13 +254,12 @@ def _merge(w, x, P, m, M, offset, walk):
     x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
     change to this hypothesis; walk (N,): variance added a sample.
     """
-    v, N = 1.0 - w, len(x)
-    for i in range(N):
-        for j in range(N):
-            P[i, j] = w * P[i, j] + v * M[i, j] + w * v * ((x[i] - m[i]) * (x[j] - m[j]))
+    v = 1.0 - w
+    d = x - m
+    P[:] = w * P + v * M + (w * v) * np.outer(d, d)
+    x[:] = w * x + v * m
+    for i in range(len(walk)):
         P[i, i] += walk[i]
-    for i in range(N):
-        x[i] = w * x[i] + v * m[i]
     for i in range(len(offset)):
         P[i, i] += v * offset[i]
 
@@ -333,11 +272,8 @@ def _relax(x, P, states):
     """
     m = states.initial_mean
     a = states.deviation_retention
-    for h in range(len(x)):
-        for i in range(len(a)):
-            x[h, i] = m[i] + a[i] * (x[h, i] - m[i])
-            for j in range(len(a)):
-                P[h, i, j] *= a[i] * a[j]
+    x[:] = m + a * (x - m)
+    P *= np.outer(a, a)
 
 
 @kernel
@@ -365,9 +301,7 @@ def _correct(prior, x, P, y, F, bank, noise, r):
     p = np.maximum(prior * np.exp(ll - top), _MIN_PROBABILITY)
     total = p.sum()
     p /= total
-    mean = 0.0
-    for h in range(H):
-        mean += p[h] * min(noise.covariance_inflation * d2[h], 3.0 * _SQUARE_CLIP)
+    mean = p @ np.minimum(noise.covariance_inflation * d2, 3.0 * _SQUARE_CLIP)
     return p, mean, top + np.log(total)
 
 
@@ -393,35 +327,16 @@ def _update(x, P, y, C, R, noise):
     Returns d2 and log(det S). K is reduced for a residual in the tail of the t distribution, and 0 above
     max_squared_residual.
     """
-    N, nu = len(x), noise.t_degrees_of_freedom
-    D = np.zeros((N, 3))
-    S = R.copy()
-    e = y.copy()
-    for i in range(N):
-        for j in range(3):
-            e[j] -= x[i] * C[i, j]
-            for k in range(N):
-                D[i, j] += P[i, k] * C[k, j]
-    for i in range(N):
-        for j in range(3):
-            for k in range(3):
-                S[j, k] += C[i, j] * D[i, k]
-    S_inv, det = _invert(S)
-    K = np.zeros((N, 3))
-    d2 = 0.0
-    for j in range(3):
-        for k in range(3):
-            d2 += e[j] * S_inv[j, k] * e[k]
-            for i in range(N):
-                K[i, j] += D[i, k] * S_inv[k, j]
+    nu = noise.t_degrees_of_freedom
+    D = P @ C
+    e = y - x @ C
+    S_inv, det = _invert(R + C.T @ D)
+    d2 = e @ S_inv @ e
+    K = D @ S_inv
     K *= min(1.0, (nu + 3.0) / (nu + d2)) if d2 < noise.max_squared_residual else 0.0
-    for j in range(3):
-        for i in range(N):
-            x[i] += K[i, j] * e[j]
-            # symmetric by construction: an asymmetry from rounding would grow without bound
-            for k in range(i + 1):
-                P[i, k] -= K[i, j] * D[k, j]
-                P[k, i] = P[i, k]
+    x += K @ e
+    P -= K @ D.T
+    P[:] = 0.5 * (P + P.T)  # an asymmetry from rounding would grow without bound
     return d2, np.log(det)
 
 
@@ -430,9 +345,8 @@ def _invert(S):
     """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
     A = np.empty((3, 3))
     for i in range(3):
+        a, b = S[i - 2], S[i - 1]  # the next rows, cyclically
         for j in range(3):
-            i1, i2 = (i + 1) % 3, (i + 2) % 3
-            j1, j2 = (j + 1) % 3, (j + 2) % 3
-            A[j, i] = S[i1, j1] * S[i2, j2] - S[i1, j2] * S[i2, j1]
-    det = S[0, 0] * A[0, 0] + S[0, 1] * A[1, 0] + S[0, 2] * A[2, 0]
+            A[i, j] = a[j - 2] * b[j - 1] - a[j - 1] * b[j - 2]
+    det = S[0] @ A[0]
     return A / det, det

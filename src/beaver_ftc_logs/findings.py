@@ -21,7 +21,7 @@ from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import unexplained_rates
+from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
@@ -184,11 +184,8 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
 
 def _white_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    known, _, F = unexplained_rates(samples, model)
-    F = F[known]
-    R = np.array(model.residual_covariance)
-    white = np.linalg.solve(np.linalg.cholesky(R), F.reshape(-1, 3).T).T
-    return np.asarray(white.reshape(F.shape) * np.sqrt(model.settings.effective_sample_share))
+    flight = innovations(samples, model)
+    return flight.F[flight.is_known] @ flight.W * np.sqrt(model.settings.effective_sample_share)
 
 
 def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> dict[str, Any]:

@@ -18,9 +18,9 @@ the two halves of a single flight in turn, or each of several flights in turn.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import groupby, pairwise
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import replace
+from itertools import groupby, pairwise, product
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +29,16 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_bank, build_states
-from beaver_ftc_logs.diagnose import LogRows, rows_of_posterior
+from beaver_ftc_logs.diagnose import rows_of_posterior
 from beaver_ftc_logs.filtering import (
     bank_posterior,
     fault_evidence,
     page_cusum,
-    quick_power,
-    quick_scale,
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
@@ -123,18 +122,6 @@ _COVERAGE_GOAL = 0.93
 Cached = TypeVar("Cached")
 
 
-@dataclass(frozen=True)
-class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
-    results that were computed from this flight and others."""
-
-    samples: Samples
-    is_usable: NDArray[np.bool_]
-    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
-        default_factory=dict, repr=False, compare=False
-    )
-
-
 def _once(parts: Sequence[FitPart], key: tuple[object, ...], compute: Callable[[], Cached]) -> Cached:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
     cache = parts[0].result_cache
@@ -169,8 +156,8 @@ def usable_mask(samples: Samples) -> NDArray[np.bool_]:
 
 def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
-    h, L = choose_order(parts, vehicle)
-    model = _model_of_order(parts, vehicle, h, L)
+    bic = bic_by_order(parts, vehicle)
+    model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
     return _with_inflated_noise(parts, model) if model.noise_models else model
 
@@ -178,35 +165,26 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
 def refit(parts: Sequence[FitPart], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
     refitted = _model_of_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    inflation = {tuple(noise.ma_coefficients): noise.covariance_inflation for noise in model.noise_models}
-    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), inflation)
+    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), model.inflation_of)
 
 
-def _with_inflation(model: Model, inflation: dict[tuple[float, ...], float]) -> Model:
+def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
+    """The model with so many times as wide a noise of each moving average."""
     models = [
-        noise.model_copy(update={"covariance_inflation": inflation.get(tuple(noise.ma_coefficients), 1.0)})
+        noise.model_copy(update={"covariance_inflation": inflation_of(noise.ma_coefficients)})
         for noise in model.noise_models
     ]
     return model.model_copy(update={"noise_models": models})
 
 
-def _folds(
-    parts: Sequence[FitPart], model: Model, tied: list[float]
-) -> Iterator[tuple[Model, Sequence[FitPart]]]:
-    """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
-    held-out flights. tied: of all flights, as in `FittedRanges`."""
-    for fitted, rest in _splits(parts):
-        fold = refit(fitted, model)
-        fit = fit_order(fitted, model.vehicle, model.n_rate_lags, model.n_command_lags)
-        gain_sd = group_gain_sd(fit, model).tolist()
+def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
+    """For each part that is left out, a model fitted to others, with the standard errors of its gains, and
+    this part."""
+    tied = trust.tied_shares(parts, model).tolist()
+    for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
+        gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield fold.model_copy(update={"fitted_ranges": ranges}), rest
-
-
-def choose_order(parts: Sequence[FitPart], vehicle: Vehicle) -> tuple[int, int]:
-    """Past samples of rates and commands by the Bayesian information criterion."""
-    bic = bic_by_order(parts, vehicle)
-    return min(bic, key=lambda order: bic[order])
+        yield refit(fitted, model).model_copy(update={"fitted_ranges": ranges}), held_out
 
 
 def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
@@ -221,23 +199,26 @@ def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, 
     Zy = (Z / rms).T @ y
     yy = y.T @ y
     bic = {}
-    for h in RATE_LAGS:
-        for L in COMMAND_LAGS:
-            cols = _order_columns(vehicle, h, L)
-            C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
-            log_det = np.linalg.slogdet((yy - Zy[cols].T @ C) / len(y))[1]
-            bic[h, L] = len(y) * log_det + 3 * len(cols) * np.log(len(y))
+    for h, L in product(RATE_LAGS, COMMAND_LAGS):
+        cols = _order_columns(vehicle, h, L)
+        C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
+        log_det = np.linalg.slogdet((yy - Zy[cols].T @ C) / len(y))[1]
+        bic[h, L] = len(y) * log_det + 3 * len(cols) * np.log(len(y))
     return bic
 
 
-def _order_columns(vehicle: Vehicle, h: int, L: int) -> list[int]:
+def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
     """Columns of the largest design that an order has."""
-    signal = 1 + 3 * max(RATE_LAGS)
-    n = len(vehicle.regressor_columns)
-    command = signal + n * vehicle.n_signal_lags(max(RATE_LAGS))
-    firsts = [command + g * max(COMMAND_LAGS) for g in range(len(regression.group_surfaces(vehicle)))]
-    commands = [first + lag for first in firsts for lag in range(L)]
-    return [*range(1 + 3 * h), *range(signal, signal + n * vehicle.n_signal_lags(h)), *commands]
+    n, most = len(vehicle.regressor_columns), max(RATE_LAGS)
+    rates = np.arange(1 + 3 * most) < 1 + 3 * h
+    signals = np.arange(n * vehicle.n_signal_lags(most)) < n * vehicle.n_signal_lags(h)
+    commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
+    return np.flatnonzero(np.concatenate([rates, signals, commands]))
+
+
+def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
+    """Least squares of a model's order over all flights."""
+    return fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
 
 
 def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
@@ -269,13 +250,11 @@ def stack_data(
     most = max(RATE_LAGS + COMMAND_LAGS)
     Z, y, stretches = [], [], []
     for i, part in enumerate(parts):
-        samples = part.samples
-        X, U, ok = regression.build_regressors(samples, groups, h, L, True, vehicle.n_signal_lags(h))
-        used = part.is_usable & ok
+        X, U, used = part.regressors(groups, h, L, vehicle.n_signal_lags(h))
         used[:most] = False
-        n = len(X)
-        Z.append(samples.fit_weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
-        y.append(samples.fit_weight * samples.rates[used])
+        n, weight = len(X), part.samples.fit_weight
+        Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
+        y.append(weight * part.samples.rates[used])
         stretches.append(np.cumsum(np.diff(np.flatnonzero(used), prepend=0) > 1) + 1_000_000 * i)
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
@@ -303,47 +282,36 @@ def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> 
         response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
         noise=fit.residual_covariance.tolist(),
     )
-    model = model.model_copy(update={"noise_models": _fit_noise_models(parts, model)})
-    if not vehicle.other_laws:
-        return model
-    models = [_with_errors(parts, model, noise) for noise in model.noise_models]
-    return model.model_copy(update={"noise_models": models})
+    colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
+    noises = [_fit_noise_model(_parts_in(parts, ma), model, list(ma)) for ma in colours]
+    model = model.model_copy(update={"noise_models": noises})
+    if vehicle.other_laws:
+        noises = [_with_errors(_parts_in(parts, noise.ma_coefficients), model, noise) for noise in noises]
+    return model.model_copy(update={"noise_models": noises})
 
 
-def _fit_noise_models(parts: Sequence[FitPart], model: Model) -> list[NoiseModel]:
-    """The colours that flights are whitened by, with the noise of each."""
-    models = []
-    for ma in sorted({part.samples.noise_ma_coefficients for part in parts} - {()}):
-        pairs = [one_step_residual(model, part) for part in parts if part.samples.noise_ma_coefficients == ma]
-        models.append(_fit_noise_model(list(ma), pairs))
-    return models
-
-
-def _with_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise with how far a model may misread the groups' effects in it, and their usual quickness."""
-    shares, power = hidden_errors(parts, model, noise), usual_quick_power(parts, model, noise)
-    return noise.model_copy(update={"misread_shares": shares, "usual_quick_power": power})
-
-
-def _parts_in(parts: Sequence[FitPart], noise: NoiseModel) -> list[FitPart]:
-    """The parts that are whitened by this noise."""
-    return [part for part in parts if list(part.samples.noise_ma_coefficients) == noise.ma_coefficients]
-
-
-def usual_quick_power(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> float:
-    """The power of the quick part of the responses that the flights of one noise exceed in a tenth of their
+def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise of some flights with how far a model may misread the groups' effects in it, and with their
+    usual quickness: the power of the quick part of the responses that the flights exceed in a tenth of their
     samples, in variances of this noise."""
-    R = np.array(noise.residual_covariance)
-    responses = [whitened_residual(model, part)[2] for part in _parts_in(parts, noise)]
-    powers = [quick_power(F, R, model.rate_hz) for F in responses]
-    return float(np.quantile(np.concatenate(powers), _USUAL_SHARE))
+    powers = np.concatenate([part.innovations(model).quick_power(model.rate_hz) for part in own])
+    return noise.model_copy(
+        update={
+            "misread_shares": hidden_errors(own, model, noise),
+            "usual_quick_power": float(np.quantile(powers, _USUAL_SHARE)),
+        }
+    )
+
+
+def _parts_in(parts: Sequence[FitPart], ma: Sequence[float]) -> list[FitPart]:
+    """The parts that are whitened by this moving average."""
+    return [part for part in parts if part.samples.noise_ma_coefficients == tuple(ma)]
 
 
 def quick_error_share(parts: Sequence[FitPart], model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    pairs = [(fitted, held_out) for fitted, rest in _splits(parts) for held_out in rest]
-    squares = [_squared_quick_error(refit(fitted, model), held_out) for fitted, held_out in pairs]
+    squares = [_squared_quick_error(fold, held_out) for fold, held_out in held_out_folds(parts, model)]
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
@@ -355,21 +323,18 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
     with the variance r of the noise of this flight and the power of the quick responses.
     """
-    ma = held_out.samples.noise_ma_coefficients
-    _, e, F = whitened_residual(fold, held_out)
-    R = fold.covariance_of_noise(ma)
-    power = quick_power(F, R, fold.rate_hz)
-    unusual = power > fold.usual_quick_power(ma)
+    flight = held_out.innovations(fold)
+    power = flight.quick_power(fold.rate_hz)
+    unusual = power > fold.usual_quick_power(flight.ma)
     if unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
-    squares = ((e - np.median(e, axis=0)) @ W) ** 2
-    r = max(trust.residual_scale(squares), 1.0)
+    squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
+    r = max(regression.noise_scale(squares), 1.0)
     ratio = squares[unusual].mean(axis=1) / r
     return float(((ratio - 1.0) / power[unusual]).mean())
 
 
-def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
+def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
     """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
     standard deviation of an error that is anywhere below the largest.
 
@@ -378,9 +343,8 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
     axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
     """
-    own = _parts_in(parts, noise)
-    e = np.vstack([one_step_residual(model, flight)[1] for flight in own])
-    powers = [_centred(whitened_residual(model, flight)[2]) ** 2 for flight in own]
+    e = one_step_residuals(own, model)
+    powers = [_centred(part.innovations(model).F) ** 2 for part in own]
     r = np.diag(np.array(noise.residual_covariance))
     p = np.vstack(powers).mean(axis=0) / r
     q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
@@ -388,10 +352,11 @@ def hidden_errors(parts: Sequence[FitPart], model: Model, noise: NoiseModel) -> 
     return (most / np.sqrt(3.0)).tolist()
 
 
-def _fit_noise_model(ma: list[float], pairs: Sequence[tuple[NDArray[np.int64], Floats]]) -> NoiseModel:
-    """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
-    and the remaining noise; without a predictor where too few do."""
-    runs = [e[begin:end] for rows, e in pairs for begin, end in _row_runs(rows)]
+def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> NoiseModel:
+    """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
+    where samples follow one another; without a predictor where too few do."""
+    flights = [part.innovations(model) for part in own]
+    runs = [flight.e[begin:end] for flight in flights for begin, end in _row_runs(flight.rows)]
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
@@ -405,62 +370,33 @@ def _fit_noise_model(ma: list[float], pairs: Sequence[tuple[NDArray[np.int64], F
 
 def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
-    moving = model.vehicle.moving_air
-    delays_s = [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]
-    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if model.vehicle.other_laws else {}
-    if model.vehicle.other_laws and model.noise_models:
+    moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
+    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
+    if other_laws and model.noise_models:
         extra |= {"quick_error": quick_error_share(parts, model)}
-    labelled = _count_labelled_faults(parts, model)
-    if not labelled.levels:
-        return _unlabelled_settings(parts, model, extra, delays_s)
-    # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-    changes = (labelled.changes + 1) / labelled.hours
-    return FilterSettings(
-        levels=labelled.levels,
-        changes_per_hour=float(np.sqrt(changes * FilterSettings().effectiveness_changes_per_hour)),
-        **(_OTHER_DAYS | extra),
-        delays_s=delays_s,
-        repair_share=(labelled.repairs + _N_PRIOR_CHANGES / 2) / (labelled.changes + _N_PRIOR_CHANGES),
-        power=_POWER_LABELLED,
-    )
+    extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
+    surfaces = list(model.vehicle.surfaces)
+    alone = [group[0] for group in model.groups if len(group) == 1]
+    labelled = {name: _label_levels(parts, surfaces.index(name)) for name in alone}
+    faults = {name: {level for one in each for level in one if level < 1} for name, each in labelled.items()}
+    if levels := {name: sorted(seen) for name, seen in faults.items() if seen}:
+        changed_to = [level for each in labelled.values() for one in each for level in one[1:]]
+        n, hours = len(changed_to), sum(part.is_usable.sum() * part.samples.dt_s for part in parts) / 3600.0
+        # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
+        rate = np.sqrt((n + 1) / hours * FilterSettings().effectiveness_changes_per_hour)
+        repair_share = (changed_to.count(1.0) + _N_PRIOR_CHANGES / 2) / (n + _N_PRIOR_CHANGES)
+        seen = {"levels": levels, "changes_per_hour": float(rate), "repair_share": repair_share}
+        return FilterSettings(**(_OTHER_DAYS | extra | seen), power=_POWER_LABELLED)
+    extra |= {"trim_walk": _estimate_trim_walk(parts, model)}
+    drifting = model.model_copy(update={"settings": FilterSettings(**extra)})
+    most = (1.0 if moving else _POWER_OTHER_LAWS) if other_laws else _POWER_UNLABELLED
+    return FilterSettings(**extra, power=min(most, 1.0 / gain_overdispersion(parts, drifting)))
 
 
-class _LabelledFaults(NamedTuple):
-    """What the labels of the flights say: levels of effectiveness below 1 seen of each group that is a single
-    surface, how often a level changed, how often to 1, and the hours of usable rows."""
-
-    levels: dict[str, list[float]]
-    changes: int
-    repairs: int
-    hours: float
-
-
-def _count_labelled_faults(parts: Sequence[FitPart], model: Model) -> _LabelledFaults:
-    levels = dict[str, list[float]]()
-    changes = 0
-    repairs = 0
-    names = list(model.vehicle.surfaces)
-    for group in model.groups:
-        if len(group) > 1:
-            continue
-        sequences = [_label_levels(part, names.index(group[0])) for part in parts]
-        faults = {level for sequence in sequences for level in sequence if level < 1.0}
-        if faults:
-            levels[group[0]] = sorted(faults)
-        changes += sum(max(len(sequence) - 1, 0) for sequence in sequences)
-        repairs += sum(int(level == 1.0) for sequence in sequences for level in sequence[1:])
-    usable_s = sum(part.is_usable.sum() * part.samples.dt_s for part in parts)
-    return _LabelledFaults(levels, changes, repairs, float(usable_s / 3600.0))
-
-
-def _unlabelled_settings(
-    parts: Sequence[FitPart], model: Model, extra: dict[str, Any], delays_s: list[float]
-) -> FilterSettings:
-    walk = _estimate_trim_walk(parts, model)
-    drifting = model.model_copy(update={"settings": FilterSettings(trim_walk=walk, **extra)})
-    most = (1.0 if model.vehicle.moving_air else _POWER_OTHER_LAWS) if extra else _POWER_UNLABELLED
-    power = min(most, 1.0 / gain_overdispersion(parts, drifting))
-    return FilterSettings(**extra, power=power, trim_walk=walk, delays_s=delays_s)
+def _label_levels(parts: Sequence[FitPart], i: int) -> list[list[float]]:
+    """The levels of one surface's label in their order, edges left out, of each flight."""
+    labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
+    return [[round(level, 6) for level, _ in groupby(one[np.isfinite(one)].tolist())] for one in labels]
 
 
 def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
@@ -473,19 +409,43 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    pairs = [(part.samples, part.is_usable) for part in parts]
-    total = n = float(len(model.groups))
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
-        known = np.array(trust.known_effects(fold))
-        for held_out in rest:
-            F, e = _standardized(fold, held_out)
-            if not len(e):  # a part without a residual shows no gain
-                continue
-            S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-            error, rank = _error_and_rank(F.sum(axis=3)[:, :, known].reshape(e.size, -1), e.ravel(), S)
-            total = total + error
-            n = n + rank
-    return total / n
+    errors = [(float(len(model.groups)), len(model.groups))]
+    for fold, held_out in held_out_folds(parts, model):
+        errors += _gain_errors(fold, held_out)
+    return sum(error for error, _ in errors) / sum(n for _, n in errors)
+
+
+def _gain_errors(
+    fold: Model, held_out: FitPart, window_s: float | None = None, loudness: float = 1.0
+) -> list[tuple[float, int]]:
+    """Squares of the errors g of the groups' gains that a part left out tells, in their covariance and what
+    the filter leaves free, S, and how many gains there are; of each window, with a gain for each axis of an
+    answer, where there are windows. loudness: variance of the noise, where the filter itself widens it.
+
+        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
+    """
+    known = np.array(trust.known_effects(fold))
+    F, e = _standardized(fold, held_out)
+    if not len(e):  # a part without a residual shows no gain
+        return []
+    P = build_states(fold, held_out.samples.noise_ma_coefficients).initial_covariance[3:, 3:]
+    S = np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
+    F, n = F[:, :, known], 1
+    if window_s is None:
+        F = F.sum(axis=3)
+    else:
+        F, S = F.reshape(*e.shape, -1), np.kron(S, np.ones((3, 3)))
+        n = max(round(len(e) * held_out.samples.dt_s / window_s), 1)
+    errors = []
+    for rows in np.array_split(np.arange(len(e)), n):
+        Fw, ew = (_centred(values[rows]) / np.sqrt(loudness) for values in (F, e))
+        Fw = Fw.reshape(ew.size, -1)
+        FF, Fe = Fw.T @ Fw, Fw.T @ ew.ravel()
+        g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+        A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
+        error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
+        errors.append((error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))))
+    return errors
 
 
 def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
@@ -493,40 +453,23 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
     windows: dict[tuple[float, ...], list[float]] = {}
-    pairs = [(part.samples, part.is_usable) for part in parts]
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
-        others = [flight for flight in parts if all(flight is not held_out for held_out in rest)]
-        for held_out in rest:
-            found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
-            found.extend(_window_inflations(fold, held_out, others))
+    rest = validation_folds(parts, _MAX_SPLITS)
+    for (fold, held_out), (fitted, _, _) in zip(held_out_folds(parts, model), rest, strict=True):
+        found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
+        found.extend(_window_inflations(fold, held_out, fitted if len(parts) > 1 else parts))
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
-    if model.vehicle.other_laws:
+    for ma in inflation if model.vehicle.other_laws else ():
         # a gyro's noise takes from the next sample what it added to one
-        factors = {ma: _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR for ma in inflation}
-        inflation = {ma: value * factors[ma] for ma, value in inflation.items()}
-    return _with_inflation(model, inflation)
+        inflation[ma] *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
+    return _with_inflation(model, lambda ma: inflation.get(tuple(ma), 1.0))
 
 
 def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> list[float]:
     """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
     filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
     others (`recent_scale`): what it widens by itself is not counted again."""
-    known = np.array(trust.known_effects(fold))
-    F, e = _standardized(fold, held_out)
-    if not len(e):  # a part without a residual shows no gain
-        return []
-    S = _prior_covariance(fold, known, held_out.samples.noise_ma_coefficients)
-    S3 = np.asarray(np.kron(S, np.ones((3, 3))), dtype=float)
-    F = F[:, :, known].reshape(*e.shape, -1)
-    loudness = _loudness(fold, held_out, others)
-    n = max(round(len(e) * held_out.samples.dt_s / _GAIN_WINDOW_S), 1)
-    inflations = []
-    for rows in np.array_split(np.arange(len(e)), n):
-        Fw = _centred(F[rows]) / np.sqrt(loudness)
-        ew = _centred(e[rows]) / np.sqrt(loudness)
-        error, rank = _error_and_rank(Fw.reshape(ew.size, -1), ew.ravel(), S3)
-        inflations.append(min(error / max(rank, 1), _MAX_INFLATION))
-    return inflations
+    errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, _loudness(fold, held_out, others))
+    return [min(error / max(n, 1), _MAX_INFLATION) for error, n in errors]
 
 
 def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> float:
@@ -537,44 +480,20 @@ def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> floa
 
     def scale(flight: FitPart) -> float:
         _, e = _standardized(fold, flight)
-        scales = recent_scale(e, np.ones(len(e), dtype=bool), np.eye(3), fold.rate_hz)
+        scales = recent_scale(e, np.ones(len(e), dtype=bool), fold.rate_hz)
         return float(scales.mean()) if len(scales) else 1.0
 
-    ma = held_out.samples.noise_ma_coefficients
-    scales = [scale(flight) for flight in others if flight.samples.noise_ma_coefficients == ma]
+    scales = [scale(flight) for flight in _parts_in(others, held_out.samples.noise_ma_coefficients)]
     return max(scale(held_out) / max([1.0, *scales]), 1.0)
-
-
-def _prior_covariance(model: Model, known: NDArray[np.bool_], ma: tuple[float, ...]) -> Floats:
-    """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    P = build_states(model, ma).initial_covariance[3:, 3:]
-    return np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
-
-
-def _error_and_rank(F: Floats, e: Floats, S: Floats) -> tuple[float, int]:
-    """Square of the error g of the gains that a residual e (m,) tells by F (m, G), in their covariance and
-    what lies between flights, and how many gains there are:
-
-        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
-    """
-    FF = F.T @ F
-    Fe = F.T @ e
-    g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
-    A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
-    error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
-    return error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))
 
 
 def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
     """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
     those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
-    _, e, F = whitened_residual(model, held_out)
-    ma = held_out.samples.noise_ma_coefficients
-    q = np.sqrt(quick_scale(F, model, ma))
-    R = model.with_noise_of(ma).residual_covariance
-    W = np.linalg.inv(np.linalg.cholesky(np.array(R))).T
-    Fw = np.einsum("nga,ab->nbga", F, W)
-    return _centred(Fw) / q[:, None, None, None], _centred(e @ W) / q[:, None]
+    flight = held_out.innovations(model)
+    sd = np.sqrt(flight.inflation * flight.quick_scale(model))[:, None]
+    F = np.einsum("nga,ab->nbga", flight.F, flight.W)
+    return _centred(F) / sd[:, :, None, None], _centred(flight.e @ flight.W) / sd
 
 
 def _centred(values: Floats) -> Floats:
@@ -591,17 +510,14 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     sums = np.zeros((2, 3))
     counts = np.zeros(2)
     spans = np.round(np.array(_TRIM_SPANS_S) * model.rate_hz)
-    for fitted, rest in _splits(parts):
-        fold = refit(fitted, model)
-        for held_out in rest:
-            rows, e, _ = whitened_residual(fold, held_out)
-            R = np.array(fold.with_noise_of(held_out.samples.noise_ma_coefficients).residual_covariance)
-            g = e / np.sqrt(np.maximum(np.diag(R), MIN_DIVISOR))
-            for begin, end in _row_runs(rows):
-                for i, n in enumerate(spans.astype(int).tolist()):
-                    means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
-                    sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
-                    counts[i] += max(len(means) - 1, 0)
+    for fold, held_out in held_out_folds(parts, model):
+        flight = held_out.innovations(fold)
+        g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
+        for begin, end in _row_runs(flight.rows):
+            for i, n in enumerate(spans.astype(int).tolist()):
+                means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
+                sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
+                counts[i] += max(len(means) - 1, 0)
     usual = np.array(FilterSettings().trim_step_sd)
     if not counts.all():
         return usual.tolist()
@@ -617,19 +533,21 @@ def _row_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _label_levels(part: FitPart, i: int) -> list[float]:
-    """The levels of one surface's label in their order, edges left out."""
-    labels = part.samples.labels[:, i][part.is_usable]
-    return [round(level, 6) for level, _ in groupby(labels[np.isfinite(labels)].tolist())]
-
-
-def validation_folds(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], FitPart, str]]:
-    """Return the fitted flights, the held-out one and its name, for each fold."""
-    if len(parts) > 1:
-        return [([part for part in parts if part is not one], one, one.samples.name) for one in parts]
-    (whole,) = parts
-    first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
-    return [([first], second, "second half"), ([second], first, "first half")]
+def validation_folds(
+    parts: Sequence[FitPart], most: int | None = None
+) -> list[tuple[list[FitPart], FitPart, str]]:
+    """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
+    more than `most` every so many at once."""
+    if len(parts) == 1:
+        (whole,) = parts
+        first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
+        return [([first], second, "second half"), ([second], first, "first half")]
+    n = min(len(parts), most or len(parts))
+    return [
+        ([part for i, part in enumerate(parts) if i % n != k], one, one.samples.name)
+        for k in range(n)
+        for one in parts[k::n]
+    ]
 
 
 def _split_in_halves(part: FitPart) -> tuple[FitPart, FitPart]:
@@ -641,58 +559,35 @@ def _split_in_halves(part: FitPart) -> tuple[FitPart, FitPart]:
 
 
 def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
-    """The model with what it was fitted on, and how it did on parts that were left out: at which evidence of
-    a fault they would alarm as often as declared."""
-    pairs = [(part.samples, part.is_usable) for part in parts]
-    held_out = _test_held_out(parts, model, pairs)
-    fit = fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    variance = np.zeros(len(model.groups))
+    """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
+    evidence of a fault they would alarm as often as declared."""
+    misread = 0.0
+    peaks = list[extremes.PeaksAndHours]()
+    deviations = list[Floats]()
+    for fold, held_out in held_out_folds(parts, model):
+        if len(peaks) < _N_MISTAKE_TESTS:
+            misread = max(misread, _misread_gain(fold, held_out))
+        peaks.append(_healthy_peaks(fold, held_out))
+        if len(parts) > 1 and model.vehicle.other_laws:
+            deviations.append(_squared_deviations(fold, held_out))
+    variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
-        variance = _gain_variance_between_laws(_max_gain_bias(parts, model), held_out.squared_gain_deviations)
-    gain_sd = np.minimum(np.sqrt(group_gain_sd(fit, model) ** 2 + variance), _GAIN_SD_CAP)
-    tail = extremes.fit_peak_tail(held_out.peaks_and_hours)
-    ranges = trust.compute_fitted_ranges(pairs, model, gain_sd).model_copy(
-        update={"alarm_peak_tail": tail, "misread_gain": held_out.misread_gain}
+        # how far another flight's gains may be before any is left out counts as one flight
+        variance += np.nanmean([_max_gain_bias(parts, model) ** 2, *deviations], axis=0)
+    gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
+    tail = extremes.fit_peak_tail(peaks)
+    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
+        update={"alarm_peak_tail": tail, "misread_gain": misread}
     )
-    rate, threshold = _alarm_rate_and_threshold(model, tail, held_out.peaks_and_hours)
+    rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
     alarm = {"false_alarms_per_hour": rate, "alarm_threshold": threshold}
     return model.model_copy(
         update={
             "fitted_ranges": ranges,
             "settings": model.settings.model_copy(update=alarm),
-            "identification_results": dict(_cross_validate(held_out.peaks_and_hours, rate, model)),
+            "identification_results": dict(_cross_validate(peaks, rate, model)),
         }
     )
-
-
-class _HeldOut(NamedTuple):
-    """How models of parts of the flights did on the parts that were left out.
-
-    misread_gain: largest gain, a sample, of reading the columns by mistake.
-    peaks_and_hours: peaks of the evidence of a fault, and hours of health, of each part.
-    squared_gain_deviations: of each part (G,), beyond what noise explains; empty under one law.
-    """
-
-    misread_gain: float
-    peaks_and_hours: list[extremes.PeaksAndHours]
-    squared_gain_deviations: list[Floats]
-
-
-def _test_held_out(
-    parts: Sequence[FitPart], model: Model, pairs: Sequence[tuple[Samples, NDArray[np.bool_]]]
-) -> _HeldOut:
-    """Fit the model without each part of the flights in turn, and test it on that part."""
-    misread = 0.0
-    peaks = list[extremes.PeaksAndHours]()
-    deviations = list[Floats]()
-    for fold, rest in _folds(parts, model, trust.tied_shares(pairs, model).tolist()):
-        for held_out in rest:
-            if len(peaks) < _N_MISTAKE_TESTS:
-                misread = max(misread, _misread_gain(fold, held_out))
-            peaks.append(_healthy_peaks(fold, held_out))
-            if len(parts) > 1 and model.vehicle.other_laws:
-                deviations.append(_squared_deviations(fold, held_out))
-    return _HeldOut(misread, peaks, deviations)
 
 
 def _alarm_rate_and_threshold(
@@ -703,7 +598,7 @@ def _alarm_rate_and_threshold(
     requested = model.vehicle.false_alarms_per_hour
     target = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.likely_levels else requested
     if tail is None and requested is not None:
-        minutes = _healthy_minutes(peaks)
+        minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
         allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
         raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
@@ -721,13 +616,13 @@ def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
         return np.zeros(len(model.groups))
     share = 0.0
     for noise in model.noise_models:
-        e = np.vstack([one_step_residual(model, part)[1] for part in _parts_in(parts, noise)])
+        e = one_step_residuals(_parts_in(parts, noise.ma_coefficients), model)
         chance = 3.0 * AR_ORDER / len(e) if noise.ar_coefficients else 0.0
         log_det = np.linalg.slogdet(np.array(noise.residual_covariance))[1]
         log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
         share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
-    power = trust.untied_power([(part.samples, part.is_usable) for part in parts], model)
-    return np.minimum(np.sqrt(3.0 * share / np.maximum(power, MIN_DIVISOR)), _GAIN_SD_CAP)
+    untied = trust.effect_powers(parts, model)[1]
+    return np.minimum(np.sqrt(3.0 * share / np.maximum(untied, MIN_DIVISOR)), _GAIN_SD_CAP)
 
 
 def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
@@ -743,15 +638,6 @@ def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     if known.any():  # a part without a residual shows the effect of no group
         squares[known] = np.maximum(g**2 - np.diag(P) * max(float((e**2).mean()), 1.0), 0.0)
     return squares
-
-
-def _gain_variance_between_laws(prior: Floats, deviations: Sequence[Floats]) -> Floats:
-    """Variance of each group's gain from a flight to one of another law, (G,).
-
-    prior: how far another flight's gains may be before any is left out, which counts as one flight;
-    deviations: squares of how far those of flights left out were.
-    """
-    return np.asarray(np.nanmean([prior**2, *deviations], axis=0))
 
 
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
@@ -771,10 +657,6 @@ def _misread_gain(model: Model, held_out: FitPart) -> float:
     return max(0.0, *gains.values()) if gains else 0.0
 
 
-def _healthy_minutes(peaks: Sequence[extremes.PeaksAndHours]) -> float:
-    return 60.0 * sum(hours for _, hours in peaks)
-
-
 def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
@@ -783,12 +665,11 @@ def _cross_validate(
     tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
     if target is None or len(flights) < 2 or not all(tails):
         return {}
-    thresholds = [_choose_threshold(tail, target, model) for tail in tails if tail]
-    pairs = zip(flights, thresholds, strict=True)
-    counts = [int((peaks >= threshold).sum()) for (peaks, _), threshold in pairs]
+    pairs = zip(flights, tails, strict=True)
+    counts = [int((peaks >= _choose_threshold(tail, target, model)).sum()) for (peaks, _), tail in pairs]
     return {
         "parts": len(flights),
-        "minutes": _healthy_minutes(flights),
+        "minutes": 60.0 * sum(hours for _, hours in flights),
         "alarmed": sum(n > 0 for n in counts),
         "alarms": sum(counts),
     }
@@ -806,14 +687,6 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
 
 
-def _splits(parts: Sequence[FitPart]) -> list[tuple[list[FitPart], list[FitPart]]]:
-    """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
-    if len(parts) == 1:
-        return [(fitted, [held_out]) for fitted, held_out, _ in validation_folds(parts)]
-    n = min(len(parts), _MAX_SPLITS)
-    return [([part for i, part in enumerate(parts) if i % n != k], list(parts[k::n])) for k in range(n)]
-
-
 def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
@@ -822,22 +695,23 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     Responses z with errors of covariance C tell their factor with the variance 1 / (z' C^-1 z), both in the
     standard errors s (L, 3) of the coefficients; b (3,) is the sum over lags, in sd of the noise.
     """
-    n = len(model.groups)
-    L = model.n_command_lags
+    n, L = len(model.groups), model.n_command_lags
     first = len(fit.coefficients) - n * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
-    relative = np.zeros(n)
-    information = np.full(n, MIN_DIVISOR)
+    gain_sd = np.zeros(n)
     for g in range(n):
         rows = slice(first + g * L, first + (g + 1) * L)
         C = fit.coefficient_error_correlation[rows, rows]
         s = fit.standard_errors[rows] / sd
-        b = fit.coefficients[rows].sum(axis=0) / sd
-        v = np.einsum("la,lm,ma->a", s, C, s)
-        relative[g] = np.sqrt(b**2 @ np.maximum(v, 0.0)) / max(float(b @ b), MIN_DIVISOR)
-        z = fit.coefficients[rows] / sd / np.maximum(s, MIN_DIVISOR)
-        information[g] += np.einsum("la,lm,ma->", z, np.linalg.pinv(C, rcond=_RANK_TOLERANCE), z)
-    return np.minimum(1.0 / np.sqrt(information) if model.vehicle.other_laws else relative, _GAIN_SD_CAP)
+        if model.vehicle.other_laws:
+            z = fit.coefficients[rows] / sd / np.maximum(s, MIN_DIVISOR)
+            information = np.einsum("la,lm,ma->", z, np.linalg.pinv(C, rcond=_RANK_TOLERANCE), z)
+            gain_sd[g] = 1.0 / np.sqrt(MIN_DIVISOR + information)
+        else:
+            b = fit.coefficients[rows].sum(axis=0) / sd
+            v = np.einsum("la,lm,ma->a", s, C, s)
+            gain_sd[g] = np.sqrt(b**2 @ np.maximum(v, 0.0)) / max(float(b @ b), MIN_DIVISOR)
+    return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
 def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
@@ -850,32 +724,30 @@ def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
 
 def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
-    entries: list[Document] = []
+    entries = fold_qualities(parts, model)
+    usual = model.settings.credible_mass
     coverage: list[list[float]] = []
-    for fitted, held_out, name in validation_folds(parts):
-        fold = refit(fitted, model)
-        entry: Document = {"left_out": name, **prediction_quality(fold, held_out)}
+    for entry, (fitted, held_out, _) in zip(entries, validation_folds(parts), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            rows = _rows_by_mass(fold, held_out)
-            entry["score"] = score_against_labels(rows[model.settings.credible_mass], labels)
-            scores = [score_against_labels(rows[mass], labels) for mass in _CREDIBLE_MASSES]
-            coverage.append([score["held_by_bounds"] for score in scores])
-        entries.append(entry)
+            scores = _scores_by_mass(refit(fitted, model), held_out, labels)
+            entry["score"] = scores[usual]
+            coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
     if not coverage:
-        return entries, model.settings.credible_mass
+        return entries, usual
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
 
 
-def _rows_by_mass(model: Model, held_out: FitPart) -> dict[float, LogRows]:
+def _scores_by_mass(model: Model, held_out: FitPart, labels: Floats) -> dict[float, Document]:
     bank = build_bank(model)
     p, _, _ = bank_posterior(held_out.samples, model, bank)
-    rows = {}
+    scores = {}
     for mass in {*_CREDIBLE_MASSES, model.settings.credible_mass}:
         settings = model.settings.model_copy(update={"credible_mass": mass})
         candidate = model.model_copy(update={"settings": settings})
-        rows[mass] = rows_of_posterior(held_out.samples, candidate, bank, p)
-    return rows
+        rows = rows_of_posterior(held_out.samples, candidate, bank, p)
+        scores[mass] = score_against_labels(rows, labels)
+    return scores
 
 
 def prediction_quality(model: Model, held_out: FitPart) -> Document:
@@ -892,17 +764,12 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     }
 
 
-def whitened_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Places (n,) of the samples in use, the unpredicted part e (n, 3) of the residual, and the answers F
-    (n, G, 3) as they show in it."""
-    ok, y, F = regression.whitened_rates(part.samples, model, labelled=True)
-    rows = np.flatnonzero(part.is_usable & ok)
-    intercept = model.whitened_intercept(part.samples.noise_ma_coefficients)
-    return rows, (y - F.sum(axis=1) - intercept)[rows], F[rows]
-
-
 def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:
-    """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    ok, y, F = regression.unexplained_rates(part.samples, model, labelled=True)
-    rows = np.flatnonzero(part.is_usable & ok)
-    return rows, (y - F.sum(axis=1) - np.array(model.intercept))[rows]
+    """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
+    flight = part.innovations(model.model_copy(update={"noise_models": []}))
+    return flight.rows, flight.e
+
+
+def one_step_residuals(parts: Sequence[FitPart], model: Model) -> Floats:
+    """The same of several flights, one after the other, (n, 3)."""
+    return np.vstack([one_step_residual(model, part)[1] for part in parts])

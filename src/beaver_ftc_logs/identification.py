@@ -6,6 +6,7 @@ covariance, ma and ar the colour of the noise. V0 is the airspeed at which the c
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import product
 from math import isfinite
 from typing import Any
 
@@ -88,7 +89,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     for ma in UNFITTED_MA:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
-            e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+            e = fitting.one_step_residuals(parts, model)
             models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
     for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
@@ -202,62 +203,48 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
 
 def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
-    known and this explains more; else both as they are."""
-    unset = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
-    scaled, other = _scale_flights(flights, assume_law_and_air(flights, vehicle)[0] if unset else vehicle)
-    return scaled, other.model_copy(update=unset) if unset else other
-
-
-def _scale_flights(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
-    known = [flight.airspeed for flight in flights if flight.airspeed is not None]
-    V = np.concatenate([np.empty(0), *known])
+    known and this explains more; else both as they are. Where other laws may fly, each group of surfaces with
+    the power of the airspeed that explains most; another than that of the pressure must explain decisively
+    more."""
+    V = np.concatenate([np.empty(0), *(flight.airspeed for flight in flights if flight.airspeed is not None)])
     V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
     if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:
         return flights, vehicle
-    other = vehicle.model_copy(update={"reference_airspeed_mps": V0})
-    scaled = _scaled(flights, other)
-    if _min_bic(flights, vehicle) - _min_bic(scaled, other) < _DECISIVE_BIC:
+    unset = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
+    assumed, _ = assume_law_and_air(flights, vehicle)
+    best = assumed.model_copy(update={"reference_airspeed_mps": V0})
+    if _min_bic(flights, assumed) - _min_bic(_scaled(flights, best), best) < _DECISIVE_BIC:
         return flights, vehicle
-    return _scale_powers(flights, other) if vehicle.other_laws else (scaled, other)
+    if best.other_laws:
+        # a criterion believes each sample, as only white noise lets it
+        white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
+        least = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
+        names = list(best.surfaces)
+        for group, power in product(regression.group_surfaces(best), _AIRSPEED_POWERS):
+            powers = best.airspeed_powers | {names[i]: power for i in group}
+            candidate = best.model_copy(update={"airspeed_powers": powers})
+            if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < least:
+                least, best = bic, candidate
+    return _scaled(flights, best), best.model_copy(update=unset)
 
 
-def _scaled(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
-    """Flights with commands times the airspeed over V0 to the power of each surface."""
-    V0 = vehicle.reference_airspeed_mps or 0.0
-    powers = vehicle.surface_airspeed_powers
-    return [scale_by_airspeed(flight, V0, powers) for flight in flights]
+def _scaled(
+    flights: Sequence[Samples], vehicle: Vehicle, white: Sequence[Samples] | None = None
+) -> list[Samples]:
+    """Flights with commands times the airspeed over V0 to the power of each surface; whitened as those are
+    that are given."""
+    V0, powers = vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
+    scaled = [scale_by_airspeed(flight, V0, powers) for flight in flights]
+    if white is None:
+        return scaled
+    pairs = zip(scaled, white, strict=True)
+    return [whiten_samples(flight, one.noise_ma_coefficients, one.fit_weight) for flight, one in pairs]
 
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     """The least Bayesian information criterion of any order."""
     return min(fitting.bic_by_order(fitting.fit_parts(flights), vehicle).values())
-
-
-def _scale_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
-    """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
-    linkages change the square. Another than that must explain decisively more."""
-    # a criterion believes each sample, as only white noise lets it
-    whitened = whiten_flights(_scaled(flights, vehicle), vehicle)
-
-    def bic_of(other: Vehicle) -> float:
-        scaled = _scaled(flights, other)
-        if vehicle.moving_air:
-            scaled = [
-                whiten_samples(flight, white.noise_ma_coefficients, white.fit_weight)
-                for flight, white in zip(scaled, whitened, strict=True)
-            ]
-        return _min_bic(scaled, other)
-
-    least = bic_of(vehicle) - _DECISIVE_BIC
-    names = list(vehicle.surfaces)
-    for group in regression.group_surfaces(vehicle):
-        for power in _AIRSPEED_POWERS:
-            powers = vehicle.airspeed_powers | {names[i]: power for i in group}
-            candidate = vehicle.model_copy(update={"airspeed_powers": powers})
-            if (bic := bic_of(candidate)) < least:
-                least, vehicle = bic, candidate
-    return _scaled(flights, vehicle), vehicle
 
 
 def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], model: Model) -> None:
@@ -268,13 +255,17 @@ def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], mod
     means = {axis: float(np.average(values, weights=counts)) for axis, values in shares.items() if known}
     if unexplained := {axis: share for axis, share in means.items() if share <= 0.0}:
         minutes = sum(int(part.is_usable.sum()) * part.samples.dt_s for part in parts) / 60.0
-        stillest = min(_command_sds(parts, model).items(), key=lambda pair: pair[1])
+        commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
+        sds = dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
+        stillest = min(sds, key=lambda name: sds[name])
+        prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
+        notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
         raise BadInput(
             f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
             f"than the mean does ({_axis_text(unexplained)}), allowed: a model that explains more; what "
-            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest[0]} has a "
-            f"standard deviation of {stillest[1]:.2g}), or the commands that this vehicle follows"
-            f"{_mistakes_text(parts, model)}"
+            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest} has a "
+            f"standard deviation of {sds[stillest]:.2g}), or the commands that this vehicle follows"
+            + "".join(f"; {note}" for note in notes)
         )
 
 
@@ -284,19 +275,6 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
         trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
-
-
-def _mistakes_text(parts: Sequence[fitting.FitPart], model: Model) -> str:
-    """Return the mistakes found in the rates when the log was read, each after a semicolon."""
-    prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
-    notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
-    return "".join(f"; {note}" for note in notes)
-
-
-def _command_sds(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
-    """Standard deviation of each surface's command."""
-    commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
-    return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
 def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
@@ -314,23 +292,27 @@ def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Docu
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    rates = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
-    lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
-    signals = [f"{name}[-{k}]" for k in lags for name in model.vehicle.regressor_columns]
-    lags = range(1, model.n_command_lags + 1)
-    return rates + signals + [f"command of {'+'.join(group)}[-{k}]" for group in model.groups for k in lags]
+    h = model.n_rate_lags
+    signals = model.vehicle.regressor_columns
+    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
+    lagged = [
+        ("pqr", h),
+        (signals, model.vehicle.n_signal_lags(h)),
+        *((one, model.n_command_lags) for one in commands),
+    ]
+    return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
 def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    fit = fitting.fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    first = len(fit.standard_error_inflation) - len(model.groups) * model.n_command_lags
-    return dict(zip("pqr", np.median(fit.standard_error_inflation[first:], axis=0).tolist(), strict=True))
+    n = len(model.groups) * model.n_command_lags
+    inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
+    return dict(zip("pqr", np.median(inflation, axis=0).tolist(), strict=True))
 
 
 def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = np.vstack([fitting.one_step_residual(model, part)[1] for part in parts])
+    e = fitting.one_step_residuals(parts, model)
     f, density = spectral_density(e, 1.0 / model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []
@@ -460,7 +442,10 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
         return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
     fitted, held_out = slice(0, None, 2), slice(1, None, 2)
     sd = y.std(axis=(0, 1))
-    guess, lower, upper = _guess_and_bounds(len(groups), dt_s)
+    # lag, delay, A, B and c
+    guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
+    free = np.full(len(guess) - 2, np.inf)
+    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
 
     def error(th: Floats, rows: slice) -> Floats:
         return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
@@ -485,29 +470,19 @@ def _cut_windows(
     parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
 ) -> tuple[Floats, Floats]:
     """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
-    u, y = [], []
+    windows = []
     for part in parts:
         samples = part.samples
         effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        commands = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
-        ok = part.is_usable & np.isfinite(commands).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
-        for end in range(past + n, len(ok), n):
+        u = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
+        known = part.is_usable & np.isfinite(u).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
+        for end in range(past + n, len(u), n):
             rows = slice(end - past - n, end)
-            if ok[rows].all() and samples.stretch_number[rows.start] == samples.stretch_number[end - 1]:
-                u.append(commands[rows])
-                y.append(samples.rates[end - n : end])
-    step = max(len(y) // _MIN_FREE_RUNS, 1)
-    shape = (-1, past + n, len(groups))
-    return np.reshape(u[::step], shape), np.reshape(y[::step], (-1, n, 3))
-
-
-def _guess_and_bounds(n: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
-    """First guess and bounds of lag, delay, A, B and c."""
-    guess = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n, 0.01), *np.zeros(3)]
-    inf = np.full(len(guess) - 2, np.inf)
-    lower = [_MIN_SERVO_LAG_S, 0.0, *-inf]
-    upper = [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *inf]
-    return np.array(guess), np.array(lower), np.array(upper)
+            if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
+                windows.append((u[rows], samples.rates[end - n : end]))
+    chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
+    u, y = ([window[i] for window in chosen] for i in (0, 1))
+    return np.reshape(u, (-1, past + n, len(groups))), np.reshape(y, (-1, n, 3))
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:

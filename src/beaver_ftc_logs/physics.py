@@ -48,46 +48,31 @@ class AngleFit:
         return self.n_windows >= _MIN_MANY_WINDOWS
 
 
-def fit_roll(gyros: list[Column], roll: Column, pitch: Column | None) -> AngleFit | None:
-    """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
+def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: int) -> AngleFit | None:
+    """How one of roll, pitch and yaw follows the rates, all as the log says, the rates in one unit; None
+    where too little moves, or this angle or roll is not known.
 
     Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
-    t = gyros[0].t_s
+    roll, pitch, _ = angles
+    angle, t = angles[axis], gyros[0].t_s
+    if roll is None or angle is None:
+        return None
     p, q, r = (_interpolate(gyro, t) for gyro in gyros)
-    angle = _interpolate(roll, t)
-    circle = _full_circle(roll.values)
     # The circle is known whatever the unit.
-    phi = angle * 2.0 * np.pi / circle
-    terms, theta = [p], None
+    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
+    theta = None
     if pitch is not None:
-        theta = _pitch_rad(roll, pitch, t)
-        terms += [np.tan(theta) * q * np.sin(phi), np.tan(theta) * r * np.cos(phi)]
-    return _fit_angle(t, angle, terms, circle, theta)
-
-
-def fit_pitch(gyros: list[Column], roll: Column, pitch: Column) -> AngleFit | None:
-    """How the pitch angle follows the rates, as `fit_roll`."""
-    t = gyros[0].t_s
-    _, q, r = (_interpolate(gyro, t) for gyro in gyros)
-    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    return _fit_angle(t, _interpolate(pitch, t), [q * np.cos(phi), -r * np.sin(phi)])
-
-
-def fit_yaw(gyros: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> AngleFit | None:
-    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a turn changes both
-    alike."""
-    t = gyros[0].t_s
-    _, q, r = (_interpolate(gyro, t) for gyro in gyros)
-    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    theta = np.zeros(len(t)) if pitch is None else _pitch_rad(roll, pitch, t)
-    psi_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
-    return _fit_angle(t, _interpolate(yaw, t), [psi_rate], _full_circle(yaw.values), theta)
-
-
-def _pitch_rad(roll: Column, pitch: Column, t: Floats) -> Floats:
-    """The pitch angle at given times, rad, of two angles in one unit."""
-    return _interpolate(pitch, t) * 2.0 * np.pi / _full_circle(np.append(4.0 * pitch.values, roll.values))
+        circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
+        theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
+    turn = [q * np.sin(phi), r * np.cos(phi)]
+    if axis == 0:
+        terms = [p] if theta is None else [p, *(np.tan(theta) * part for part in turn)]
+    elif axis == 1:
+        return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
+    else:
+        terms = [sum(turn) / (1.0 if theta is None else np.cos(theta))]
+    return _fit_angle(t, _interpolate(angle, t), terms, _full_circle(angle.values), theta)
 
 
 def _fit_angle(
@@ -159,57 +144,50 @@ def attitude_mistake(
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
     rate."""
-    gyros = list(named.values())
     for axis, (rate, angle) in enumerate(zip(named, angles, strict=True)):
         if angle is None:
             continue
-        if axis == 1 and (remark := pitch_remark(angle[1], angle[0])):
+        if axis == 1 and (remark := _pitch_remark(*angle)):
             return remark
-        fit = _fit_axis(gyros, angles, axis)
+        fit = _fit_with(named, angles, axis, named[rate])
         if fit is None:
             continue
         for name, column in {**named, **others}.items():
-            trial = _fit_axis([*gyros[:axis], column, *gyros[axis + 1 :]], angles, axis)
+            trial = _fit_with(named, angles, axis, column)
             if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
                 return (
                     f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
                     f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
                 )
-        remark = factor_remark(fit, rate, angle[0]) or _exact_factor_remark(fit, gyros, angles, axis, rate)
-        if remark:
+        if remark := _factor_remark(fit, rate, angle[0]):
             return remark
+        # in a banked flight a yaw rate in another unit does not even correlate with the angle: q turns it too
+        for factor in UNIT_FACTORS if abs(fit.correlation) < _AGREEING else ():
+            scaled = replace(named[rate], values=factor * named[rate].values)
+            if _is_exact(_fit_with(named, angles, axis, scaled)):
+                return (
+                    f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
+                    f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
+                )
     return None
+
+
+def _fit_with(
+    named: Mapping[str, Column], angles: Sequence[NamedColumn | None], axis: int, rate: Column
+) -> AngleFit | None:
+    """How the angle of a place follows the rates with this one in its place."""
+    gyros = [rate if i == axis else gyro for i, gyro in enumerate(named.values())]
+    return fit_angle(gyros, [angle and angle[1] for angle in angles], axis)
 
 
 def confirmed_rates(named: Mapping[str, Column], angles: Sequence[NamedColumn | None]) -> frozenset[str]:
     """The columns of p, q and r whose integral is the change of roll, pitch and yaw, in sign and unit too."""
-    gyros = list(named.values())
-    fits = {rate: _fit_axis(gyros, angles, axis) for axis, rate in enumerate(named)}
-    return frozenset(name for name, fit in fits.items() if fit is not None and _is_exact(fit))
+    places = enumerate(named.items())
+    return frozenset(n for axis, (n, rate) in places if _is_exact(_fit_with(named, angles, axis, rate)))
 
 
-def _is_exact(fit: AngleFit) -> bool:
-    return fit.correlation > _EXACT and 1.0 / _UNIT_RATIO < fit.slope < _UNIT_RATIO
-
-
-def _exact_factor_remark(
-    fit: AngleFit, gyros: list[Column], angles: Sequence[NamedColumn | None], axis: int, rate: str
-) -> str | None:
-    """Describe the sign or unit by which a rate explains its angle exactly, where it does not as it is; None
-    where none does. In a banked flight a yaw rate in another unit does not even correlate with the yaw angle,
-    since q turns it as well."""
-    if abs(fit.correlation) >= _AGREEING:
-        return None
-    for factor in UNIT_FACTORS:
-        scaled = replace(gyros[axis], values=factor * gyros[axis].values)
-        trial = _fit_axis([*gyros[:axis], scaled, *gyros[axis + 1 :]], angles, axis)
-        if trial is not None and _is_exact(trial):
-            return (
-                f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
-                f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on "
-                f"{rate} fits"
-            )
-    return None
+def _is_exact(fit: AngleFit | None) -> bool:
+    return fit is not None and fit.correlation > _EXACT and 1.0 / _UNIT_RATIO < fit.slope < _UNIT_RATIO
 
 
 def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
@@ -220,17 +198,7 @@ def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
     return _CLOSE if corr < _AGREEING else _EXACT if corr < _CLOSE else np.inf
 
 
-def _fit_axis(gyros: list[Column], angles: Sequence[NamedColumn | None], axis: int) -> AngleFit | None:
-    """How the angle of a place follows the rates; None where too little moves, or it is not known."""
-    (roll, pitch, yaw) = (None if named is None else named[1] for named in angles)
-    if roll is None or (angle := (roll, pitch, yaw)[axis]) is None:
-        return None
-    if axis == 2:
-        return fit_yaw(gyros, roll, pitch, angle)
-    return fit_pitch(gyros, roll, angle) if axis else fit_roll(gyros, roll, pitch)
-
-
-def factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
+def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
     nothing is. rate, angle: their columns.
 
@@ -251,7 +219,7 @@ def factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     return f"{ratio}: a factor of {slope:.4g} on {rate} fits, or of {1.0 / slope:.4g} on {angle}"
 
 
-def pitch_remark(pitch: Column, name: str) -> str | None:
+def _pitch_remark(name: str, pitch: Column) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
     largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))

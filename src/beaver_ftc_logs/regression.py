@@ -1,4 +1,5 @@
-"""The regressors of the next sample's rates, and least squares on them.
+"""The one regression of a flight: the regressors of the next sample's rates, what a model leaves of them
+(`Innovations`), and least squares on both. What identifies, doubts, detects and bounds selects from it.
 
     rates[k] = b + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
 
@@ -17,7 +18,8 @@ cannot be distinguished by any fit, so they form one group with one response. Le
 coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divided by its scale s (m,).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +35,35 @@ _EIGENVALUE_FLOOR = 1e-10
 _RANK_TOLERANCE = 1e-12
 _N_PARTS, _MIN_PART_ROWS, BOUND_MARGIN = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
+_MEDIAN_CHI2 = 2.366
+"""The median of a square of three axes."""
+_QUICK_SPAN_S = 0.5
+"""A response is quick if it differs from its mean over so many seconds."""
+
+
+@dataclass(frozen=True)
+class FitPart:
+    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
+    results that were computed from this flight and others."""
+
+    samples: Samples
+    is_usable: NDArray[np.bool_]
+    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
+
+    def regressors(
+        self, groups: list[list[int]], h: int, L: int, f: int
+    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """As `build_regressors`, commands as effective as labels say, and which samples are known and in
+        use."""
+        X, U, is_known = build_regressors(self.samples, groups, h, L, True, f)
+        return X, U, self.is_usable & is_known
+
+    def innovations(self, model: Model) -> "Innovations":
+        """The samples in use by a model, commands as effective as labels say."""
+        flight = innovations(self.samples, model, labelled=True)
+        return flight.at(np.flatnonzero(self.is_usable & flight.is_known))
 
 
 def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
@@ -91,33 +122,108 @@ def expand_groups(values: Floats, model: Model) -> Floats:
     return np.asarray(np.take(np.column_stack([values, np.ones(len(values))]), index, axis=1))
 
 
-def unexplained_rates(
-    samples: Samples, model: Model, labelled: bool = False
-) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """By a model: which samples it can predict, (n,), y (n, 3) and F (n, G, 3). labelled: as in
-    `build_regressors`.
+@dataclass(frozen=True)
+class Innovations:
+    """What the past does not explain of a flight's rates, a row a sample: y = c + sum_g F_g + e in health.
+
+    rows (n,): place of each row in the flight. is_known (n,): whether all of the past is there; else a row
+    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s, R (3, 3) (rad/s)2: as in the head of this file, less what
+    earlier residuals predict of them. inflation: how many times as wide as R the filter takes the noise to
+    be. ma: moving average by which the flight is whitened, empty if it is not.
+    """
+
+    rows: NDArray[np.int64]
+    is_known: NDArray[np.bool_]
+    y: Floats
+    F: Floats
+    c: Floats
+    R: Floats
+    inflation: float = 1.0
+    ma: tuple[float, ...] = ()
+
+    @cached_property
+    def e(self) -> Floats:
+        """Residual of a healthy vehicle, (n, 3)."""
+        return np.where(self.is_known[:, None], self.y - self.c - self.F.sum(axis=1), 0.0)
+
+    @cached_property
+    def W(self) -> Floats:
+        """Whitening matrix, (3, 3): W W' = R^-1."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.R)).T)
+
+    @property
+    def log_size(self) -> float:
+        """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
+        return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.ma or (1.0,))))
+
+    def at(self, rows: NDArray[np.int64] | slice) -> "Innovations":
+        """Some of the rows."""
+        chosen = {name: getattr(self, name)[rows] for name in ("rows", "is_known", "y", "F")}
+        return replace(self, **chosen)
+
+    def columns(self) -> Floats:
+        """Effects of trim and responses in standard deviations of the noise, (n, 3, 3 + G)."""
+        trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
+        return np.asarray((np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1))
+
+    def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
+        """By least squares of y on trim and responses: the gain that each response surely is not below, and
+        not above, (G,) each, 1 as in the model; far apart where columns make one another up. And the scale
+        of the noise, in variances of it. share: effective_sample_share."""
+        Z = self.columns().reshape(3 * len(self.F), -1)
+        v = (self.y @ self.W).ravel()
+        s = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+        X = Z / s
+        P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
+        b = P @ (X.T @ v)
+        e2 = (v - X @ b) ** 2
+        margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
+        low, high = (b - margin) / s, (b + margin) / s
+        return low[3:], high[3:], noise_scale(e2)
+
+    def gains(self) -> Floats:
+        """The gain of each response, (G,), by least squares of y on trim and responses."""
+        Z = self.columns().reshape(3 * len(self.F), -1)
+        return np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:]
+
+    def quick_power(self, rate_hz: float) -> Floats:
+        """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
+        difference from their mean over the last half second."""
+        sums, n = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
+        quick = (self.F - sums / n[:, None, None]) @ self.W
+        return np.asarray((quick**2).sum(axis=(1, 2)) / 3.0)
+
+    def quick_scale(self, model: Model) -> Floats:
+        """Variance q of the residual over that of the noise, (n,): above 1 where the responses are quicker
+        than usual in the fit, since a share of the quick part may be missing, or be too much.
+
+        Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
+        is no noise: it has the same sign in many samples.
+        """
+        excess = np.maximum(self.quick_power(model.rate_hz) - model.usual_quick_power(self.ma), 0.0)
+        return np.asarray(1.0 + model.settings.quick_error_share**2 * excess)
+
+
+def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innovations:
+    """A flight by a model, every sample a row; labelled: as in `build_regressors`. Where the model knows the
+    flight's noise, less the prediction of each residual from those before it: a healthy flight leaves a white
+    residual.
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
     h, L = model.n_rate_lags, model.n_command_lags
     f = model.vehicle.n_signal_lags(h)
-    X, U, ok = build_regressors(samples, group_indices(model), h, L, labelled, f)
+    X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
     _, A, B, _ = model.as_arrays()
-    y = samples.rates - np.einsum("nm,mr->nr", X, A)
-    return ok, y, np.einsum("ngl,glr->ngr", U, B)
-
-
-def whitened_rates(
-    samples: Samples, model: Model, labelled: bool = False
-) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """As `unexplained_rates`, less the prediction of each residual from those before it by the flight's noise
-    model: a healthy flight leaves a white residual."""
-    ok, y, F = unexplained_rates(samples, model, labelled)
-    ar = model.residual_ar_coefficients(samples.noise_ma_coefficients)
-    whole = ok.copy()
+    ma = samples.noise_ma_coefficients
+    ar = model.residual_ar_coefficients(ma)
+    y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
+    F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
+    whole = known.copy()
     for lag in range(1, len(ar) + 1):
-        whole &= _delay_rows(ok, lag, False)
-    return whole, subtract_noise(y, ar), subtract_noise(F, ar)
+        whole &= _delay_rows(known, lag, False)
+    rows, c, R = np.arange(len(y)), model.whitened_intercept(ma), model.covariance_of_noise(ma)
+    return Innovations(rows, whole, np.nan_to_num(y), np.nan_to_num(F), c, R, model.inflation_of(ma), ma)
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
@@ -182,16 +288,18 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
 
 
-def bound_above(Z: Floats, y: Floats, share: float) -> tuple[Floats, Floats]:
-    """Least squares of y (n,) on Z (n, m): what each coefficient surely does not exceed, (m,), which is much
-    where columns make one another up; and squares of what is left (n,). share: effective_sample_share."""
-    s = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
-    X = Z / s
-    P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
-    b = P @ (X.T @ y)
-    e2 = (y - X @ b) ** 2
-    sd = np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
-    return (b + BOUND_MARGIN * sd) / s, e2
+def trailing_sums(x: Floats, n: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
+    end = np.arange(1, len(x) + 1)
+    begin = np.maximum(end - max(round(n), 1), 0)
+    sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+    return sums[end] - sums[begin], end - begin
+
+
+def noise_scale(e2: Floats) -> float:
+    """The scale of the noise by the squares of what is left, (3 n,), which faults of few samples do not
+    change."""
+    return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
 def split_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:

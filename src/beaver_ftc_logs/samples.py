@@ -454,7 +454,7 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
         first = int(np.searchsorted(samples.t_s, until_s, side="right"))
         for begin in range(first, len(samples.t_s), _FIT_SAMPLES):
             if n_seen % every == 0:
-                kept.append(_select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
+                kept.append(select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
             n_seen += 1
         while len(kept) * _FIT_SAMPLES > MAX_FIT_SAMPLES and part > 1:
             kept, every = kept[::2], 2 * every
@@ -462,12 +462,7 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
     return samples if part == 1 else _concatenate_samples(path.stem, kept, part)
 
 
-def first_samples(samples: Samples, n: int) -> Samples:
-    """The first samples."""
-    return samples if n >= len(samples.t_s) else _select_rows(samples, slice(n))
-
-
-def _select_rows(samples: Samples, rows: slice) -> Samples:
+def select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
     fields = {name: getattr(samples, name) for name in _PER_SAMPLE_FIELDS}
     chosen = {name: values[rows].copy() for name, values in fields.items() if values is not None}

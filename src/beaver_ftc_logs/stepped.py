@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import bound_above, split_parts
+from beaver_ftc_logs.regression import Innovations, split_parts
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 BOUND_WINDOW_S = 1.0
@@ -81,19 +81,14 @@ def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: floa
 def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """The gains and their upper bounds (S,) of `Replayed`: 1 + beta of nu = constant + Z beta, each axis in
     standard deviations of nu."""
-    S = Z.shape[2]
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
     if (parts := split_parts(rows)) is None:
-        return np.ones(S), np.ones(S)
+        return np.ones(Z.shape[2]), np.ones(Z.shape[2])
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
-    X = np.concatenate([np.broadcast_to(np.eye(3), (len(Z), 3, 3)), Z / sd[:, None]], axis=2)
-    y = nu / sd
-    beta, *_ = np.linalg.lstsq(X[rows].reshape(3 * len(rows), -1), y[rows].ravel(), rcond=None)
-    upper = np.full(S, -np.inf)
-    for part in parts:
-        bounds, _ = bound_above(X[part].reshape(3 * len(part), -1), y[part].ravel(), _EFFECTIVE_SAMPLE_SHARE)
-        upper = np.maximum(upper, 1.0 + bounds[3:])
-    return 1.0 + beta[3:], upper
+    k, known = np.arange(len(nu)), np.ones(len(nu), dtype=bool)
+    frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), np.diag(sd**2))
+    upper = [frames.at(part).gain_bounds(_EFFECTIVE_SAMPLE_SHARE)[1] for part in parts]
+    return 1.0 + frames.at(rows).gains(), 1.0 + np.max(upper, axis=0)
 
 
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:

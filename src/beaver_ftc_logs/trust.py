@@ -30,6 +30,7 @@ from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 
@@ -50,8 +51,6 @@ _MAX_AXIS_RATIO, _UNIT_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_FACTOR, _MIN_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _RANGE_QUANTILES = (0.001, 0.999)
-_MEDIAN_CHI2 = 2.366
-"""The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
 """Gains below which a command works the other way round, or hardly. Of 576 correct logs with faults of any
 kind none was below 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
@@ -59,31 +58,32 @@ _REVERSED_GAIN_LIMIT = -0.5
 """Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0."""
 
 
-def compute_fitted_ranges(
-    flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats
-) -> FittedRanges:
+def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Floats) -> FittedRanges:
     """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
-    rates = np.vstack([samples.rates[used] for samples, used in flights])
-    commands = np.vstack([samples.commands[used] for samples, used in flights])
-    airspeeds = [samples.airspeed[used] for samples, used in flights if samples.airspeed is not None]
+    rates = np.vstack([part.samples.rates[part.is_usable] for part in parts])
+    commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
+    airspeeds = _usable([(part.samples.airspeed, part.is_usable) for part in parts])
+    climbs = _usable([(part.samples.energy_height_rate_mps, part.is_usable) for part in parts])
+    climbs = climbs[np.isfinite(climbs)]
+    still: dict[str, float] = {}
+    for part in parts:
+        for name, still_s in part.samples.unchanged_s.items():
+            still[name] = max(still.get(name, 0.0), float(still_s.max(initial=0.0)))
     return FittedRanges(
         commands=central_ranges(commands),
         rates=central_ranges(rates),
-        airspeed=central_ranges(np.concatenate(airspeeds)[:, None])[0] if airspeeds else None,
+        airspeed=central_ranges(airspeeds[:, None])[0] if airspeeds.size else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        tied=tied_shares(flights, model).tolist(),
+        tied=tied_shares(parts, model).tolist(),
         gain_sd=gain_sd.tolist(),
-        still_s=_longest_still(flights),
-        energy_climb=_unpowered_climb(flights),
+        still_s=still,
+        energy_climb=float(np.quantile(climbs, energy.UNPOWERED_SHARE)) if climbs.size else None,
     )
 
 
-def _unpowered_climb(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
-    """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
-    pairs = [(flight.energy_height_rate_mps, used) for flight, used in flights]
-    climb = np.concatenate([np.empty(0), *(rate[used] for rate, used in pairs if rate is not None)])
-    climb = climb[np.isfinite(climb)]
-    return float(np.quantile(climb, energy.UNPOWERED_SHARE)) if climb.size else None
+def _usable(flights: Sequence[tuple[Floats | None, Mask]]) -> Floats:
+    """A quantity of those flights that have it, in the samples in use."""
+    return np.concatenate([np.empty(0), *(values[used] for values, used in flights if values is not None)])
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
@@ -94,48 +94,28 @@ def central_ranges(values: Floats) -> list[list[float]]:
     return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
-def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
-    longest: dict[str, float] = {}
-    for flight, _ in flights:
-        for name, still_s in flight.unchanged_s.items():
-            longest[name] = max(longest.get(name, 0.0), float(still_s.max(initial=0.0)))
-    return longest
-
-
-def tied_shares(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def tied_shares(parts: Sequence[FitPart], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    power, rest = _effect_powers(flights, model)
+    power, rest = effect_powers(parts, model)
     moved = power > _MIN_EFFECT_POWER
     share = 1.0 - rest / np.minimum(np.where(moved, power, 1.0), _EFFECT_POWER_CAP)
     return np.where(moved, np.maximum(share, 0.0), 1.0)
 
 
-def untied_power(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
-    """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
-    sample, (G,)."""
-    return _effect_powers(flights, model)[1]
-
-
-def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tuple[Floats, Floats]:
+def effect_powers(parts: Sequence[FitPart], model: Model) -> tuple[Floats, Floats]:
     """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
     of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
+    h, f = model.n_rate_lags, model.vehicle.n_signal_lags(model.n_rate_lags)
     groups = regression.group_indices(model)
-    h, L = model.n_rate_lags, model.n_command_lags
-    past, commands = [], []
-    for flight, used in flights:
-        X, U, ok = regression.build_regressors(flight, groups, h, L, True, model.vehicle.n_signal_lags(h))
-        past.append(X[used & ok])
-        commands.append(U[used & ok])
-    X, U = np.vstack(past), np.vstack(commands)
-    B = np.array(model.command_response)
-    W = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))).T
-    power = np.zeros(len(groups))
-    rest = np.zeros(len(groups))
+    stacked = [part.regressors(groups, h, model.n_command_lags, f) for part in parts]
+    X, U = (np.concatenate([one[i][one[2]] for one in stacked]) for i in (0, 1))
+    _, _, B, R = model.as_arrays()
+    W = np.linalg.inv(np.linalg.cholesky(R)).T
+    power, rest = np.zeros((2, len(groups)))
     for g in range(len(groups)):
-        others = [U[:, k] for k in range(len(groups)) if k != g]
-        Z = np.column_stack([np.ones(len(X)), X, *others])
+        Z = np.column_stack([np.ones(len(X)), X, np.delete(U, g, axis=1).reshape(len(U), -1)])
         y = U[:, g] @ B[g] @ W
         y = y - y.mean(axis=0)
         power[g] = float((y**2).sum()) / len(y)
@@ -193,14 +173,13 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         return
     most = _UNIT_FACTOR_ROOT**2
     for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        fits = None
-        if 1.0 / most < ratio / per_rad < most:
-            fits = f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"
-        elif 1.0 / most < ratio * per_rad < most:
-            fits = f"{per_rad:.4g} fits: the model's own were in {unit}?"
-        if fits:
+        hints = {
+            ratio / per_rad: f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits",
+            ratio * per_rad: f"{per_rad:.4g} fits: the model's own were in {unit}?",
+        }
+        for hint in (hint for factor, hint in hints.items() if 1.0 / most < factor < most):
             spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {fits}")
+            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
 
 
 def refuse_command_unit(
@@ -211,10 +190,10 @@ def refuse_command_unit(
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    rate_ratios = _spans(central_ranges(rates)) / np.maximum(_spans(ranges.rate_ranges_rad_s), MIN_DIVISOR)
+    rate_ratios = _relative_motion(rates, ranges.rate_ranges_rad_s)
     alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
     allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
-    ratios = _spans(central_ranges(commands)) / np.maximum(_spans(ranges.command_ranges), MIN_DIVISOR)
+    ratios = _relative_motion(commands, ranges.command_ranges)
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
@@ -223,14 +202,30 @@ def refuse_command_unit(
             )
 
 
-class _GainBounds(NamedTuple):
-    """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
-    command, (G,), there is; and the log likelihood of a sample of each part, (4,), but for what all colours
-    have alike."""
+class Answers(NamedTuple):
+    """How the rates of each part of a flight answer the groups' commands: bounds of the gains lower and
+    upper, (4, G), 1 as in the model; log likelihood of a sample (4,), but for what all colours have alike;
+    as how many white samples a part counts."""
 
-    upper_gains: list[float]
-    lower_gains: list[float]
-    part_likelihoods: Floats
+    lower: Floats
+    upper: Floats
+    likelihood: Floats
+    n_white: float
+
+
+def answers(samples: Samples, model: Model, most: int | None = None) -> Answers | None:
+    """The answers in all parts of a flight, of a long one by every k-th sample, so that about `most` are
+    left; None where a part is too short."""
+    flight = regression.innovations(samples, model)
+    rows = np.flatnonzero(flight.is_known)
+    step = max(len(rows) // most, 1) if most else 1
+    if (parts := regression.split_parts(rows[::step])) is None:
+        return None
+    share = model.settings.effective_sample_share / flight.inflation
+    bounds = [flight.at(part).gain_bounds(share) for part in parts]
+    lower, upper, scales = (np.array(each) for each in zip(*bounds, strict=True))
+    likelihood = -flight.log_size - 1.5 * np.log(scales)
+    return Answers(lower, upper, likelihood, share * min(map(len, parts)))
 
 
 def refuse_columns(samples: Samples, model: Model) -> None:
@@ -246,13 +241,13 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     if (pair := _whiten_likeliest(samples, model)) is None:
         return
     flight, likeliest = pair
-    bounds = _bound_gains(flight, likeliest)
-    if bounds is None:
+    found = answers(flight, likeliest)
+    if found is None:
         return
-    mistakes = _mistake_texts(samples, model, bounds)
+    mistakes = _mistake_texts(samples, model, found)
     for ma in NOISE_MA_CANDIDATES if mistakes else ():
-        other = _bound_gains(whiten_samples(samples, ma), model)
-        if other is not None and other.part_likelihoods.mean() > bounds.part_likelihoods.mean():
+        other = answers(whiten_samples(samples, ma), model)
+        if other is not None and other.likelihood.mean() > found.likelihood.mean():
             likelier = _mistake_texts(samples, model, other)
             mistakes = {key: text for key, text in mistakes.items() if key in likelier}
     text = next(iter(mistakes.values()), None) or _likelier_mistake(flight, likeliest)
@@ -268,8 +263,9 @@ def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model] |
         (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
         for noise in model.noise_models
     ]
-    known = [(pair, found) for pair in pairs or [(samples, model)] if (found := _likelihoods_and_size(*pair))]
-    return max(known, key=lambda one: one[1][0].mean())[0] if known else None
+    found = [(pair, _likelihoods(*pair).mean()) for pair in pairs or [(samples, model)]]
+    likeliest, likelihood = max(found, key=lambda one: one[1])
+    return likeliest if np.isfinite(likelihood) else None
 
 
 def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
@@ -277,21 +273,24 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     over all of a flight: a gain nearer to -1 than to 0, which is that of a lost surface."""
     if (pair := _whiten_likeliest(samples, model)) is None:
         return []
-    ok, y, F = regression.whitened_rates(*pair)
-    Z, v = _gain_data(np.flatnonzero(ok), y, F, _whitening(*pair)[0])
-    gains = np.linalg.lstsq(Z, v, rcond=None)[0][3:]
+    flight = regression.innovations(*pair)
+    gains = flight.at(np.flatnonzero(flight.is_known)).gains()
     rows = zip(model.groups, gains, known_effects(model), strict=True)
     return [group for group, gain, known in rows if known and gain < _REVERSED_GAIN_LIMIT]
 
 
-def _mistake_texts(samples: Samples, model: Model, bounds: _GainBounds) -> dict[str, str]:
+def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, str]:
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
     mistakes = {}
-    known = known_gains(model)
-    for group, sure, hi, lo in zip(model.groups, known, bounds.upper_gains, bounds.lower_gains, strict=True):
+    known, surfaces, ranges = known_gains(model), list(model.vehicle.surfaces), model.fitted_ranges
+    motions = np.zeros(len(surfaces))
+    if ranges is not None and ranges.command_ranges:
+        motions = _relative_motion(samples.commands, ranges.command_ranges)
+    highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
+    for group, sure, hi, lo in zip(model.groups, known, highest, lowest, strict=True):
         name = "+".join(group)
-        motion = _relative_motion(samples, model, group)
+        motion = max(motions[surfaces.index(surface)] for surface in group)
         command = f"the command of {name}"
         moves = f"{command} moves {motion:.3g} times as much as in the flights of the model, and does"
         if hi < MAX_REVERSED_GAIN:
@@ -331,10 +330,9 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     errs in a signal's effect, a smaller or reversed effect may be likelier than the modelled one, while none
     is likelier still.
     """
-    found = _likelihoods_and_size(samples, model)
+    found = answers(samples, model, _MAX_COMPARED_SAMPLES)
     if found is None:
         return {}, 0.0
-    logged, n = found
     without = {
         signal: _likelihoods(log_without_signal(samples, model.vehicle, signal), model)
         for signal in model.vehicle.signal_columns
@@ -342,170 +340,82 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     gains = {}
     for log in corrected_logs(samples, model.vehicle, unknown_surfaces(model)):
         ll = _likelihoods(log.samples, model) + log.log_jacobian
-        gain = float((ll - logged).min())
+        gain = float((ll - found.likelihood).min())
         if signal := log.scaled_signal:
             gain = min(gain, float((ll - without[signal]).sum()))
         gains[log.correction_text] = gain
-    return gains, n
+    return gains, found.n_white
 
 
 def _likelihoods(samples: Samples, model: Model) -> Floats:
     """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
-    found = _likelihoods_and_size(samples, model)
-    return np.array(-np.inf) if found is None else found[0]
+    found = answers(samples, model, _MAX_COMPARED_SAMPLES)
+    return np.array(-np.inf) if found is None else found.likelihood
 
 
-def _likelihoods_and_size(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """Log likelihood of a sample of each part of the flight, as in `_GainBounds`, and the effective number of
-    white samples of a part; of a long flight every k-th sample is taken. None where a part is too short."""
-    W, share, log_sd = _whitening(samples, model)
-    ok, y, F = regression.whitened_rates(samples, model)
-    rows = np.flatnonzero(ok)
-    if (parts := regression.split_parts(rows[:: max(len(rows) // _MAX_COMPARED_SAMPLES, 1)])) is None:
-        return None
-    pairs = [_gain_data(part, y, F, W) for part in parts]
-    scales = [residual_scale(regression.bound_above(Z, v, share)[1]) for Z, v in pairs]
-    return -log_sd - 1.5 * np.log(scales), share * min(map(len, parts))
-
-
-def _whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
-    """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
-    one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    ma = samples.noise_ma_coefficients
-    inflation = model.inflation_of(ma)
-    root = np.linalg.cholesky(model.with_noise_of(ma).as_arrays()[3] / inflation)
-    log_sd = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(ma or (1.0,))))
-    return np.linalg.inv(root).T, model.settings.effective_sample_share / inflation, log_sd
-
-
-def _gain_data(rows: NDArray[np.int64], y: Floats, F: Floats, W: Floats) -> tuple[Floats, Floats]:
-    """Z (3 n, 3 + G) of trim and responses F, and v (3 n,) of y, at these rows."""
-    trim = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
-    Z = np.concatenate([trim, F[rows]], axis=1) @ W
-    return Z.transpose(0, 2, 1).reshape(3 * len(rows), -1), (y[rows] @ W).ravel()
-
-
-def residual_scale(e2: Floats) -> float:
-    """The scale of the noise by the squares of what is left, (3 n,)."""
-    return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
-
-
-def _bound_gains(samples: Samples, model: Model) -> _GainBounds | None:
-    """The answers to each group's command in all parts of a flight; None where a part is too short."""
-    ok, y, F = regression.whitened_rates(samples, model)
-    if (parts := regression.split_parts(np.flatnonzero(ok))) is None:
-        return None
-    W, share, log_sd = _whitening(samples, model)
-    hi = np.full(len(model.groups), -np.inf)
-    lo = np.full(len(model.groups), np.inf)
-    scales = []
-    for rows in parts:
-        Z, v = _gain_data(rows, y, F, W)
-        above, e2 = regression.bound_above(Z, v, share)
-        below, _ = regression.bound_above(-Z, v, share)
-        hi = np.maximum(hi, above[3:])
-        lo = np.minimum(lo, -below[3:])
-        scales.append(residual_scale(e2))
-    return _GainBounds(hi.tolist(), lo.tolist(), -log_sd - 1.5 * np.log(scales))
-
-
-def _relative_motion(samples: Samples, model: Model, group: list[str]) -> float:
-    """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
-    not known."""
-    if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
-        return 0.0
-    fitted = np.maximum(_spans(model.fitted_ranges.command_ranges), MIN_DIVISOR)
-    ratios = _spans(central_ranges(samples.commands)) / fitted
-    return max(float(ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
-
-
-def _spans(ranges: Sequence[Sequence[float]]) -> Floats:
-    return np.ptp(np.array(ranges, dtype=float).reshape(-1, 2), axis=1)
+def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
+    """Return how many times as far as in the model's flights each column of values (n, S) moves, (S,)."""
+    spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
+    return np.asarray(spans[0] / np.maximum(spans[1], MIN_DIVISOR))
 
 
 def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
-    reasons: dict[str, Mask] = {}
-    for name, limit_s in _max_still_s(samples, model).items():
-        reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = samples.unchanged_s[name] > limit_s
+    reasons: dict[str, Mask] = _still_rows(samples, model)
     if samples.is_rate_clipped is not None:
-        clipped = _clipped_recently(samples.is_rate_clipped, samples.dt_s)
-        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = clipped
+        recent, _ = regression.trailing_sums(
+            samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
+        )
+        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
     if model.fitted_ranges is not None:
         reasons |= _rows_out_of_range(samples, model, model.fitted_ranges)
     return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
-def _clipped_recently(clipped: Mask, dt_s: float) -> Mask:
-    """Whether a condition held in the last half minute."""
-    k = np.arange(len(clipped))
-    since = k - np.maximum.accumulate(np.where(clipped, k, -len(clipped) - round(_CLIPPING_MEMORY_S / dt_s)))
-    return np.asarray(since * dt_s <= _CLIPPING_MEMORY_S)
-
-
 def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
+    """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
+    flight so far, by reason."""
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
         *zip(commands, samples.commands.T, ranges.command_ranges, strict=False),
         *zip(_rate_columns(model), samples.rates.T, ranges.rate_ranges_rad_s, strict=False),
     ]
+    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
+        channels.append(("airspeed", samples.airspeed, ranges.airspeed_range_mps))
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        outside = ~_in_range(values, lo - margin, hi + margin)
-        reasons[_outside_text(name, lo, hi)] = _mostly_recently(outside, samples)
-    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
-        lo, hi = ranges.airspeed_range_mps
-        outside = ~_in_range(samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * lo, (1.0 + _AIRSPEED_MARGIN) * hi)
-        reasons[_outside_text("airspeed", lo, hi)] = _mostly_recently(outside, samples)
+        margins = (_AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi) if name == "airspeed" else (margin, margin)
+        outside = (values < lo - margins[0]) | (values > hi + margins[1])
+        reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
+        sums, n = regression.trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
+        reasons[reason] = np.asarray(sums > _MIN_OUTSIDE_SHARE * n)
     return reasons
-
-
-def _outside_text(name: str, lo: float, hi: float) -> str:
-    return f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
-
-
-def _in_range(values: Floats, lo: float, hi: float) -> Mask:
-    return np.asarray(~np.isfinite(values) | ((values >= lo) & (values <= hi)))
-
-
-def _mostly_recently(held: Mask, samples: Samples) -> Mask:
-    """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
-    n = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
-    sums = np.concatenate([[0], np.cumsum(held)])
-    end = np.arange(1, len(held) + 1)
-    begin = np.maximum(end - n, 0)
-    return np.asarray(sums[1:] - sums[begin] > _MIN_OUTSIDE_SHARE * (end - begin))
 
 
 def _rate_columns(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
-    """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
-    flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
+def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+    """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
+    thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
     fitted = model.fitted_ranges.longest_still_s if model.fitted_ranges else {}
     rates = _rate_columns(model)
-    limits_s = {}
-    for name in samples.unchanged_s:
+    reasons = {}
+    for name, unchanged_s in samples.unchanged_s.items():
         still_s = fitted.get(name, 0.0 if name in rates else np.inf)
         least_s = MIN_STILL_S / 3.0 if name in fitted and name in rates else MIN_STILL_S
-        limits_s[name] = max(least_s, _MAX_STILL_FACTOR * still_s)
-    return limits_s
-
-
-def dead_rows(samples: Samples, model: Model) -> Mask:
-    """Samples with a signal that does not live: what the filter is not to learn from."""
-    dead = np.zeros(len(samples.t_s), dtype=bool)
-    for name, limit_s in _max_still_s(samples, model).items():
-        dead |= samples.unchanged_s[name] > limit_s
-    return dead if samples.is_rate_clipped is None else dead | samples.is_rate_clipped
+        limit_s = max(least_s, _MAX_STILL_FACTOR * still_s)
+        reasons[f"{name} stands still, for longer than {limit_s:.3g} s"] = unchanged_s > limit_s
+    return reasons
 
 
 def without_dead_rows(samples: Samples, model: Model) -> Samples:
-    """The flight with nothing known where a signal does not live."""
-    dead = dead_rows(samples, model)
+    """The flight with nothing known where a signal does not live: the filter is not to learn from it."""
+    dead = np.any([*_still_rows(samples, model).values(), np.zeros(len(samples.t_s), dtype=bool)], axis=0)
+    if samples.is_rate_clipped is not None:
+        dead |= samples.is_rate_clipped
     if not dead.any():
         return samples
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))

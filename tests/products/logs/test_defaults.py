@@ -35,9 +35,8 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     """Noise of nine times the variance, white or held for `span` samples: sums over n = 10 samples at any
     place have (2 n^2 + 1) / (3 n) times the variance that sums of white noise have."""
     held = np.repeat(RNG.standard_normal((6000 // span, 3)), span, axis=0)
-    covariance = np.diag([1.0, 4.0, 9.0])
-    residual = 3.0 * held * np.sqrt(np.diag(covariance))
-    scale = recent_scale(residual, np.ones(6000, bool), covariance, 100.0)
+    residual = 3.0 * held
+    scale = recent_scale(residual, np.ones(6000, bool), 100.0)
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
-    cut = recent_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
+    cut = recent_scale(residual[:500], np.ones(500, bool), 100.0)
     assert np.allclose(cut, scale[:500])

@@ -9,12 +9,8 @@ import pytest
 from beaver_ftc_logs import filtering
 from beaver_ftc_logs.bank import build_bank, build_states
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.filtering import (
-    _model_weights,
-    _run_flight,
-    _with_command_delay,
-    bank_posterior,
-)
+from beaver_ftc_logs.filtering import _with_command_delay, bank_posterior, model_weights, run_flight
+from beaver_ftc_logs.regression import innovations
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +21,8 @@ def healthy(sampled):
 def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
     bank, delays_s = build_bank(model), model.settings.command_delays_s
-    evidence = [_run_flight(_with_command_delay(samples, d), model, bank)[3] for d in delays_s]
-    return _model_weights(evidence, model.rate_hz)
+    flights = [innovations(_with_command_delay(samples, d), model) for d in delays_s]
+    return model_weights([run_flight(flight, model, bank)[3] for flight in flights], model.rate_hz)
 
 
 @pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])

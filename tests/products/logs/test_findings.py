@@ -8,7 +8,7 @@ from beaver_ftc_logs.findings import (
     isolability_document,
     verdict_document,
 )
-from beaver_ftc_logs.regression import unexplained_rates
+from beaver_ftc_logs.regression import innovations
 from products.logs import small
 
 NAMES = ["right", "left"]
@@ -53,8 +53,8 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
 
 
 def _white_responses(samples, model):
-    ok, _, answers = unexplained_rates(samples, model)
+    flight = innovations(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
         model.settings.effective_sample_share
     )
-    return answers[ok] @ root.T
+    return flight.F[flight.is_known] @ root.T

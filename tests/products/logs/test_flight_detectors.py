@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
-from beaver_ftc_logs.regression import unexplained_rates
+from beaver_ftc_logs.regression import innovations
 from products.logs import small
 
 WING = small.model(settings={"levels": {"left": [0.4, 0.8]}, "level_step": 0.25, "trim_sd": 0.3})
@@ -16,17 +16,17 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
-    ok, unexplained, answers = unexplained_rates(samples, model)
+    flight = innovations(samples, model)
     sd = np.sqrt(np.diag(model.residual_covariance))
     whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
     for i in range(k + 1):
         age_s = (k - i) * samples.dt_s
-        if not ok[i] or (not forget and age_s > 19.95):
+        if not flight.is_known[i] or (not forget and age_s > 19.95):
             continue
         weight = np.exp(-age_s / 20.0) if forget else 1.0
-        x = whiten @ np.column_stack([np.diag(sd), answers[i].T])
-        y = whiten @ (unexplained[i] - np.array(model.intercept) - answers[i].sum(axis=0))
+        x = whiten @ np.column_stack([np.diag(sd), flight.F[i].T])
+        y = whiten @ (flight.y[i] - np.array(model.intercept) - flight.F[i].sum(axis=0))
         information = information + weight * x.T @ x
         score = score + weight * x.T @ y
     covariance = np.linalg.inv(information)

@@ -74,7 +74,7 @@ def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
     both = bank_posterior(new, moving, bank)
     alone = bank_posterior(new, moving.model_copy(update={"noise_models": own}), bank)
     np.testing.assert_allclose(both[0][300:], alone[0][300:], atol=1e-6)
-    short = bank_posterior(samples.first_samples(new, 600), moving, bank)
+    short = bank_posterior(samples.select_rows(new, slice(600)), moving, bank)
     for part, cut in zip(both, short, strict=True):
         np.testing.assert_array_equal(part[:600], cut)
 
@@ -85,15 +85,12 @@ def test_columns_are_compared_in_white(moving, colour):
     flight = flown(colour, 1.1, 4000, 21)
     trust.refuse_columns(flight, moving)
     found = [
-        trust._bound_gains(whiten_samples(flight, one.ma_coefficients), moving) for one in moving.noise_models
+        trust.answers(whiten_samples(flight, one.ma_coefficients), moving) for one in moving.noise_models
     ]
-    likeliest = max(
-        zip(found, moving.noise_models, strict=True),
-        key=lambda pair: pair[0].part_likelihoods.mean(),
-    )
-    assert all(1.0 < gain < 1.6 for gain in likeliest[0].upper_gains)
-    plain = trust._bound_gains(flight, moving.model_copy(update={"noise_models": []}))
-    assert colour == (1.0,) or min(plain.upper_gains) > 1.9  # what coloured noise does to the fit
+    likeliest = max(found, key=lambda one: one.likelihood.mean())
+    assert all(1.0 < gain < 1.6 for gain in likeliest.upper.max(axis=0))
+    plain = trust.answers(flight, moving.model_copy(update={"noise_models": []}))
+    assert colour == (1.0,) or min(plain.upper.max(axis=0)) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 

@@ -86,10 +86,7 @@ def yawed(seed=1):
 def test_rates_are_the_change_of_each_angle():
     phi, theta, rates = turning()
     columns, angles = [Column(T_S, one) for one in rates], [Column(T_S, one) for one in (phi, theta, yawed())]
-    for found in (
-        physics.fit_roll(columns, *angles[:2]), physics.fit_pitch(columns, *angles[:2]),
-        physics.fit_yaw(columns, *angles),
-    ):  # fmt: skip
+    for found in (physics.fit_angle(columns, angles, axis) for axis in range(3)):
         assert (found.slope, found.correlation) == (
             pytest.approx(1.0, rel=2e-3),
             pytest.approx(1.0, abs=1e-3),
@@ -100,7 +97,7 @@ def test_rates_are_the_change_of_each_angle():
 def test_nothing_is_said_of_an_angle_that_does_not_move(drift_rad_s):
     """In steady flight at 45 m/s the level turns by 45 / 6.37e6 rad/s, and no gyro does: alpha is no rate."""
     still = Column(T_S, np.zeros(len(T_S)))
-    assert physics.fit_roll([still] * 3, Column(T_S, drift_rad_s * T_S), None) is None
+    assert physics.fit_angle([still] * 3, [Column(T_S, drift_rad_s * T_S), None, None], 0) is None
     angles = [("roll", still), ("pitch", Column(T_S, 0.14 + drift_rad_s * T_S)), None]
     rates = {name: Column(T_S, 1e-8 * np.sin(T_S)) for name in ("gx", "gy", "gz")}
     alpha = {"alpha": Column(T_S, 0.14 + 0.0 * T_S)}
@@ -115,4 +112,4 @@ def test_nothing_is_said_where_the_nose_is_steep():
     rates = {"gx": still, "gy": Column(T_S, np.full(len(T_S), 0.3)), "gz": still}
     angles = [("roll", over), ("pitch", theta), ("yaw", over)]
     assert physics.attitude_mistake(rates, angles, {}) is None
-    assert physics.fit_roll(list(rates.values()), over, theta) is None
+    assert physics.fit_angle(list(rates.values()), [over, theta, None], 0) is None

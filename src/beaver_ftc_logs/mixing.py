@@ -86,9 +86,11 @@ class Mixing:
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface by its parameters. place: where it stands in them; kind: surfaces of one kind get one
-    command; axis_shares: of roll, pitch and yaw command in it, None where they are not known; reason, mixer_reason:
-    the parameters that say so."""
+    """A surface by its parameters.
+
+    place: where it stands in them; kind: surfaces of one kind get one command; axis_shares: of roll, pitch
+    and yaw command in it, None where they are not known; reason, mixer_reason: the parameters that say so.
+    """
 
     name: str
     place: str

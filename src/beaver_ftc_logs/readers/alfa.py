@@ -49,8 +49,8 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
     return sections
 
 
-def read(path: Path) -> RecordedFlight:
-    """The flight in a folder of topics. Raises BadInput if it has none of the gyro."""
+def read(path: Path, _wanted: Any = None) -> RecordedFlight:
+    """The flight in a folder of topics, with all its columns. Raises BadInput if it has none of the gyro."""
     if not path.is_dir():
         raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
     tables = dict(_read_topic_tables(path))

@@ -21,7 +21,7 @@ from beaver_ftc_logs.recording import (
     package_errors_as_bad_input,
 )
 
-TIME = ("TimeUS", "us")
+_TIME_FIELD = "TimeUS"
 _INSTANCE_FIELDS = ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
@@ -48,7 +48,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
         topics = {
             topic: part
             for name, of in messages.items()
-            if name not in _IGNORED_MESSAGES and TIME[0] in of.fields
+            if name not in _IGNORED_MESSAGES and _TIME_FIELD in of.fields
             for topic, part in _topics_of_instances(name, of)
         }
         if not topics:
@@ -60,8 +60,8 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
 
 def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]]:
     """The messages of each instance as a topic of its own."""
-    stamps = messages.numbers(TIME[0])
-    fields = [field for field in messages.fields if field != TIME[0]]
+    stamps = messages.numbers(_TIME_FIELD)
+    fields = [field for field in messages.fields if field != _TIME_FIELD]
     key = next((field for field in _INSTANCE_FIELDS if messages.fields.get(field) is int), None)
     numbers = messages.numbers(key).astype(int) if key else np.zeros(len(stamps), dtype=int)
     for number in dict.fromkeys(numbers.tolist()):

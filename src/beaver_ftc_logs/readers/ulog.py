@@ -18,7 +18,7 @@ from beaver_ftc_logs.recording import (
     package_errors_as_bad_input,
 )
 
-TIME = ("timestamp", "us")
+_TIME_FIELD = "timestamp"
 _MAX_MESSAGE_BYTES = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
@@ -63,10 +63,10 @@ def _read_topics(
             add_parameter(params, name, value)
     topics = {}
     for of in log.data_list:
-        if TIME[0] in of.data:
-            fields = [field for field in of.data if field != TIME[0]]
+        if _TIME_FIELD in of.data:
+            fields = [field for field in of.data if field != _TIME_FIELD]
             name = f"{of.name}_{of.multi_id}" if of.multi_id else of.name
-            topics[name] = Topic(of.data[TIME[0]].astype(float), fields, of.data.__getitem__)
+            topics[name] = Topic(of.data[_TIME_FIELD].astype(float), fields, of.data.__getitem__)
     return topics
 
 

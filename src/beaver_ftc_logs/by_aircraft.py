@@ -428,8 +428,3 @@ def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
         else f"{name}: in half of the flight not even a complete loss would show within a second."
         for name, loss in zip(surfaces, losses.tolist(), strict=True)
     ]
-
-
-def as_text(verdict: Document) -> str:
-    """The verdict in lines for people."""
-    return f"{findings.as_text(verdict)}\n  report: {verdict['folder']}/report.html"

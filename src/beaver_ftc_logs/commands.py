@@ -178,8 +178,7 @@ def diagnose(options: DiagnoseOptions) -> None:
         _diagnose_and_write(flight, model, options.out, options.score, options.detector)
         for flight in stream_flights(options.flights, model.vehicle, options.reader)
     ]
-    texts = (f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts)
-    answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
@@ -214,12 +213,14 @@ def _check_replay_options(options: DiagnoseOptions) -> None:
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_diagnosed, read_inputs
+    from beaver_ftc_logs import pages
+    from beaver_ftc_logs.by_aircraft import diagnose_inputs, load_diagnosed, read_inputs
+    from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
-    from beaver_ftc_logs.pages import write_aircraft_diagnosis
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import read_vehicle_parts
     from beaver_ftc_logs.scoring import score_diagnosis
+    from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     if options.certificate:
         from beaver_ftc_logs import certified
@@ -244,7 +245,10 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
             writer = None
             if options.certificate:
                 writer = partial(certified.write_certificate_and_log, inputs, rows)
-            folder = write_aircraft_diagnosis(options.out, samples, surfaces, rows, verdict, writer)
+            words = pages.words_of_aircraft(given.aircraft.name, BOUND_WINDOW_S)
+            page = pages.render_diagnosis(samples, surfaces, rows, verdict, words)
+            table = rows.table(surfaces)
+            folder = pages.write_results(options.out, samples.name, table, verdict, page, writer)
             verdicts.append(verdict | {"folder": str(folder)})
         texts += [*mixing, *map(as_text, verdicts[before:])]
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
@@ -271,14 +275,17 @@ def _diagnose_and_write(
 ) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with_detector
     from beaver_ftc_logs.findings import verdict_document
-    from beaver_ftc_logs.pages import write_diagnosis
+    from beaver_ftc_logs.pages import render_diagnosis, words_of_model, write_results
     from beaver_ftc_logs.scoring import score_diagnosis
 
     rows = diagnose_with_detector(detector, samples, model)
     verdict = verdict_document(samples, model, rows) | {"detector": detector}
     if with_score:
         verdict["score"] = score_diagnosis(samples, rows, model.groups)
-    folder = write_diagnosis(out, samples, model, rows, verdict)
+    surfaces = list(model.vehicle.surfaces)
+    page = render_diagnosis(samples, surfaces, rows, verdict, words_of_model(model))
+    table = rows.table(surfaces, with_probability=True)
+    folder = write_results(out, samples.name, table, verdict, page)
     return verdict | {"folder": str(folder)}
 
 

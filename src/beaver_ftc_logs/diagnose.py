@@ -9,9 +9,10 @@ residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whe
 calm (n,): whether health, or no response at all, is the likelier.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,19 @@ class LogRows:
             object.__setattr__(self, "evidence_start_time_s", self.t_s)
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
+
+    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> dict[str, Any]:
+        """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
+        bounds are 0 and 1."""
+        columns: dict[str, Any] = {"t_s": self.t_s, "faulty": self.faulty}
+        columns["named"] = self.isolated_surfaces.tolist()
+        for i, surface in enumerate(surfaces):
+            columns[f"{surface}_effectiveness"] = self.effectiveness[:, i]
+            columns[f"{surface}_low"] = self.effectiveness_low[:, i]
+            columns[f"{surface}_high"] = self.effectiveness_high[:, i]
+        if with_probability:
+            columns["fault_probability"] = self.fault_probability
+        return columns | {"credible": self.credible}
 
     def has_credible_alarm(self) -> bool:
         """Whether an alarm is raised in a credible row."""

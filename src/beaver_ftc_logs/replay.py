@@ -5,7 +5,6 @@ of any sensor but the gyros were declared, that is what the diagnosis was
 given, and the verdicts are the same to the bit.
 """
 
-from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,7 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     arrays = [np.column_stack([log[name] for name in names]) for names in groups]
     replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
     rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
-    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
+    return rows.table(aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
 
 
 def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
@@ -50,18 +49,6 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
         raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
     check_time(path, log["t_s"])
     return log
-
-
-def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
-    """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
-    bounds are 0 and 1."""
-    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty}
-    columns["named"] = rows.isolated_surfaces.tolist()
-    for i, surface in enumerate(surfaces):
-        columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
-        columns[f"{surface}_low"] = rows.effectiveness_low[:, i]
-        columns[f"{surface}_high"] = rows.effectiveness_high[:, i]
-    return columns | {"credible": rows.credible}
 
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:

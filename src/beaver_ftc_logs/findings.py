@@ -42,10 +42,7 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
     return {
         "flight": samples.name,
         "vehicle": model.vehicle.name,
-        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
-        "recorded_s": len(samples.t_s) * samples.dt_s,
-        "gaps": int(samples.stretch_number[-1]),
-        "rate_hz": 1.0 / samples.dt_s,
+        **span_entry(samples),
         "faulty": bool(rows.faulty.any()),
         "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
@@ -53,6 +50,16 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
         "isolability": isolable,
         "settings": model.settings.model_dump(by_alias=True),
         "notes": list(samples.notes),
+    }
+
+
+def span_entry(samples: Samples) -> Document:
+    """How much of a flight was recorded."""
+    return {
+        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
+        "recorded_s": len(samples.t_s) * samples.dt_s,
+        "gaps": int(samples.stretch_number[-1]),
+        "rate_hz": 1.0 / samples.dt_s,
     }
 
 

@@ -134,8 +134,7 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     ]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
-    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    trios = zip(fits, (angles.roll, *named), rates, strict=True)
+    trios = zip(fits, (angles.roll, *named), vehicle.rate_columns, strict=True)
     return [_fit_text(fit, angle.column, rate) for fit, angle, rate in trios if fit and angle]
 
 

@@ -285,6 +285,17 @@ class Vehicle(Section):
         found += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
         return found + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
 
+    def measured_quantities(self) -> list[QuantityColumn]:
+        """Every column but those of labels and outputs."""
+        located = [quantity for _, quantity in self.located_model_quantities()]
+        typed = [quantity for *_, quantity in self.typed_quantities()]
+        return [*located, *self.flow.values(), *typed]
+
+    @property
+    def rate_columns(self) -> list[str]:
+        """The columns of p, q and r."""
+        return [self.rates.p.column, self.rates.q.column, self.rates.r.column]
+
     @property
     def command_columns(self) -> list[str]:
         """The commands' columns."""
@@ -317,15 +328,12 @@ class Vehicle(Section):
     def regressor_columns(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.scale_by_airspeed`)."""
-        rate_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        scaled = rate_names + self.signal_columns if self.reference_airspeed_mps is not None else []
+        scaled = self.rate_columns + self.signal_columns if self.reference_airspeed_mps is not None else []
         return self.signal_columns + [f"{name} by airspeed" for name in scaled]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [quantity for *_, quantity in self.located_model_quantities()]
-        quantities += [quantity for *_, quantity in self.typed_quantities()]
-        quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
+        quantities = [*self.measured_quantities(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 

@@ -89,32 +89,23 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
+    def _where(self, mask: NDArray[np.bool_], **values: Any) -> "LogRows":
+        """The rows with other values where a mask is true."""
+        changed = {name: np.where(mask, value, getattr(self, name)) for name, value in values.items()}
+        return replace(self, **changed)
+
     def without_estimate(self, removed: NDArray[np.bool_]) -> "LogRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where removed (n,) or (n, S) is true."""
         mask = removed if removed.ndim == 2 else removed[:, None]
-        return replace(
-            self,
-            effectiveness=np.where(mask, 1.0, self.effectiveness),
-            effectiveness_low=np.where(mask, 0.0, self.effectiveness_low),
-            effectiveness_high=np.where(mask, 1.0, self.effectiveness_high),
-        )
-
-    def without_alarm(self, removed: NDArray[np.bool_]) -> "LogRows":
-        """The rows without alarm and name where removed (n,) is true."""
-        return replace(
-            self,
-            faulty=np.where(removed, 0, self.faulty),
-            isolated_surfaces=np.where(removed, "", self.isolated_surfaces),
-            fault_probability=np.where(removed, 0.0, self.fault_probability),
-        )
+        return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
     def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true."""
-        removed = np.zeros(len(self.t_s), dtype=bool)
-        for mask in reasons.values():
-            removed |= mask
-        rows = self.without_estimate(removed).without_alarm(removed)
+        removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
+        rows = self.without_estimate(removed)._where(
+            removed, faulty=0, isolated_surfaces="", fault_probability=0.0
+        )
         return replace(rows, credible=np.where(removed, 0, 1), doubtful_rows=reasons)
 
 
@@ -195,10 +186,10 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges is not None else None
-    if unpowered_mps is None or samples.energy_height_rate_mps is None:
-        return rows
+    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges else None
     rate_mps = samples.energy_height_rate_mps
+    if unpowered_mps is None or rate_mps is None:
+        return rows
     named = energy.withdraw_surfaces(
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
@@ -300,7 +291,8 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
     low, high = _credible_bounds(levels, p, model.settings.credible_mass)
     if len(model.groups[g]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
-    return _median_level(levels, p), low, high
+    # the median, with half of the probability on either side: the least mean absolute error
+    return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
 def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
@@ -327,11 +319,6 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
     for h, j in enumerate(level_of):
         p[:, j] += P_live[:, h]
     return levels, p
-
-
-def _median_level(levels: Floats, p: Floats) -> Floats:
-    """The level with half of the probability on either side: the least mean absolute error."""
-    return np.asarray(levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
 
 
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
@@ -371,20 +358,13 @@ def _surfaces_at_fault(
     for k in np.flatnonzero(faulty):
         new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
+        # what was once excluded stays so: Ville's inequality bounds the chance of a wrong exclusion
+        named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
+        waits = n_same < n_hold or (model.settings.one_faulty_group and named_again)
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
-        keeps = old and (
-            offset[k] or (old != UNKNOWN_SURFACE and (n_same < n_hold or _names_all_again(new, old, model)))
-        )
+        keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new
     return named
-
-
-def _names_all_again(new: str, old: str, model: Model) -> bool:
-    """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
-    bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.one_faulty_group and (
-        new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
-    )
 
 
 def join_names(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:

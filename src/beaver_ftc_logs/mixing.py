@@ -312,8 +312,8 @@ def _px4_mixing(params: _Parameters, column_names: set[str]) -> tuple[list[_Surf
         outputs += _px4_pulses(params, [*drivers.values()])
     # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
     is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
-    problem = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
-    return surfaces, outputs, _Axes(_PX4_AXIS_COLUMNS, 1.0, problem)
+    reason = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
+    return surfaces, outputs, _Axes(_PX4_AXIS_COLUMNS, 1.0, reason)
 
 
 def _px4_axis_shares(params: _Parameters, indices: Collection[int]) -> dict[int, Any]:

@@ -336,7 +336,7 @@ class Model(FileSection):
     def _noise_of(self, average: Sequence[float]) -> NoiseModel:
         """The noise fitted for flights of this moving average; that of all flights where none was fitted."""
         fitted = [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
-        return fitted[0] if fitted else NoiseModel.model_construct(noise=self.residual_covariance)
+        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.residual_covariance)
 
     def covariance_of_noise(self, average: Sequence[float]) -> Floats:
         """Covariance (3, 3) of the noise of flights of this moving average, (rad/s)2."""

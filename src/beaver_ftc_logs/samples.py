@@ -110,7 +110,8 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         return sample_column(column, t_s, step_s)[0] if column and len(column.t_s) >= min_rows else None
 
     heights = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    logged = [values for quantity in heights if (values := sampled(quantity, 2)) is not None]
+    logged = [one for quantity in heights if (one := sampled(quantity, 2)) is not None]
+    climb_mps = energy.energy_climb_mps(t_s, logged[0], logged[1], stretch) if len(logged) == 2 else None
     rates = [log.columns[name] for name in rate_names]
     clipped = [signals.find_clipped_rows(rate.values).astype(float) for rate in rates]
     was_clipped = [_latest_values(t_s, rate.t_s, rows) for rate, rows in zip(rates, clipped, strict=True)]
@@ -134,8 +135,8 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         notes=(*log.notes, *dict.fromkeys(_defects(log, used, rate_names))),
         airspeed=sampled(vehicle.airspeed),
         unchanged_s={name: _unchanged_s(log.columns[name], t_s) for name in used},
-        is_rate_clipped=np.nan_to_num(was_clipped).any(axis=0),
-        energy_height_rate_mps=energy.energy_climb_mps(t_s, *logged, stretch) if len(logged) == 2 else None,
+        is_rate_clipped=np.asarray(np.nan_to_num(was_clipped).any(axis=0)),
+        energy_height_rate_mps=climb_mps,
         confirmed_rates=confirmed,
     )
     V0 = vehicle.reference_airspeed_mps

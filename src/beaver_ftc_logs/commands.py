@@ -182,34 +182,31 @@ def diagnose(options: DiagnoseOptions) -> None:
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
-    """Raise BadInput for options that contradict one another."""
-    if options.aircraft is None:
-        extra = {"--scenario": options.scenario, "--vehicle": options.vehicle}
-        extra |= {"--certificate": "" if options.certificate else None}
-        for option, value in extra.items():
-            if value is not None:
-                given = f"{option} {value}".rstrip()
-                raise BadInput(f"diagnose: {given}: allowed: only with --aircraft NAME")
-        if options.model is None:
-            _check_replay_options(options)
-        return
-    if options.model is not None:
+    """Raise BadInput for options that contradict one another, or that would change nothing."""
+    own_detector = options.detector == "bank-of-filters"
+    by_aircraft, by_model = options.aircraft is not None, options.model is not None
+    if by_aircraft and by_model:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
-    if options.detector != "bank-of-filters":
+    if by_aircraft and not own_detector:
         reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
         raise BadInput(f"diagnose: --aircraft with {reason}")
-
-
-def _check_replay_options(options: DiagnoseOptions) -> None:
-    """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
-    ignored = {
-        "--score": options.score,
-        "--detector": options.detector != "bank-of-filters",
-        "--reader": options.reader is not None,
+    aircraft_only = {
+        f"--scenario {options.scenario}": options.scenario,
+        f"--vehicle {options.vehicle}": options.vehicle,
+        "--certificate": options.certificate or None,
     }
-    for option, is_given in ignored.items():
-        if is_given:
-            raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
+    diagnosis_only = {
+        "--score": options.score or None,
+        "--detector": None if own_detector else options.detector,
+        "--reader": options.reader,
+    }
+    for given, is_allowed, allowed in (
+        (aircraft_only, by_aircraft, "only with --aircraft NAME"),
+        (diagnosis_only, by_aircraft or by_model, "only with --model MODEL or --aircraft NAME"),
+    ):
+        for option, value in given.items():
+            if value is not None and not is_allowed:
+                raise BadInput(f"diagnose: {option}: allowed: {allowed}")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:

@@ -76,21 +76,11 @@ def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
-    sorted_names = sorted(names)
-    ranked_names = sorted(
-        sorted_names, key=lambda name: -SequenceMatcher(None, name.lower(), wanted_name.lower()).ratio()
-    )
-    nearest_text = (
-        ", ".join(
-            name if name.isprintable() else repr(name) for name in ranked_names[:_N_LISTED_NEAREST_NAMES]
-        )
-        or "none"
-    )
-    return (
-        nearest_text
-        if len(sorted_names) <= _N_LISTED_NEAREST_NAMES
-        else f"{nearest_text}, and {len(sorted_names) - _N_LISTED_NEAREST_NAMES} more"
-    )
+    wanted, ranked = wanted_name.lower(), sorted(names)
+    ranked.sort(key=lambda name: -SequenceMatcher(None, name.lower(), wanted).ratio())
+    nearest = [name if name.isprintable() else repr(name) for name in ranked[:_N_LISTED_NEAREST_NAMES]]
+    n_more = len(ranked) - len(nearest)
+    return (", ".join(nearest) or "none") + (f", and {n_more} more" if n_more else "")
 
 
 @contextmanager
@@ -178,14 +168,10 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.in
     misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or stamps[k] != stamps[k - 1]]
     if not misplaced_rows:
         return kept_rows, ""
-    n_further = len(misplaced_rows) - 1
-    others_text = (
-        f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(stamps)}" if n_further else ""
-    )
-    return (
-        kept_rows,
-        f"{topic}: row {misplaced_rows[0] + 1}: its stamp is out of order, the row is left out{others_text}",
-    )
+    n_more = len(misplaced_rows) - 1
+    others = f", as {'is' if n_more == 1 else 'are'} {n_more} more of {len(stamps)}" if n_more else ""
+    first = f"{topic}: row {misplaced_rows[0] + 1}"
+    return kept_rows, f"{first}: its stamp is out of order, the row is left out{others}"
 
 
 def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
@@ -193,15 +179,16 @@ def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
 
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
-    negated_first_stamp_by_length: list[float] = []
-    first_row_by_length: list[int] = []
+    # by length of a subsequence: its largest first stamp, negated, and the row of that
+    first_stamps: list[float] = []
+    first_rows: list[int] = []
     next_rows = np.full(len(stamps), -1)
     for k in range(len(stamps) - 1, -1, -1):
-        longest_following_length = bisect_left(negated_first_stamp_by_length, -stamps[k])
-        next_rows[k] = first_row_by_length[longest_following_length - 1] if longest_following_length else -1
-        negated_first_stamp_by_length[longest_following_length : longest_following_length + 1] = [-stamps[k]]
-        first_row_by_length[longest_following_length : longest_following_length + 1] = [k]
-    kept_rows = first_row_by_length[-1:]
+        length = bisect_left(first_stamps, -stamps[k])
+        next_rows[k] = first_rows[length - 1] if length else -1
+        first_stamps[length : length + 1] = [-stamps[k]]
+        first_rows[length : length + 1] = [k]
+    kept_rows = first_rows[-1:]
     while kept_rows and next_rows[kept_rows[-1]] >= 0:
         kept_rows.append(int(next_rows[kept_rows[-1]]))
     return np.array(kept_rows, dtype=np.int64)

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.diagnosis import Verdict
@@ -22,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, RecordedFlight
+from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -30,7 +29,6 @@ from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 if TYPE_CHECKING:
     from beaver_ftc.loop import Diagnosis
 
-Mask = NDArray[np.bool_]
 
 _MAX_HZ, _MIN_HZ = 1000.0, 20.0
 _STEP_JITTER = 0.1

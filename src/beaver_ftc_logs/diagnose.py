@@ -22,7 +22,7 @@ from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.regression import expand_groups, unexplained_rates
 from beaver_ftc_logs.samples import Samples
 
@@ -51,15 +51,15 @@ class LogRows:
     """
 
     t_s: Floats
-    faulty: NDArray[np.int64]
+    faulty: Ints
     isolated_surfaces: NDArray[np.object_]
     effectiveness: Floats
     effectiveness_low: Floats
     effectiveness_high: Floats
     fault_probability: Floats
-    credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    credible: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
-    doubtful_rows: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    doubtful_rows: Mapping[str, Mask] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.evidence_start_time_s) != len(self.t_s):
@@ -89,17 +89,17 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
-    def _where(self, mask: NDArray[np.bool_], **values: Any) -> "LogRows":
+    def _where(self, mask: Mask, **values: Any) -> "LogRows":
         """The rows with other values where a mask is true."""
         changed = {name: np.where(mask, value, getattr(self, name)) for name, value in values.items()}
         return replace(self, **changed)
 
-    def without_estimate(self, removed: NDArray[np.bool_]) -> "LogRows":
+    def without_estimate(self, removed: Mask) -> "LogRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where removed (n,) or (n, S) is true."""
         mask = removed if removed.ndim == 2 else removed[:, None]
         return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
-    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "LogRows":
+    def without_verdict(self, reasons: Mapping[str, Mask]) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true."""
         removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
@@ -142,9 +142,7 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     return finish_rows(samples, model, rows, silent)
 
 
-def finish_rows(
-    samples: Samples, model: Model, rows: LogRows, silent: NDArray[np.bool_] | None = None
-) -> LogRows:
+def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | None = None) -> LogRows:
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
     reasons = trust.untrusted_rows(samples, model)
@@ -225,7 +223,7 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
     return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
-def healthy_residual(model: Model, known: NDArray[np.bool_], y: Floats, F: Floats) -> Floats:
+def healthy_residual(model: Model, known: Mask, y: Floats, F: Floats) -> Floats:
     """Residual y - c - sum_g F_g of a healthy vehicle by `unexplained_rates`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
     c, _, _, R = model.as_arrays()
@@ -295,14 +293,14 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
-def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
+def _held_long_enough(holds: Mask, model: Model) -> Mask:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
     n = round(model.settings.confirmation_s * model.rate_hz)
     held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
     return np.asarray(holds & (held > n))
 
 
-def _latched(alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latched(alarmed: Mask, calm: Mask) -> Mask:
     """An alarm once raised stands until health is the likelier again."""
     k = np.arange(len(alarmed))
     last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))
@@ -333,7 +331,7 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 
 def _surfaces_at_fault(
-    model: Model, bank: HypothesisBank, P: Floats, faulty: NDArray[np.int64], nameable: NDArray[np.bool_]
+    model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
@@ -367,7 +365,7 @@ def _surfaces_at_fault(
     return named
 
 
-def join_names(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+def join_names(flags: Mask, names: Sequence[str]) -> NDArray[np.object_]:
     """The names that are flagged in flags (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 

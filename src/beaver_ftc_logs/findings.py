@@ -10,7 +10,6 @@ information a second about one group. m axes, G groups, n samples.
 """
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -171,7 +170,7 @@ def _event_text(event: Document) -> str:
     return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {text}{brief}"
 
 
-def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
+def isolability_document(samples: Samples, model: Model) -> Document:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_bank(model)
     F = _white_responses(samples, model)
@@ -199,7 +198,7 @@ def _white_responses(samples: Samples, model: Model) -> Floats:
     return np.asarray(white.reshape(F.shape) * np.sqrt(model.settings.effective_sample_share))
 
 
-def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> dict[str, Any]:
+def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     odds = _alarm_odds(model, bank, g, dt_s)
     if not len(F):
@@ -244,7 +243,7 @@ def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
     return losses
 
 
-def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
+def _alike_pairs(F: Floats, model: Model) -> list[Document]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
@@ -255,7 +254,7 @@ def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
     return pairs
 
 
-def isolability_sentences(isolable: dict[str, Any]) -> list[str]:
+def isolability_sentences(isolable: Document) -> list[str]:
     """The statement in words."""
     lines = [entry["says"] for entry in isolable["together"]]
     for entry in isolable["groups"]:

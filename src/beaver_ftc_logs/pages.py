@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
-from beaver_ftc.results import as_json, result_folder
+from beaver_ftc.results import Document, as_json, result_folder
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
@@ -73,7 +72,7 @@ def words_of_aircraft(name: str, window_s: float) -> Words:
 
 
 def render_diagnosis(
-    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: dict[str, Any], words: Words
+    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: Document, words: Words
 ) -> str:
     """The report of a flight as HTML text."""
     return load_template("flight.html.j2").render(
@@ -159,8 +158,8 @@ def _shade_alarms(axis: Any, rows: LogRows) -> None:
 def write_results(
     parent: Path,
     name: str,
-    table: dict[str, Any],
-    verdict: dict[str, Any],
+    table: Document,
+    verdict: Document,
     page: str | None = None,
     extra: Callable[[Path], None] | None = None,
 ) -> Path:
@@ -238,22 +237,16 @@ def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
 
 
 def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[Floats, Floats, Floats]:
-    """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
+    """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
+    known, for lines to end."""
     rows, residual = fitting.one_step_residual(model, held_out)
-    rates = np.full_like(held_out.samples.rates, np.nan)
-    r = np.full_like(held_out.samples.rates, np.nan)
-    rates[rows], r[rows] = held_out.samples.rates[rows], residual
-    first = _liveliest_row(rates, rows, n)
+    samples = held_out.samples
+    rates, r = np.full((2, *samples.rates.shape), np.nan)
+    rates[rows], r[rows] = samples.rates[rows], residual
+    total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
+    first = int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
     window = slice(first, first + n)
-    return held_out.samples.t_s[window], rates[window], r[window]
-
-
-def _liveliest_row(rates: Floats, rows: NDArray[np.int64], n: int) -> int:
-    """First sample of the window in which the rates known moved most."""
-    squares = np.zeros(len(rates))
-    squares[rows] = (rates[rows] ** 2).sum(axis=1)
-    total = np.concatenate([[0.0], np.cumsum(squares)])
-    return int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
+    return samples.t_s[window], rates[window], r[window]
 
 
 def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Parameters = Mapping[str, tuple[float, ...]]
 """Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
 _S_PER_US = 1e-6
@@ -154,7 +156,7 @@ def columns_of_topics(
     return columns, tuple(name for name in names if name not in columns), float(origin_us * _S_PER_US)
 
 
-def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.int64], str]:
+def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:
     """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
 
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
@@ -174,7 +176,7 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.in
     return kept_rows, f"{first}: its stamp is out of order, the row is left out{others}"
 
 
-def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
+def _longest_increasing_rows(stamps: Floats) -> Ints:
     """Places of a longest strictly increasing subsequence, by patience sorting from the end.
 
     From the end, so that of a row and one that comes late behind it the late one is left out.

@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_parts, split_long_recording
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight
+from beaver_ftc_logs.recording import Column, Floats, Ints, LoggedFailure, Mask, RecordedFlight
 from beaver_ftc_logs.units import TIME_UNITS
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
@@ -66,7 +65,7 @@ class Samples:
     commands: Floats
     signals: Floats
     labels: Floats
-    stretch_number: NDArray[np.int64]
+    stretch_number: Ints
     dt_s: float
     held_age_s: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
@@ -74,7 +73,7 @@ class Samples:
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
     unchanged_s: Mapping[str, Floats] = field(default_factory=dict)
-    is_rate_clipped: NDArray[np.bool_] | None = None
+    is_rate_clipped: Mask | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
@@ -190,7 +189,7 @@ def _unchanged_s(column: Column, t_s: Floats) -> Floats:
     return np.nan_to_num(since_s + _held_age_s(column, t_s))
 
 
-def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
+def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
     """Whether at each sample a gap has opened since the last number of a column."""
     column = _finite_rows(column)
     usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
@@ -277,7 +276,7 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
             )
 
 
-def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
+def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
@@ -307,7 +306,7 @@ def _other_time_unit_hint(rate_hz: float) -> str:
     return ""
 
 
-def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
+def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
     """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1

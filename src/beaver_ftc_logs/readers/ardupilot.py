@@ -38,13 +38,10 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
         from beaver_ftc_logs.readers import dataflash
 
         messages = dataflash.read_messages(path)
-        if (
-            (of := messages.get("PARM"))
-            and {"Name", "Value"} <= {*of.format.colhash}
-            and "Value" in of.fields
-        ):
-            for name, value in zip(of.cells("Name"), of.numbers("Value").tolist(), strict=True):
-                add_parameter(params, name.partition(b"\0")[0].decode("ascii", "replace"), value)
+        of = messages.get("PARM")
+        if of and "Name" in of.format.colhash and "Value" in of.fields:
+            for name, value in zip(of.texts("Name"), of.numbers("Value").tolist(), strict=True):
+                add_parameter(params, name, value)
         topics = {
             topic: part
             for name, of in messages.items()

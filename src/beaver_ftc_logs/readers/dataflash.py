@@ -48,11 +48,17 @@ class Messages:
         factor = self.format.msg_mults[self.format.colhash[field]]
         return values if factor is None or self.is_text else values / (1.0 / factor)
 
+    def texts(self, field: str) -> list[str]:
+        """The words of a field."""
+        if self.is_text:
+            return list(self.cells(field))
+        return [cell.partition(b"\0")[0].decode("ascii", "replace") for cell in self.cells(field)]
+
     def cells(self, field: str) -> Any:
-        """The field in each message as it is written: numbers, or bytes."""
+        """The field in each message as it is written: numbers or bytes, texts in a log as text."""
         i = self.format.colhash[field]
         if self.is_text:
-            return [_line(self.data, at).split(b",")[i + 1].strip() for at in self.begins]
+            return [_line(self.data, at).split(",")[i + 1].strip() for at in self.begins]
         codes = [FORMAT_TO_STRUCT[code][0] for code in self.format.msg_fmts]
         size, offset = struct.calcsize(f"<{codes[i]}"), struct.calcsize(f"<{''.join(codes[:i])}")
         windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(self.data, np.uint8), size)
@@ -108,19 +114,20 @@ def _text_messages(data: mmap) -> Iterator[tuple[Any, array]]:
     at = data.find(b"FMT,")
     while 0 <= at < len(data):
         line = _line(data, at)
-        kind = line.partition(b",")[0].decode("ascii", "replace")
+        kind = line.partition(",")[0]
         begins[kind].append(at)
         if kind == "FMT":
-            _, number, length, name, codes, columns = line.decode().split(",", 5)
+            _, number, length, name, codes, columns = map(str.strip, line.split(",", 5))
             plain = ",".join(map(str.strip, columns.split(",")))
-            formats[name.strip()] = DFFormat(int(number), name.strip(), int(length), codes.strip(), plain)
-        at += len(line) + 1
+            formats[name] = DFFormat(int(number), name, int(length), codes, plain)
+        end = data.find(b"\n", at)
+        at = end + 1 if end >= 0 else len(data)
     for kind, places in begins.items():
         if fmt := formats.get(kind):
-            whole = (at for at in places if _line(data, at).count(b",") >= len(fmt.format))
+            whole = (at for at in places if _line(data, at).count(",") >= len(fmt.format))
             yield fmt, array("q", whole)
 
 
-def _line(data: mmap, at: int) -> bytes:
+def _line(data: mmap, at: int) -> str:
     end = data.find(b"\n", at)
-    return data[at : end if end >= 0 else len(data)]
+    return data[at : end if end >= 0 else len(data)].rstrip().decode()

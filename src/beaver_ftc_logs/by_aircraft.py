@@ -6,6 +6,7 @@ log has the guarantees of the loop: no alarm in a healthy flight, no true fault 
 outside the aircraft's envelope, after a gap, and where a number is missing.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import pi
@@ -13,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.diagnosis import Verdict
@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, RecordedFlight
+from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -29,7 +29,6 @@ from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 if TYPE_CHECKING:
     from beaver_ftc.loop import Diagnosis
 
-Mask = NDArray[np.bool_]
 
 _MAX_HZ, _MIN_HZ = 1000.0, 20.0
 _STEP_JITTER = 0.1
@@ -61,21 +60,25 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
     if scenario is None:
         return DiagnosedAircraft(aircraft)
     loaded = load_scenario(scenario)
-    if loaded.fdi.sensor_monitor == "always":
-        reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never"
-        raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded.fdi.scheme == "none":
-        reason = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
-        raise BadInput(f"--scenario {scenario}: {reason}")
-    if loaded.airframe.name != aircraft.name:
-        reason = f"flies {loaded.airframe.name}, allowed: a scenario of {aircraft.name}"
-        raise BadInput(f"--scenario {scenario}: {reason}")
+    flown, fdi = loaded.airframe.name, loaded.fdi
+    reasons = {
+        "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never": (
+            fdi.sensor_monitor == "always"
+        ),
+        "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme": (
+            fdi.scheme == "none"
+        ),
+        f"flies {flown}, allowed: a scenario of {aircraft.name}": flown != aircraft.name,
+    }
+    for reason, holds in reasons.items():
+        if holds:
+            raise BadInput(f"--scenario {scenario}: {reason}")
     return DiagnosedAircraft(loaded.airframe, error_sections(loaded))
 
 
 @dataclass(frozen=True)
 class LogInputs:
-    """A log as inputs of the diagnosis.
+    """A log as inputs of the diagnosis of an aircraft.
 
     input_arrays: one array (n, ...) each, as `stepped.input_columns`. held_age_s: mean age of the values of
     each column that is held. has_missing_value (n,): rows in which an input is not a number.
@@ -83,6 +86,7 @@ class LogInputs:
     reset. full_deflection_rad (S,): what a command of 1 is in the log."""
 
     samples: Samples
+    aircraft: Aircraft
     diagnosis: "Diagnosis"
     rate_hz: float
     input_arrays: list[Floats]
@@ -91,19 +95,79 @@ class LogInputs:
     gap_free_stretches: list[tuple[int, int]]
     full_deflection_rad: Floats
 
+    def with_commands(self, commands: Floats) -> "LogInputs":
+        """The inputs with other commands, rad."""
+        rates, signals, _, attitude = self.input_arrays
+        return replace(self, input_arrays=[rates, signals, commands, attitude])
+
+    def stretches(self) -> Iterator[list[Floats]]:
+        """The arrays of each stretch, for a diagnosis that begins anew."""
+        for begin, end in self.gap_free_stretches:
+            self.diagnosis.reset()
+            yield [np.ascontiguousarray(array[begin:end]) for array in self.input_arrays]
+
+    def raises_any_alarm(self) -> bool:
+        """Whether an alarm is raised in any stretch; nothing after it is replayed."""
+        steps = (zip(*arrays, strict=True) for arrays in self.stretches())
+        return any(self.diagnosis.step(*sample).detected for stretch in steps for sample in stretch)
+
+    def replay(self) -> Replayed:
+        """The verdicts of all samples. Rows between stretches have no alarm and bounds 0 and 1. Raises
+        BadInput if a command has the other sign in every part of a stretch."""
+        replays = [replay_samples(self.diagnosis, arrays, self.rate_hz) for arrays in self.stretches()]
+        gains = np.min([replay.command_gains for replay in replays], axis=0)
+        upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
+        if not self.diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
+            for surface, bound in zip(self.aircraft.surfaces, upper, strict=True):
+                if bound < trust.MAX_REVERSED_GAIN:
+                    reason = f"the rates answer the command of {surface} the other way round in all of it"
+                    allowed = f"signs as of {self.aircraft.name}; does `scale: -1` fit?"
+                    raise BadInput(f"{self.samples.name}: {reason}, allowed: {allowed}")
+        n = len(self.samples.t_s)
+        verdicts, low, high = [Verdict()] * n, np.zeros((n, len(gains))), np.ones((n, len(gains)))
+        for (begin, end), replay in zip(self.gap_free_stretches, replays, strict=True):
+            verdicts[begin:end] = replay.verdicts
+            low[begin:end], high[begin:end] = replay.alone_low, replay.alone_high
+        return Replayed(verdicts, low, high, gains, upper)
+
+    def rows(self, replay: Replayed) -> LogRows:
+        """The rows, without a verdict where the log is not credible."""
+        rows = rows_of_replay(self.samples.t_s, replay, self.aircraft.surfaces, self.diagnosis.config)
+        return rows.without_verdict(_doubtful_rows(self, replay, rows))
+
 
 def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check_inputs(log, vehicle, given.aircraft)
+    aircraft = given.aircraft
+    airspeed, flow = _flow_columns(log, vehicle, aircraft)
     changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
     samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
-    diagnosis = Diagnosis(given.aircraft, rate_hz, **given.declared_errors)
-    tilted = diagnosis.declared.air.moves
-    arrays, ages = _read_sample_inputs(samples, log, vehicle, given.aircraft, tilted)
-    _check_plausible(samples.name, arrays, given.aircraft)
+    diagnosis = Diagnosis(aircraft, rate_hz, **given.declared_errors)
+    columns, ages = convert_to_si(log, vehicle).columns, dict(samples.held_age_s)
+
+    def sampled_at(quantity: QuantityColumn) -> Floats:
+        values, age_s = sample_column(columns[quantity.column], samples.t_s, samples.dt_s)
+        if age_s is not None:
+            ages[quantity.column] = age_s
+        return values
+
+    signals = np.column_stack([sampled_at(quantity) for quantity in (*flow[:2], airspeed, *flow[2:])])
+    places = [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
+    full_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
+    samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
+    attitude = np.zeros_like(samples.rates)
+    if diagnosis.declared.air.moves:
+        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
+            quantity = getattr(vehicle.attitude, angle) if vehicle.attitude else None
+            if quantity is None or quantity.column not in columns:
+                reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
+                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
+            attitude[:, axis] = sampled_at(quantity)
+    arrays = [samples.rates, signals, samples.commands * full_rad, attitude]
+    _check_plausible(samples.name, signals, arrays[2], aircraft)
     missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
     stretches = _gap_free_stretches(samples, missing, rate_hz)
     if not stretches:
@@ -111,10 +175,7 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
             f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
             f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
-    places = _surface_places(vehicle, given.aircraft)
-    samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
-    full_rad = _full_deflection_rad(vehicle, given.aircraft)
-    return LogInputs(samples, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
+    return LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
 
 
 def diagnose_aircraft(
@@ -126,120 +187,58 @@ def diagnose_aircraft(
 
 
 def diagnose_inputs(inputs: LogInputs, given: DiagnosedAircraft) -> tuple[LogRows, Document]:
-    """The rows and the document of verdict.json."""
-    samples, aircraft = inputs.samples, given.aircraft
-    replay = _replay_flight(inputs, aircraft)
-    rows = _replayed_rows(inputs, aircraft, replay)
+    """The rows and the document of verdict.json. Raises BadInput if the log has no alarm once the sign of a
+    command is changed, or two commands are exchanged."""
+    replay = inputs.replay()
+    rows = inputs.rows(replay)
     if rows.has_credible_alarm():
-        _refuse_reversed(inputs, aircraft, replay, rows)
-        _refuse_exchanged(inputs, aircraft, rows)
-    return rows, _verdict_document(samples, rows, replay, given, inputs.held_age_s)
+        for corrected, error in _corrected_inputs(inputs, replay):
+            if corrected.rows(corrected.replay()).clears_alarm(rows):
+                raise error
+    return rows, _verdict_document(inputs, rows, replay, given)
 
 
-def _replay_flight(inputs: LogInputs, aircraft: Aircraft) -> Replayed:
-    """The verdicts of all samples. Raises BadInput if a command has the other sign in every part."""
-    diagnosis = inputs.diagnosis
-    replays = []
-    for begin, end in inputs.gap_free_stretches:
-        diagnosis.reset()
-        arrays = [array[begin:end] for array in inputs.input_arrays]
-        replays.append(replay_samples(diagnosis, arrays, inputs.rate_hz))
-    if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(inputs.samples.name, aircraft, replays)
-    return _join_stretches(len(inputs.samples.t_s), inputs.gap_free_stretches, replays)
-
-
-def _replayed_rows(inputs: LogInputs, aircraft: Aircraft, replay: Replayed) -> LogRows:
-    """The rows, without a verdict where the log is not credible."""
-    t_s, stretches = inputs.samples.t_s, inputs.gap_free_stretches
-    rows = rows_of_replay(t_s, replay, aircraft.surfaces, inputs.diagnosis.config)
-    reasons = _doubtful_rows_of(inputs.input_arrays[1], aircraft, inputs.has_missing_value, stretches)
-    reasons |= _unexplained_starts(t_s, stretches, replay)
-    return rows.without_verdict(_complete_reasons(stretches, rows, reasons))
-
-
-def _refuse_reversed(inputs: LogInputs, aircraft: Aircraft, replay: Replayed, rows: LogRows) -> None:
-    """Raise BadInput if the log has no alarm once the sign of a command is changed. With a fault the changed
+def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[LogInputs, BadInput]]:
+    """The inputs with one mistake in the commands mended, and the error that says so. With a fault a changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
+    flight, aircraft = inputs.samples.name, inputs.aircraft
     for s in np.flatnonzero(replay.command_gains < 0.0):
         commands = inputs.input_arrays[2] * np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
-        corrected = _with_commands(inputs, commands)
-        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
-        if rows_then.clears_alarm(rows):
-            raise reversed_command_error(inputs.samples.name, aircraft.surfaces[s], f"of {aircraft.name}")
-
-
-def _refuse_exchanged(inputs: LogInputs, aircraft: Aircraft, rows: LogRows) -> None:
-    """Raise BadInput if the log has no alarm once two commands are exchanged."""
+        error = reversed_command_error(flight, aircraft.surfaces[s], f"of {aircraft.name}")
+        yield inputs.with_commands(commands), error
     for first, second in combinations(range(len(aircraft.surfaces)), 2):
         order = np.arange(len(aircraft.surfaces))
         order[[first, second]] = second, first
-        corrected = _with_commands(inputs, inputs.samples.commands[:, order] * inputs.full_deflection_rad)
-        if _raises_any_alarm(corrected):
-            continue
-        rows_then = _replayed_rows(corrected, aircraft, _replay_flight(corrected, aircraft))
-        if rows_then.clears_alarm(rows):
+        corrected = inputs.with_commands(inputs.samples.commands[:, order] * inputs.full_deflection_rad)
+        if not corrected.raises_any_alarm():
             pair = f"{aircraft.surfaces[first]} and {aircraft.surfaces[second]}"
             reason = f"if the commands of {pair} are exchanged, there is no alarm"
-            raise BadInput(f"{inputs.samples.name}: {reason}, allowed: commands as of {aircraft.name}")
+            yield corrected, BadInput(f"{flight}: {reason}, allowed: commands as of {aircraft.name}")
 
 
-def _with_commands(inputs: LogInputs, commands: Floats) -> LogInputs:
-    """The inputs with other commands, rad."""
-    rates, signals, _, attitude = inputs.input_arrays
-    return replace(inputs, input_arrays=[rates, signals, commands, attitude])
-
-
-def _raises_any_alarm(inputs: LogInputs) -> bool:
-    """Whether an alarm is raised in any stretch; nothing after it is replayed."""
-    for begin, end in inputs.gap_free_stretches:
-        inputs.diagnosis.reset()
-        arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
-        if any(inputs.diagnosis.step(*sample).detected for sample in zip(*arrays, strict=True)):
-            return True
-    return False
-
-
-def _check_command_signs(flight: str, aircraft: Aircraft, replays: list[Replayed]) -> None:
-    """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
-    gains = np.min([replay.command_gain_bounds for replay in replays], axis=0)
-    for surface, upper in zip(aircraft.surfaces, gains, strict=True):
-        if upper < trust.MAX_REVERSED_GAIN:
-            reason = f"the rates answer the command of {surface} the other way round in all of it"
-            raise BadInput(f"{flight}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
-
-
-def _check_inputs(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
-    """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
+def _flow_columns(
+    log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft
+) -> tuple[QuantityColumn, list[QuantityColumn]]:
+    """The columns of the airspeed and of the flow. Raises BadInput if the vehicle file or the log lacks an
+    input of the aircraft's design model."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
         allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
         raise BadInput(f"vehicle {vehicle.name}: surfaces: no {missing[0]}, allowed: {allowed}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
-    flow = _flow_input_names(aircraft)
-    for name in flow:
+    names = ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
+    for name in names:
         if name not in vehicle.flow:
-            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow)}"
+            reason = f"flow: no {name}, allowed: a column for each of {', '.join(names)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
-    for quantity in (vehicle.airspeed, *(vehicle.flow[name] for name in flow)):
+    flow = [vehicle.flow[name] for name in names]
+    for quantity in (vehicle.airspeed, *flow):
         if quantity.column not in log.columns:
             nearest = log.nearest_columns_text(quantity.column)
             reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
             raise BadInput(f"{log.name}: {reason}")
-
-
-def _flow_input_names(aircraft: Aircraft) -> list[str]:
-    return ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
-
-
-def _surface_places(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
-    """Place of each of the aircraft's surfaces among the vehicle's."""
-    return [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
-
-
-def _full_deflection_rad(vehicle: Vehicle, aircraft: Aircraft) -> Floats:
-    return np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
+    return vehicle.airspeed, flow
 
 
 def _log_rate_hz(samples: Samples) -> float:
@@ -253,39 +252,8 @@ def _log_rate_hz(samples: Samples) -> float:
     return rate_hz
 
 
-def _read_sample_inputs(
-    samples: Samples, log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, tilted: bool
-) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.input_columns`, and the mean age of
-    the values of each held column, s. tilted: if false, the attitude is zeros."""
-    columns = convert_to_si(log, vehicle).columns
-    ages = dict(samples.held_age_s)
-
-    def sampled_at(quantity: QuantityColumn) -> Floats:
-        values, age_s = sample_column(columns[quantity.column], samples.t_s, samples.dt_s)
-        if age_s is not None:
-            ages[quantity.column] = age_s
-        return values
-
-    assert vehicle.airspeed is not None  # as `_check_inputs` has seen
-    flow = [vehicle.flow[name] for name in _flow_input_names(aircraft)]
-    signals = [sampled_at(quantity) for quantity in (*flow[:2], vehicle.airspeed, *flow[2:])]
-    places = _surface_places(vehicle, aircraft)
-    full_rad = _full_deflection_rad(vehicle, aircraft)
-    attitude = np.zeros_like(samples.rates)
-    if tilted:
-        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
-            quantity = getattr(vehicle.attitude, angle) if vehicle.attitude else None
-            if quantity is None or quantity.column not in columns:
-                reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
-            attitude[:, axis] = sampled_at(quantity)
-    return [samples.rates, np.column_stack(signals), samples.commands[:, places] * full_rad, attitude], ages
-
-
-def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> None:
+def _check_plausible(flight: str, signals: Floats, commands: Floats, aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    signals, commands = arrays[1], arrays[2]
     for i, name in enumerate(("alpha_rad", "beta_rad")):
         median = _median_without_nan(np.abs(signals[:, i]))
         if median > 0.5 * pi:
@@ -296,10 +264,10 @@ def _check_plausible(flight: str, arrays: list[Floats], aircraft: Aircraft) -> N
         reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
         allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")
-    for s, surface in enumerate(aircraft.surfaces):
+    for surface, command in zip(aircraft.surfaces, commands.T, strict=True):
         travel = aircraft.travel[surface]
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
-        max_rad = np.nanmax(np.abs(commands[:, s]), initial=0.0)
+        max_rad = np.nanmax(np.abs(command), initial=0.0)
         if max_rad > _STOP_RATIO * stop_rad:
             reason = f"the command of {surface} reaches {max_rad:.3g} rad"
             allowed = f"its stop, {stop_rad:.3g} rad"
@@ -316,92 +284,61 @@ def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list
     """First row and end of each stretch that is evenly spaced and has no missing number."""
     uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
     joins = ~(missing[1:] | missing[:-1] | uneven)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], joins, [False]]).astype(int)))
-    ends = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(first, last + 1) for first, last in ends if last + 1 - first >= _MIN_SAMPLES]
+    first, last = np.flatnonzero(np.diff(joins.astype(int), prepend=0, append=0)).reshape(-1, 2).T
+    enough = last + 1 - first >= _MIN_SAMPLES
+    return [*zip(first[enough].tolist(), (last[enough] + 1).tolist(), strict=True)]
 
 
-def _join_stretches(n: int, stretches: list[tuple[int, int]], replays: list[Replayed]) -> Replayed:
-    """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
-    and 1."""
-    verdicts = [Verdict()] * n
-    gains = np.min([replay.command_gains for replay in replays], axis=0)
-    upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
-    low, high = np.zeros((n, len(gains))), np.ones((n, len(gains)))
-    for (begin, end), replay in zip(stretches, replays, strict=True):
-        verdicts[begin:end] = replay.verdicts
-        low[begin:end], high[begin:end] = replay.alone_low, replay.alone_high
-    return Replayed(verdicts, low, high, gains, upper)
-
-
-def _doubtful_rows_of(
-    signals: Floats, aircraft: Aircraft, missing: Mask, stretches: list[tuple[int, int]]
-) -> dict[str, Mask]:
-    """For each reason the rows (n,) for which there is no verdict."""
-    low_mps, high_mps = aircraft.envelope.airspeed_mps
-    low, high = aircraft.alpha_rad
-    outside = np.ones(len(signals), dtype=bool)
-    for begin, end in stretches:
+def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[str, Mask]:
+    """For each reason that has rows, the rows (n,) for which there is no verdict."""
+    aircraft, missing = inputs.aircraft, inputs.has_missing_value
+    (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
+    alpha, airspeed = inputs.input_arrays[1][:, 0], inputs.input_arrays[1][:, 2]
+    outside, unexplained, after = (np.zeros(len(alpha), dtype=bool) for _ in range(3))
+    outside[:] = True
+    for begin, end in inputs.gap_free_stretches:
         outside[begin:end] = False
-    airspeed, alpha = signals[:, 2], signals[:, 0]
-    return {
+        t_s = rows.t_s[begin:end]
+        first_verdicts = replay.verdicts[begin : begin + int(np.searchsorted(t_s, t_s[0] + _START_WINDOW_S))]
+        if any(verdict.isolated == "unanticipated" for verdict in first_verdicts):
+            detected = [verdict.detected for verdict in first_verdicts]
+            unexplained[begin + detected.index(True) : end] = True
+    cause = "another aircraft or loading, or undeclared errors"
+    reasons = {
         "a number is missing": missing,
         "samples are not evenly spaced": outside & ~missing,
         f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (airspeed < low_mps) | (airspeed > high_mps),
         f"angle of attack is outside {low:.3g} to {high:.3g} rad": (alpha < low) | (alpha > high),
+        f"no fault explains it from the first second on: {cause}": unexplained,
     }
-
-
-def _unexplained_starts(t_s: Floats, stretches: list[tuple[int, int]], replay: Replayed) -> dict[str, Mask]:
-    """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
-    residuals within the first second."""
-    after = np.zeros(len(t_s), dtype=bool)
-    for begin, end in stretches:
-        stop = begin + int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
-        if any(verdict.isolated == "unanticipated" for verdict in replay.verdicts[begin:stop]):
-            first = next(k for k in range(begin, stop) if replay.verdicts[k].detected)
-            after[first:end] = True
-    cause = "another aircraft or loading, or undeclared errors"
-    return {f"no fault explains it from the first second on: {cause}": after}
-
-
-def _complete_reasons(
-    stretches: list[tuple[int, int]], rows: LogRows, reasons: dict[str, Mask]
-) -> dict[str, Mask]:
-    """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
-    a reason of its own."""
     has_reason = np.logical_or.reduce(list(reasons.values()))
-    after = np.zeros(len(rows.t_s), dtype=bool)
-    for begin, end in stretches:
+    for begin, end in inputs.gap_free_stretches:
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
             after[alarms[0] : end] = True
-    reasons = reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
+    reasons["the alarm was raised where nothing can be said"] = after & ~has_reason
     return {reason: mask for reason, mask in reasons.items() if mask.any()}
 
 
 def _verdict_document(
-    samples: Samples, rows: LogRows, replay: Replayed, given: DiagnosedAircraft, ages: dict[str, float]
+    inputs: LogInputs, rows: LogRows, replay: Replayed, given: DiagnosedAircraft
 ) -> Document:
     """The document of verdict.json."""
-    surfaces = list(given.aircraft.surfaces)
-    alarms = np.flatnonzero(rows.faulty)
-    last = replay.verdicts[alarms[-1]] if alarms.size else Verdict()
-    since = [k for k in alarms.tolist() if replay.verdicts[k].isolated == last.isolated]
+    samples, surfaces = inputs.samples, list(given.aircraft.surfaces)
+    alarms = np.flatnonzero(rows.faulty).tolist()
+    last = replay.verdicts[alarms[-1]] if alarms else Verdict()
+    since = [k for k in alarms if replay.verdicts[k].isolated == last.isolated]
     held = [
         f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
-        for name, age_s in ages.items()
+        for name, age_s in inputs.held_age_s.items()
     ]
     return {
         "flight": samples.name,
         "aircraft": given.aircraft.name,
         "declared": given.declared_errors,
-        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
-        "recorded_s": len(samples.t_s) * samples.dt_s,
-        "gaps": int(samples.stretch_number[-1]),
-        "rate_hz": 1.0 / samples.dt_s,
-        "faulty": bool(alarms.size),
-        "detection_s": float(samples.t_s[alarms[0]]) if alarms.size else None,
+        **findings.span_entry(samples),
+        "faulty": bool(alarms),
+        "detection_s": float(samples.t_s[alarms[0]]) if alarms else None,
         "isolation_s": float(samples.t_s[since[0]]) if last.isolated else None,
         "isolated": last.isolated,
         "type": last.type,
@@ -428,8 +365,3 @@ def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
         else f"{name}: in half of the flight not even a complete loss would show within a second."
         for name, loss in zip(surfaces, losses.tolist(), strict=True)
     ]
-
-
-def as_text(verdict: Document) -> str:
-    """The verdict in lines for people."""
-    return f"{findings.as_text(verdict)}\n  report: {verdict['folder']}/report.html"

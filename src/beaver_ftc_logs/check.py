@@ -38,7 +38,7 @@ from beaver_ftc_logs.readers.table import (
     text_of_column_phrase,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
-from beaver_ftc_logs.samples import Samples, read_vehicle_parts, resample
+from beaver_ftc_logs.samples import convert_to_si, read_vehicle_parts, resample
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
@@ -80,23 +80,29 @@ _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _LOG_RATES_HZ = (4.0, 2000.0)
 
 
+class _NoVehicle(Exception):
+    """No vehicle file can be proposed for a log; the text says why."""
+
+
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
     """Return a description of a log in `lines`, and a `vehicle` for it: the one given, or a guess.
 
     usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
     """
-    remarks: list[str] = []
+    lines: list[str] = []
     guess: Document | None = None
     if vehicle is None:
-        guess = _guess_vehicle(path, reader, remarks)
-        if guess is None:
-            return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
+        try:
+            guess = _guess_vehicle(path, reader, lines)
+        except _NoVehicle as reason:
+            lines.append(f"{path}: {reason}")
+            return {"log": str(path), "usable": False, "lines": lines, "vehicle": None}
         vehicle = Vehicle.model_validate(guess)
     parts = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
-    for part, (_, lines) in enumerate(parts, 1):
-        remarks += lines if len(parts) == 1 else [f"part {part} of {len(parts)}: {line}" for line in lines]
-    usable = all(usable for usable, _ in parts)
-    return {"log": str(path), "usable": usable, "lines": remarks, "vehicle": guess}
+    for part, (_, said) in enumerate(parts, 1):
+        head = f"part {part} of {len(parts)}: " if len(parts) > 1 else ""
+        lines += [f"{head}{line}" for line in said]
+    return {"log": str(path), "usable": all(of for of, _ in parts), "lines": lines, "vehicle": guess}
 
 
 def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
@@ -105,55 +111,48 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
         samples = resample(log, vehicle)
     except BadInput as error:
         return False, [str(error)]
+    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
+    gap = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
+    size = (
+        f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s; gaps: {n_gaps}{gap}"
+    )
     rates = zip("pqr", samples.rates.T, strict=True)
     still = [axis for axis, rate in rates if np.ptp(rate[np.isfinite(rate)]) == 0.0]
     lines = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still]
-    return not still, [_log_size_text(samples), *samples.notes, *_compare_angles(log, vehicle), *lines]
-
-
-def _log_size_text(samples: Samples) -> str:
-    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
-    gap = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
-    text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s"
-    return f"{text}; gaps: {n_gaps}{gap}"
+    return not still, [size, *samples.notes, *_compare_angles(log, vehicle), *lines]
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, angles = log.columns, vehicle.attitude
+    columns, angles = convert_to_si(log, vehicle).columns, vehicle.attitude
     if angles is None or angles.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
-    gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    named = [angle if angle and angle.column in columns else None for angle in (angles.pitch, angles.yaw)]
-    in_si = [angle and _column_in_si(columns, angle) for angle in (angles.roll, *named)]
+    gyros = [columns[name] for name in vehicle.rate_columns]
+    names = [angle.column if angle else "" for angle in (angles.roll, angles.pitch, angles.yaw)]
+    in_si = [columns.get(name) for name in names]
     fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
-    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    trios = zip(fits, (angles.roll, *named), rates, strict=True)
-    return [_fit_text(fit, angle.column, rate) for fit, angle, rate in trios if fit and angle]
+    return [
+        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} (correlation "
+        f"{fit.correlation:.2f}): {'they agree' if _agrees(fit) else 'they tell nothing of one another'}"
+        for fit, angle, rate in zip(fits, names, vehicle.rate_columns, strict=True)
+        if fit
+    ]
 
 
-def _fit_text(fit: physics.AngleFit, angle: str, rate: str) -> str:
-    verdict = "they agree" if abs(fit.correlation) > _MIN_CORRELATION else "they tell nothing of one another"
-    return (
-        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} "
-        f"(correlation {fit.correlation:.2f}): {verdict}"
-    )
+def _agrees(fit: physics.AngleFit) -> bool:
+    return abs(fit.correlation) > _MIN_CORRELATION
 
 
-def _column_in_si(columns: Any, quantity: Any) -> Column:
-    column: Column = columns[quantity.column]
-    return replace(column, values=quantity.to_si(column.values))
-
-
-def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:
-    """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
+def _guess_vehicle(path: Path, reader: str | None, lines: list[str]) -> Document:
+    """The keys of a vehicle file for a log, by its first part. Raises _NoVehicle where rates or commands are
+    not found. lines: receives what is said of the log."""
     check_exists(path)
     reader = reader or reader_name_for_path(path)
-    time = _find_time(path, remarks) if reader == "table" else None
+    time = _find_time(path, lines) if reader == "table" else None
     log, in_log, mixing = _read_likely(path, reader, time)
-    remarks += mixing.lines
+    lines += mixing.lines
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
     angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
     found = {
@@ -162,54 +161,35 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     }
     if hovers_throughout(log.parameters, log.columns):
         reason = f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2)"
-        remarks.append(f"{path}: {reason}, allowed: a log with flight on its wing")
-        return None
+        raise _NoVehicle(f"{reason}, allowed: a log with flight on its wing")
     if not mixing.surfaces:
-        rotors = multicopter_reason(log.parameters, in_log)
-        if rotors is not None:
+        if rotors := multicopter_reason(log.parameters, in_log):
             reason = f"is the log of a multicopter ({rotors}), which has no surfaces"
-            remarks.append(f"{path}: {reason}, allowed: a log of an aircraft with surfaces")
-            return None
+            raise _NoVehicle(f"{reason}, allowed: a log of an aircraft with surfaces")
         for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
             mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
             mixing.surfaces[_plain_name(name)] = {name: 1.0}
-    missing = [axis for axis in "pqr" if found[axis] is None]
-    if missing or not mixing.surfaces:
-        problem = missing_commands_text(in_log)
-        if missing:
-            problem = f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
-        nearest = nearest_names_text("rate" if missing else "command", in_log)
-        remarks.append(f"{path}: {problem}; the log has {nearest}")
-        return None
-    return _propose_vehicle(path.stem, log, reader, time, found, mixing)
-
-
-def _propose_vehicle(
-    name: str,
-    log: RecordedFlight,
-    reader: str,
-    time: tuple[str, str] | None,
-    found: dict[str, str | None],
-    mixing: Mixing,
-) -> Document:
-    columns = log.columns
-    roll = columns[found["roll"]] if found["roll"] else None
+    if missing := [axis for axis in "pqr" if found[axis] is None]:
+        nearest = nearest_names_text("rate", in_log)
+        reason = f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
+        raise _NoVehicle(f"{reason}; the log has {nearest}")
+    if not mixing.surfaces:
+        nearest = nearest_names_text("command", in_log)
+        raise _NoVehicle(f"{missing_commands_text(in_log)}; the log has {nearest}")
+    roll = log.columns[found["roll"]] if found["roll"] else None
     angle_unit = _guess_angle_unit(str(found["roll"]), roll, reader) if roll is not None else "rad"
     rate_unit = _guess_rate_unit(log, [str(found[axis]) for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
-    vehicle: Document = {"name": _plain_name(name), "reader": reader}
+    vehicle: Document = {"name": _plain_name(path.stem), "reader": reader}
     if time and time != (TIME_COLUMN, "s"):
         vehicle["time"] = {"column": time[0], "unit": time[1]}
-    vehicle["rates"] = {axis: _column_entry(str(found[axis]), rate_unit, "rad/s") for axis in "pqr"}
-    vehicle["commands"] = mixing.commands
-    vehicle["surfaces"] = mixing.surfaces
-    angles = {axis: found[axis] for axis in ("roll", "pitch") if found[axis]}
+    vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
+    vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
     if roll is not None:
-        entries = {axis: _column_entry(str(name), angle_unit, "rad") for axis, name in angles.items()}
-        vehicle["attitude"] = entries
+        named = [axis for axis in ("roll", "pitch") if found[axis]]
+        vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
     if az := found["az"]:
-        median = float(np.nanmedian(np.abs(columns[az].values)))
-        unit = nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0) if median > 0.0 else None
-        if unit:
+        median = float(np.nanmedian(np.abs(log.columns[az].values)))
+        if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
             vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
     if found["airspeed"]:
         vehicle["airspeed"] = found["airspeed"]
@@ -297,7 +277,7 @@ def _guess_rate_unit(
     if roll is not None:
         in_rad = replace(roll, values=roll.values * rad_per_roll_unit)
         fit = physics.fit_angle(rates, (in_rad, None, None), 0)
-        if fit is not None and abs(fit.correlation) > _MIN_CORRELATION:
+        if fit is not None and _agrees(fit):
             found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
     largest = max(_largest_magnitude(rate.values) for rate in rates)
     return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
@@ -307,7 +287,7 @@ def _largest_magnitude(values: Floats) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _column_entry(name: str, unit: str, si_unit: str) -> Any:
+def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
     return name if unit == si_unit else {"column": name, "unit": unit}
 
 

@@ -39,8 +39,7 @@ def corrected_logs(
     that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
     shows nothing of their commands."""
     surfaces = list(vehicle.surfaces)
-    rates = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    doubtful = [name for name in rates if name not in samples.confirmed_rates]
+    doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
     for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
         order = list(range(len(surfaces)))
         order[i], order[j] = j, i
@@ -65,7 +64,7 @@ def _altered(
     samples: Samples, vehicle: Vehicle, sources: Mapping[str, str], factors: Mapping[str, float]
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.regressor_columns
+    names = vehicle.rate_columns + vehicle.regressor_columns
     columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
     new = []
     for name in names:

@@ -178,48 +178,46 @@ def diagnose(options: DiagnoseOptions) -> None:
         _diagnose_and_write(flight, model, options.out, options.score, options.detector)
         for flight in stream_flights(options.flights, model.vehicle, options.reader)
     ]
-    texts = (f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts)
-    answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
+    answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
-    """Raise BadInput for options that contradict one another."""
-    if options.aircraft is None:
-        extra = {"--scenario": options.scenario, "--vehicle": options.vehicle}
-        extra |= {"--certificate": "" if options.certificate else None}
-        for option, value in extra.items():
-            if value is not None:
-                given = f"{option} {value}".rstrip()
-                raise BadInput(f"diagnose: {given}: allowed: only with --aircraft NAME")
-        if options.model is None:
-            _check_replay_options(options)
-        return
-    if options.model is not None:
+    """Raise BadInput for options that contradict one another, or that would change nothing."""
+    own_detector = options.detector == "bank-of-filters"
+    by_aircraft, by_model = options.aircraft is not None, options.model is not None
+    if by_aircraft and by_model:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
-    if options.detector != "bank-of-filters":
+    if by_aircraft and not own_detector:
         reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
         raise BadInput(f"diagnose: --aircraft with {reason}")
-
-
-def _check_replay_options(options: DiagnoseOptions) -> None:
-    """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
-    ignored = {
-        "--score": options.score,
-        "--detector": options.detector != "bank-of-filters",
-        "--reader": options.reader is not None,
+    aircraft_only = {
+        f"--scenario {options.scenario}": options.scenario,
+        f"--vehicle {options.vehicle}": options.vehicle,
+        "--certificate": options.certificate or None,
     }
-    for option, is_given in ignored.items():
-        if is_given:
-            raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
+    diagnosis_only = {
+        "--score": options.score or None,
+        "--detector": None if own_detector else options.detector,
+        "--reader": options.reader,
+    }
+    for given, is_allowed, allowed in (
+        (aircraft_only, by_aircraft, "only with --aircraft NAME"),
+        (diagnosis_only, by_aircraft or by_model, "only with --model MODEL or --aircraft NAME"),
+    ):
+        for option, value in given.items():
+            if value is not None and not is_allowed:
+                raise BadInput(f"diagnose: {option}: allowed: {allowed}")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_diagnosed, read_inputs
+    from beaver_ftc_logs import pages
+    from beaver_ftc_logs.by_aircraft import diagnose_inputs, load_diagnosed, read_inputs
+    from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
-    from beaver_ftc_logs.pages import write_aircraft_diagnosis
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import read_vehicle_parts
     from beaver_ftc_logs.scoring import score_diagnosis
+    from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     if options.certificate:
         from beaver_ftc_logs import certified
@@ -244,7 +242,10 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
             writer = None
             if options.certificate:
                 writer = partial(certified.write_certificate_and_log, inputs, rows)
-            folder = write_aircraft_diagnosis(options.out, samples, surfaces, rows, verdict, writer)
+            words = pages.words_of_aircraft(given.aircraft.name, BOUND_WINDOW_S)
+            page = pages.render_diagnosis(samples, surfaces, rows, verdict, words)
+            table = rows.table(surfaces)
+            folder = pages.write_results(options.out, samples.name, table, verdict, page, writer)
             verdicts.append(verdict | {"folder": str(folder)})
         texts += [*mixing, *map(as_text, verdicts[before:])]
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
@@ -271,14 +272,17 @@ def _diagnose_and_write(
 ) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with_detector
     from beaver_ftc_logs.findings import verdict_document
-    from beaver_ftc_logs.pages import write_diagnosis
+    from beaver_ftc_logs.pages import render_diagnosis, words_of_model, write_results
     from beaver_ftc_logs.scoring import score_diagnosis
 
     rows = diagnose_with_detector(detector, samples, model)
     verdict = verdict_document(samples, model, rows) | {"detector": detector}
     if with_score:
         verdict["score"] = score_diagnosis(samples, rows, model.groups)
-    folder = write_diagnosis(out, samples, model, rows, verdict)
+    surfaces = list(model.vehicle.surfaces)
+    page = render_diagnosis(samples, surfaces, rows, verdict, words_of_model(model))
+    table = rows.table(surfaces, with_probability=True)
+    folder = write_results(out, samples.name, table, verdict, page)
     return verdict | {"folder": str(folder)}
 
 

@@ -9,9 +9,10 @@ residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whe
 calm (n,): whether health, or no response at all, is the likelier.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.samples import Samples
 
@@ -50,21 +51,34 @@ class LogRows:
     """
 
     t_s: Floats
-    faulty: NDArray[np.int64]
+    faulty: Ints
     isolated_surfaces: NDArray[np.object_]
     effectiveness: Floats
     effectiveness_low: Floats
     effectiveness_high: Floats
     fault_probability: Floats
-    credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    credible: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
-    doubtful_rows: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    doubtful_rows: Mapping[str, Mask] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.evidence_start_time_s) != len(self.t_s):
             object.__setattr__(self, "evidence_start_time_s", self.t_s)
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
+
+    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> dict[str, Any]:
+        """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
+        bounds are 0 and 1."""
+        columns: dict[str, Any] = {"t_s": self.t_s, "faulty": self.faulty}
+        columns["named"] = self.isolated_surfaces.tolist()
+        for i, surface in enumerate(surfaces):
+            columns[f"{surface}_effectiveness"] = self.effectiveness[:, i]
+            columns[f"{surface}_low"] = self.effectiveness_low[:, i]
+            columns[f"{surface}_high"] = self.effectiveness_high[:, i]
+        if with_probability:
+            columns["fault_probability"] = self.fault_probability
+        return columns | {"credible": self.credible}
 
     def has_credible_alarm(self) -> bool:
         """Whether an alarm is raised in a credible row."""
@@ -75,32 +89,23 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
-    def without_estimate(self, removed: NDArray[np.bool_]) -> "LogRows":
+    def _where(self, mask: Mask, **values: Any) -> "LogRows":
+        """The rows with other values where a mask is true."""
+        changed = {name: np.where(mask, value, getattr(self, name)) for name, value in values.items()}
+        return replace(self, **changed)
+
+    def without_estimate(self, removed: Mask) -> "LogRows":
         """The rows with effectiveness 1 and bounds 0 and 1 where removed (n,) or (n, S) is true."""
         mask = removed if removed.ndim == 2 else removed[:, None]
-        return replace(
-            self,
-            effectiveness=np.where(mask, 1.0, self.effectiveness),
-            effectiveness_low=np.where(mask, 0.0, self.effectiveness_low),
-            effectiveness_high=np.where(mask, 1.0, self.effectiveness_high),
-        )
+        return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
-    def without_alarm(self, removed: NDArray[np.bool_]) -> "LogRows":
-        """The rows without alarm and name where removed (n,) is true."""
-        return replace(
-            self,
-            faulty=np.where(removed, 0, self.faulty),
-            isolated_surfaces=np.where(removed, "", self.isolated_surfaces),
-            fault_probability=np.where(removed, 0.0, self.fault_probability),
-        )
-
-    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "LogRows":
+    def without_verdict(self, reasons: Mapping[str, Mask]) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true."""
-        removed = np.zeros(len(self.t_s), dtype=bool)
-        for mask in reasons.values():
-            removed |= mask
-        rows = self.without_estimate(removed).without_alarm(removed)
+        removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
+        rows = self.without_estimate(removed)._where(
+            removed, faulty=0, isolated_surfaces="", fault_probability=0.0
+        )
         return replace(rows, credible=np.where(removed, 0, 1), doubtful_rows=reasons)
 
 
@@ -137,9 +142,7 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     return finish_rows(samples, model, rows, silent)
 
 
-def finish_rows(
-    samples: Samples, model: Model, rows: LogRows, silent: NDArray[np.bool_] | None = None
-) -> LogRows:
+def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | None = None) -> LogRows:
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
     reasons = trust.untrusted_rows(samples, model)
@@ -181,10 +184,10 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges is not None else None
-    if unpowered_mps is None or samples.energy_height_rate_mps is None:
-        return rows
+    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges else None
     rate_mps = samples.energy_height_rate_mps
+    if unpowered_mps is None or rate_mps is None:
+        return rows
     named = energy.withdraw_surfaces(
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
@@ -278,17 +281,18 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
     low, high = _credible_bounds(levels, p, model.settings.credible_mass)
     if len(model.groups[g]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
-    return _median_level(levels, p), low, high
+    # the median, with half of the probability on either side: the least mean absolute error
+    return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
-def _held_long_enough(holds: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
+def _held_long_enough(holds: Mask, model: Model) -> Mask:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
     n = round(model.settings.confirmation_s * model.rate_hz)
     held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
     return np.asarray(holds & (held > n))
 
 
-def _latched(alarmed: NDArray[np.bool_], calm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latched(alarmed: Mask, calm: Mask) -> Mask:
     """An alarm once raised stands until health is the likelier again."""
     k = np.arange(len(alarmed))
     last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))
@@ -307,11 +311,6 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
     return levels, p
 
 
-def _median_level(levels: Floats, p: Floats) -> Floats:
-    """The level with half of the probability on either side: the least mean absolute error."""
-    return np.asarray(levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
-
-
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
     """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
     order = np.argsort(-p, axis=1, kind="stable")
@@ -324,7 +323,7 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 
 def _surfaces_at_fault(
-    model: Model, bank: HypothesisBank, P: Floats, faulty: NDArray[np.int64], nameable: NDArray[np.bool_]
+    model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
@@ -349,23 +348,16 @@ def _surfaces_at_fault(
     for k in np.flatnonzero(faulty):
         new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
+        # what was once excluded stays so: Ville's inequality bounds the chance of a wrong exclusion
+        named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
+        waits = n_same < n_hold or (model.settings.one_faulty_group and named_again)
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
-        keeps = old and (
-            offset[k] or (old != UNKNOWN_SURFACE and (n_same < n_hold or _names_all_again(new, old, model)))
-        )
+        keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new
     return named
 
 
-def _names_all_again(new: str, old: str, model: Model) -> bool:
-    """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
-    bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.one_faulty_group and (
-        new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
-    )
-
-
-def join_names(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+def join_names(flags: Mask, names: Sequence[str]) -> NDArray[np.object_]:
     """The names that are flagged in flags (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 

@@ -10,7 +10,6 @@ information a second about one group. m axes, G groups, n samples.
 """
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -42,10 +41,7 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
     return {
         "flight": samples.name,
         "vehicle": model.vehicle.name,
-        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
-        "recorded_s": len(samples.t_s) * samples.dt_s,
-        "gaps": int(samples.stretch_number[-1]),
-        "rate_hz": 1.0 / samples.dt_s,
+        **span_entry(samples),
         "faulty": bool(rows.faulty.any()),
         "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
@@ -53,6 +49,16 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
         "isolability": isolable,
         "settings": model.settings.model_dump(by_alias=True),
         "notes": list(samples.notes),
+    }
+
+
+def span_entry(samples: Samples) -> Document:
+    """How much of a flight was recorded."""
+    return {
+        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
+        "recorded_s": len(samples.t_s) * samples.dt_s,
+        "gaps": int(samples.stretch_number[-1]),
+        "rate_hz": 1.0 / samples.dt_s,
     }
 
 
@@ -126,6 +132,7 @@ def as_text(verdict: Document) -> str:
     lines += [f"  {text}" for text in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
+    lines += [f"  report: {verdict['folder']}/report.html"] if "folder" in verdict else []
     return "\n".join(lines)
 
 
@@ -163,7 +170,7 @@ def _event_text(event: Document) -> str:
     return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {text}{brief}"
 
 
-def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
+def isolability_document(samples: Samples, model: Model) -> Document:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_bank(model)
     F = _white_responses(samples, model)
@@ -188,7 +195,7 @@ def _white_responses(samples: Samples, model: Model) -> Floats:
     return flight.F[flight.is_known] @ flight.W * np.sqrt(model.settings.effective_sample_share)
 
 
-def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> dict[str, Any]:
+def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     odds = _alarm_odds(model, bank, g, dt_s)
     if not len(F):
@@ -233,7 +240,7 @@ def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
     return losses
 
 
-def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
+def _alike_pairs(F: Floats, model: Model) -> list[Document]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
@@ -244,7 +251,7 @@ def _alike_pairs(F: Floats, model: Model) -> list[dict[str, Any]]:
     return pairs
 
 
-def isolability_sentences(isolable: dict[str, Any]) -> list[str]:
+def isolability_sentences(isolable: Document) -> list[str]:
     """The statement in words."""
     lines = [entry["says"] for entry in isolable["together"]]
     for entry in isolable["groups"]:

@@ -86,29 +86,31 @@ class Mixing:
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface by its parameters. place: where it stands in them; number: its output's, or its own; kind:
-    surfaces of one kind get one command; axis_shares: of roll, pitch and yaw command in it, None where they
-    are not known; reason, mixer_reason: the parameters that say so."""
+    """A surface by its parameters.
+
+    place: where it stands in them; kind: surfaces of one kind get one command; axis_shares: of roll, pitch
+    and yaw command in it, None where they are not known; reason, mixer_reason: the parameters that say so.
+    """
 
     name: str
     place: str
-    number: int
     kind: int
     axis_shares: Floats | None
     reason: str
     mixer_reason: str = ""
 
+    def __str__(self) -> str:
+        spoken = self.name.replace("_", " ").replace("vtail", "V-tail").replace("atail", "A-tail")
+        return f"{self.place} is the {spoken}"
+
+    def stays_out(self, reason: str) -> str:
+        return f"{self} ({self.reason}), and stays out: {reason}"
+
 
 Reading = tuple[float, float, str]
 """Scale and offset from the numbers of a column to the command, and a text on them."""
-
-
-@dataclass(frozen=True)
-class _Outputs:
-    """The column of each surface's output, and how it is read."""
-
-    columns: list[str]
-    readings: list[Reading]
+_Outputs = list[tuple[str, Reading]]
+"""The column of each surface's output, and how it is read."""
 
 
 @dataclass(frozen=True)
@@ -119,14 +121,36 @@ class _Axes:
     scale: float
     problem: str = ""
 
+    def weights(self, surface: _Surface) -> Weights:
+        """The surface as a mix of these commands; empty where its mix is not known."""
+        if surface.axis_shares is None:
+            return {}
+        return _tidy(dict(zip(self.columns, surface.axis_shares.tolist(), strict=True)))
+
+    def problem_of(self, surface: _Surface, names: set[str]) -> str:
+        """Why a surface cannot be a mix of these commands, empty where it can."""
+        weights = self.weights(surface)
+        missing = [f"{column} is not either" for column in weights if column not in names]
+        return self.problem or next(iter(missing), "" if weights else "its mix is not known")
+
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing that the parameters of a log say, with commands out of these columns. Without surfaces where
     they say none, or their commands are not in the log."""
+    mixing, names = Mixing(), set(column_names)
     if reader not in SELECTIVE_READERS:
-        return Mixing()
-    mixing_by = _ardupilot_mixing if reader == "ardupilot" else _px4_mixing
-    mixing = mixing_by(_Parameters(params), set(column_names))
+        return mixing
+    read = _Parameters(params, mixing.lines)
+    surfaces, outputs, axes = _ardupilot_mixing(read) if reader == "ardupilot" else _px4_mixing(read, names)
+    if surfaces:
+        # surfaces by the commands that the log has of most of them: of their outputs first, else of the axes
+        fullest = max(outputs, key=lambda one: sum(column in names for column, _ in one))
+        by_output = sum(column in names for column, _ in fullest)
+        if by_output and by_output >= sum(not axes.problem_of(surface, names) for surface in surfaces):
+            _add_surfaces_by_output(mixing, surfaces, fullest, names)
+        else:
+            _add_surfaces_by_axis(mixing, surfaces, axes, names)
+    mixing.lines += read.lines_on_changes
     if not mixing.surfaces:
         mixing.lines.append("the parameters of the log give no mixing: it stays out")
     return mixing
@@ -134,9 +158,10 @@ def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]
 
 @dataclass
 class _Parameters:
-    """Access to the parameters of a log that says what is wrong with one."""
+    """Access to the parameters of a log that says what is wrong with one. lines: receive what stays out."""
 
     values_by_name: Parameters
+    lines: list[str]
     lines_on_changes: list[str] = field(default_factory=list)
 
     def number(self, name: str, low: float, high: float, unit: str = "") -> float:
@@ -148,9 +173,9 @@ class _Parameters:
         value = values[-1]
         if not (math.isfinite(value) and low <= value <= high):
             raise _BadParameter(f"{name} is {value:g}, {allowed}")
-        if len(values) > 1:
-            line = f"{name} changes in the log: its last value, {value:g}, is used"
-            self.lines_on_changes += [] if line in self.lines_on_changes else [line]
+        line = f"{name} changes in the log: its last value, {value:g}, is used"
+        if len(values) > 1 and line not in self.lines_on_changes:
+            self.lines_on_changes.append(line)
         return value
 
     def whole_number(self, name: str, low: int, high: int) -> int:
@@ -159,85 +184,82 @@ class _Parameters:
             raise _BadParameter(f"{name} is {value:g}, allowed: a whole number")
         return round(value)
 
-    def numbers_in_names(self, pattern: str) -> list[int]:
-        """The number in each name that fits a pattern with one group, ascending."""
-        matches = (re.fullmatch(pattern, name) for name in self.values_by_name)
-        return sorted(int(match[1]) for match in matches if match)
+    def kinds(
+        self,
+        place: str,
+        names: Mapping[int, str],
+        known: Collection[int],
+        other: str,
+        unused: Collection[int],
+    ) -> dict[int, int]:
+        """The known kinds by number, of the parameters with these names; what stays out is said, but of
+        unused kinds."""
+        kinds: dict[int, int] = {}
+        for number, name in names.items():
+            try:
+                kind = self.whole_number(name, min(unused, default=0), 1000)
+            except _BadParameter as problem:
+                self.lines.append(f"{place} {number} stays out: {problem}")
+                continue
+            if kind in known:
+                kinds[number] = kind
+            elif kind not in unused:
+                self.lines.append(f"{place} {number} stays out: {name} {kind} {other}")
+        return kinds
 
 
-def _ardupilot_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
-    mixing = Mixing()
-    surfaces = _ardupilot_surfaces(params, mixing.lines)
-    columns = [_ardupilot_channel_column(surface.number) for surface in surfaces]
-    readings = [_ardupilot_channel_reading(params, surface.number) for surface in surfaces]
-    axes = _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
-    _add_surfaces(mixing, surfaces, [_Outputs(columns, readings)], axes, column_names)
-    mixing.lines += params.lines_on_changes
-    return mixing
+def _full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
+    """The name of a surface; with its number where several are of its kind."""
+    return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
 
 
-def _ardupilot_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
-    """The surfaces by SERVOn_FUNCTION. lines: receives what stays out."""
-    channels = params.numbers_in_names(r"SERVO(\d{1,2})_FUNCTION")
-    if not channels:
-        lines.append("SERVOn_FUNCTION is not in the log")
-    functions: dict[int, int] = {}
-    for channel in channels:
-        try:
-            function = params.whole_number(f"SERVO{channel}_FUNCTION", -1, 1000)
-        except _BadParameter as problem:
-            lines.append(f"channel {channel} stays out: {problem}")
-            continue
-        if function in _ARDUPILOT_SURFACES:
-            functions[channel] = function
-        elif function > 0:
-            lines.append(f"channel {channel} stays out: SERVO{channel}_FUNCTION {function} is no surface")
-    mixers = _ardupilot_mixers(params, functions.values(), lines)
-    used = list(functions.values())
+def _ardupilot_mixing(params: _Parameters) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+    """The surfaces by SERVOn_FUNCTION."""
+    matches = (re.fullmatch(r"SERVO(\d{1,2})_FUNCTION", name) for name in params.values_by_name)
+    names = {int(match[1]): match[0] for match in matches if match}
+    if not names:
+        params.lines.append("SERVOn_FUNCTION is not in the log")
+    kinds = params.kinds(
+        "channel", dict(sorted(names.items())), _ARDUPILOT_SURFACES, "is no surface", (-1, 0)
+    )
+    factors, mixer_reason = _ardupilot_mixers(params, kinds.values())
     surfaces = []
-    for channel, function in functions.items():
-        name, shares, is_mixed = _ARDUPILOT_SURFACES[function]
-        factors, mixer = mixers if is_mixed else (np.ones(3), "")
-        surfaces.append(
-            _Surface(
-                name if used.count(function) == 1 else f"{name}_{channel}",
-                f"channel {channel}",
-                channel,
-                function,
-                None if shares is None or factors is None else np.array(shares) * factors,
-                f"SERVO{channel}_FUNCTION {function}",
-                mixer,
-            )
+    for channel, kind in kinds.items():
+        name, shares, is_mixed = _ARDUPILOT_SURFACES[kind]
+        axis_shares = None if shares is None else np.array(shares)
+        if is_mixed and axis_shares is not None:
+            axis_shares = None if factors is None else axis_shares * factors
+        full, reason = _full_name(name, channel, kinds), f"SERVO{channel}_FUNCTION {kind}"
+        mixer = mixer_reason if is_mixed else ""
+        surfaces.append(_Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
+    outputs = [
+        (
+            f"{next((text for last, text in _ARDUPILOT_MESSAGES.items() if n <= last), 'RCO?')}.C{n}",
+            _ardupilot_channel_reading(params, f"SERVO{n}"),
         )
-    return surfaces
+        for n in kinds
+    ]
+    return surfaces, [outputs], _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
 
 
-def _ardupilot_mixers(
-    params: _Parameters, functions: Collection[int], lines: list[str]
-) -> tuple[Floats | None, str]:
+def _ardupilot_mixers(params: _Parameters, kinds: Collection[int]) -> tuple[Floats | None, str]:
     """The factors of the mixers on aileron, elevator and rudder, None where they are not known, and the
     parameters that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
-    if not any(_ARDUPILOT_SURFACES[function][2] for function in functions):
+    if not any(_ARDUPILOT_SURFACES[kind][2] for kind in kinds):
         return None, ""
     try:
         gain = params.number("MIXING_GAIN", _MIN_MIXING_GAIN, _MAX_MIXING_GAIN)
         offset = params.number("MIXING_OFFSET", -_MAX_MIXING_OFFSET, _MAX_MIXING_OFFSET)
     except _BadParameter as problem:
-        lines.append(f"the mixer of elevons and V-tail stays out: {problem}")
+        params.lines.append(f"the mixer of elevons and V-tail stays out: {problem}")
         return None, ""
     turning, pitching = 1.0 + max(offset, 0.0) / 100.0, 1.0 - min(offset, 0.0) / 100.0
     factors = gain * np.array([turning, pitching, turning])
     return factors, f", MIXING_GAIN {gain:g}, MIXING_OFFSET {offset:g}"
 
 
-def _ardupilot_channel_column(channel: int) -> str:
-    message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if channel <= last), "RCO?")
-    return f"{message}.C{channel}"
-
-
-def _ardupilot_channel_reading(params: _Parameters, channel: int) -> Reading:
+def _ardupilot_channel_reading(params: _Parameters, prefix: str) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range."""
-    prefix = f"SERVO{channel}"
     try:
         low, high, trim = (
             params.number(f"{prefix}_{part}", *limits, " us") for part, limits in _PULSE_RANGE_US.items()
@@ -263,123 +285,82 @@ def _assumed_reading(problem: _BadParameter) -> Reading:
     return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
 
 
-def _px4_mixing(params: _Parameters, column_names: set[str]) -> Mixing:
-    mixing = Mixing()
-    surfaces = _px4_surfaces(params, mixing.lines)
-    outputs = [_px4_servos(surfaces)]
-    if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
-        outputs += _px4_pulses(params, surfaces)
-    # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
-    is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
-    axes = _Axes(_PX4_AXIS_COLUMNS, 1.0, "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)")
-    _add_surfaces(mixing, surfaces, outputs, axes, column_names)
-    mixing.lines += params.lines_on_changes
-    return mixing
-
-
-def _px4_surfaces(params: _Parameters, lines: list[str]) -> list[_Surface]:
-    """The surfaces by CA_SV_CSn_TYPE, their shares by the torques. lines: receives what stays out."""
+def _px4_mixing(params: _Parameters, column_names: set[str]) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+    """The surfaces by CA_SV_CSn_TYPE, their shares by the torques."""
     try:
         n = params.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)
     except _BadParameter as problem:
-        lines.append(str(problem))
-        return []
-    kinds: dict[int, int] = {}
-    for i in range(n):
-        name = f"CA_SV_CS{i}_TYPE"
-        try:
-            kind = params.whole_number(name, 0, 1000)
-        except _BadParameter as problem:
-            lines.append(f"surface {i} stays out: {problem}")
-            continue
-        if kind in _PX4_SURFACES:
-            kinds[i] = kind
-        else:
-            lines.append(f"surface {i} stays out: {name} {kind} moves the aircraft about no axis")
-    shares_by_index = _px4_axis_shares(params, kinds, lines)
-    used_kinds = list(kinds.values())
+        params.lines.append(str(problem))
+        n = 0
+    names = {i: f"CA_SV_CS{i}_TYPE" for i in range(n)}
+    kinds = params.kinds("surface", names, _PX4_SURFACES, "moves the aircraft about no axis", ())
+    shares = _px4_axis_shares(params, kinds)
+    drivers: dict[int, list[str]] = {}
     surfaces = []
     for i, kind in kinds.items():
-        shares, name = shares_by_index[i], _PX4_SURFACES[kind]
-        if shares is not None and not shares.any():
-            lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
+        if shares[i] is not None and not shares[i].any():
+            params.lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
             continue
-        full = name if used_kinds.count(kind) == 1 else f"{name}_{i}"
-        outputs = "".join(f", {output} {_PX4_FIRST_SERVO + i}"
-                               for output in _px4_output_parameters(params, i))  # fmt: skip
-        reason = f"CA_SV_CS{i}_TYPE {kind}{outputs}"
-        surfaces.append(_Surface(full, f"surface {i}", i, i, shares, reason))
-    return surfaces
+        servo = _PX4_FIRST_SERVO + i
+        found = [name for name, values in params.values_by_name.items() if values[-1] == servo]
+        drivers[i] = [name for name in found if re.fullmatch(_PX4_OUTPUT_PATTERN, name)]
+        reason = f"CA_SV_CS{i}_TYPE {kind}{''.join(f', {name} {servo}' for name in drivers[i])}"
+        full = _full_name(_PX4_SURFACES[kind], i, kinds)
+        surfaces.append(_Surface(full, f"surface {i}", kind, shares[i], reason))
+    outputs = [[(f"actuator_servos.control[{i}]", (1.0, 0.0, "")) for i in drivers]]
+    if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
+        outputs += _px4_pulses(params, [*drivers.values()])
+    # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
+    is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
+    reason = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
+    return surfaces, outputs, _Axes(_PX4_AXIS_COLUMNS, 1.0, reason)
 
 
-def _px4_axis_shares(
-    params: _Parameters, indices: Collection[int], lines: list[str]
-) -> dict[int, Floats | None]:
+def _px4_axis_shares(params: _Parameters, indices: Collection[int]) -> dict[int, Any]:
     """The share of each torque command in each surface: the pseudo-inverse of the torques of all surfaces
     [PX4, ControlAllocationPseudoInverse]. None of any where a torque is not known."""
-    if not indices:
-        return {}
     try:
-        torques = np.array([
+        torques = [
             [params.number(f"CA_SV_CS{i}_TRQ_{axis}", -_MAX_TORQUE, _MAX_TORQUE) for axis in "RPY"]
             for i in indices
-        ])  # fmt: skip
+        ]
     except _BadParameter as problem:
-        lines.append(f"the mix of torques stays out: {problem}")
+        params.lines.append(f"the mix of torques stays out: {problem}")
         return dict.fromkeys(indices)
-    shares = np.linalg.pinv(torques.T)
+    shares = np.linalg.pinv(np.reshape(torques, (-1, 3)).T)
     return dict(zip(indices, np.where(np.abs(shares) < _LEAST_WEIGHT, 0.0, shares), strict=True))
 
 
-def _px4_output_parameters(params: _Parameters, index: int) -> list[str]:
-    """The parameters that give an output to a surface: PWM_MAIN_FUNC3."""
-    servo = _PX4_FIRST_SERVO + index
-    names = [name for name, values in params.values_by_name.items() if values[-1] == servo]
-    return [name for name in names if re.fullmatch(_PX4_OUTPUT_PATTERN, name)]
+def _px4_pulses(params: _Parameters, drivers: Sequence[list[str]]) -> list[_Outputs]:
+    """The pulses of each surface's first output; none where one has none, or where there are two drivers.
 
-
-def _px4_servos(surfaces: Sequence[_Surface]) -> _Outputs:
-    columns = [f"actuator_servos.control[{surface.number}]" for surface in surfaces]
-    return _Outputs(columns, [(1.0, 0.0, "")] * len(surfaces))
-
-
-def _px4_pulses(params: _Parameters, surfaces: Sequence[_Surface]) -> list[_Outputs]:
-    """The pulses of each surface's first output; none where one has none, or where there are two drivers."""
-    names = [_px4_output_parameters(params, surface.number)[:1] for surface in surfaces]
-    matches = [re.fullmatch(_PX4_OUTPUT_PATTERN, name) for one in names for name in one]
+    drivers: of each surface the parameters that give it an output, such as PWM_MAIN_FUNC3.
+    """
+    matches = [re.fullmatch(_PX4_OUTPUT_PATTERN, names[0]) for names in drivers if names]
     outputs = [(match[1], int(match[2])) for match in matches if match]
-    if len(outputs) < len(surfaces) or len({driver for driver, _ in outputs}) != 1:
+    if len(outputs) < len(drivers) or len({driver for driver, _ in outputs}) != 1:
         return []
-    readings = [_px4_output_reading(params, *output) for output in outputs]
-    return [_Outputs([f"actuator_outputs.output[{number - 1}]" for _, number in outputs], readings)]
+    return [
+        [
+            (f"actuator_outputs.output[{n - 1}]", _px4_output_reading(params, driver, n))
+            for driver, n in outputs
+        ]
+    ]
 
 
 def _px4_output_reading(params: _Parameters, driver: str, number: int) -> Reading:
     """Scale and offset from a pulse, us, to the command, and a text [PX4, mixer_module.cpp]."""
     try:
-        low = params.number(f"{driver}_MIN{number}", *_PULSE_RANGE_US["MIN"], " us")
-        high = params.number(f"{driver}_MAX{number}", *_PULSE_RANGE_US["MAX"], " us")
+        low, high = (
+            params.number(f"{driver}_{part}{number}", *_PULSE_RANGE_US[part], " us")
+            for part in ("MIN", "MAX")
+        )
         if not low < high:
             raise _BadParameter(f"{driver}_MIN{number} is {low:g} us, allowed: less than {high:g} us")
         mask = params.whole_number(f"{driver}_REV", 0, 2**16 - 1)
     except _BadParameter as problem:
         return _assumed_reading(problem)
     return _reading(low, high, 0.5 * (low + high), bool(mask >> (number - 1) & 1))
-
-
-def _add_surfaces(
-    mixing: Mixing, surfaces: list[_Surface], outputs: list[_Outputs], axes: _Axes, names: set[str]
-) -> None:
-    """Surfaces by the commands that the log has of most of them: of their outputs first, else of the axes."""
-    if not surfaces:
-        return
-    fullest = max(outputs, key=lambda one: len(names.intersection(one.columns)))
-    by_output = len(names.intersection(fullest.columns))
-    by_axis = sum(not _problem_of_axes(surface, axes, names) for surface in surfaces)
-    if by_output > 0 and by_output >= by_axis:
-        _add_surfaces_by_output(mixing, surfaces, fullest, names)
-    else:
-        _add_surfaces_by_axis(mixing, surfaces, axes, names)
 
 
 def _add_surfaces_by_output(
@@ -390,39 +371,38 @@ def _add_surfaces_by_output(
     Commands that depend on those before are none of their own: the surface is said to follow these, since a
     fit cannot distinguish what moves together.
     """
-    surfaces, columns, readings = [], [], []
-    for surface, column, reading in zip(all_surfaces, outputs.columns, outputs.readings, strict=True):
-        if column in names:
-            surfaces.append(surface)
-            columns.append(column)
-            readings.append(reading)
-        else:
-            mixing.lines.append(_stays_out(surface, f"{column} is not in the log"))
+    pairs = [*zip(all_surfaces, outputs, strict=True)]
+    for surface, (column, _) in pairs:
+        if column not in names:
+            mixing.lines.append(surface.stays_out(f"{column} is not in the log"))
+    used = [(surface, *output) for surface, output in pairs if output[0] in names]
+    surfaces, columns = [surface for surface, *_ in used], [column for _, column, _ in used]
     rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces, columns)
     basis: list[int] = []
-    for k, surface in enumerate(surfaces):
-        column, (scale, offset, text) = columns[k], readings[k]
+    for k, (surface, column, (scale, offset, text)) in enumerate(used):
         factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
         if basis and np.allclose(factors @ rows[basis], rows[k], atol=1e-6):
-            weights = _sum_of_weights(factors, [own[i] for i in basis])
+            weights: Weights = {}
+            for factor, i in zip(factors.tolist(), basis, strict=True):
+                for name, weight in own[i].items():
+                    weights[name] = weights.get(name, 0.0) + factor * weight
+            weights = _tidy(weights)
         else:
             basis.append(k)
             weights = own[k]
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column[column] = _command_entry(column, scale, offset)
         shared = "" if column in weights else f"; it moves with {' and '.join(weights)}"
-        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}: {surface.reason}{text}{shared}")
+        mixing.lines.append(f"{surface}: {surface.reason}{text}{shared}")
 
 
 def _weights_of_own_columns(surfaces: Sequence[_Surface], columns: list[str]) -> list[Weights]:
     """The command of each surface by itself. Flaps are added to one flaperon and taken from the other: half
     the sum of both is the command without flaps."""
-    weights = [{column: 1.0} for column in columns]
     flaps = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
-    if len(flaps) == len(_FLAPERONS):
-        for k in flaps:
-            weights[k] = {columns[i]: 0.5 for i in flaps}
-    return weights
+    halves = {columns[k]: 0.5 for k in flaps}
+    both = len(flaps) == len(_FLAPERONS)
+    return [halves if both and k in flaps else {column: 1.0} for k, column in enumerate(columns)]
 
 
 def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:
@@ -431,16 +411,8 @@ def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:
     known = [surface.axis_shares for surface in surfaces if surface.axis_shares is not None]
     if len(known) == len(surfaces):
         return np.array(known)
-    kinds = list(dict.fromkeys(surface.kind for surface in surfaces))
-    return np.array([[float(kind == surface.kind) for kind in kinds] for surface in surfaces])
-
-
-def _sum_of_weights(factors: Floats, weights: list[Weights]) -> Weights:
-    total: Weights = {}
-    for factor, row in zip(factors.tolist(), weights, strict=True):
-        for column, weight in row.items():
-            total[column] = total.get(column, 0.0) + factor * weight
-    return _tidy(total)
+    kinds = [surface.kind for surface in surfaces]
+    return np.equal.outer(kinds, [*dict.fromkeys(kinds)]).astype(float)
 
 
 def _tidy(weights: Weights) -> Weights:
@@ -451,34 +423,14 @@ def _tidy(weights: Weights) -> Weights:
 def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[_Surface], axes: _Axes, names: set[str]) -> None:
     """Each surface is a mix of the commands of roll, pitch and yaw, in a log without commands of outputs."""
     for surface in surfaces:
-        if problem := _problem_of_axes(surface, axes, names):
-            mixing.lines.append(_stays_out(surface, f"its output is not in the log, and {problem}"))
+        if problem := axes.problem_of(surface, names):
+            mixing.lines.append(surface.stays_out(f"its output is not in the log, and {problem}"))
             continue
-        weights = _weights_of_axes(surface, axes)
+        weights = axes.weights(surface)
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column |= {column: _command_entry(column, axes.scale, 0.0) for column in weights}
         mix = " ".join(f"{weight:+.4g} {column}" for column, weight in weights.items())
-        reason = f"{surface.reason}{surface.mixer_reason}"
-        mixing.lines.append(f"{surface.place} is the {_spoken(surface)}, {mix}: {reason}")
-
-
-def _problem_of_axes(surface: _Surface, axes: _Axes, names: set[str]) -> str:
-    """Why a surface cannot be a mix of the commands of the axes, empty where it can."""
-    weights = _weights_of_axes(surface, axes)
-    missing = [column for column in weights if column not in names]
-    if axes.problem or not weights:
-        return axes.problem or "its mix is not known"
-    return f"{missing[0]} is not either" if missing else ""
-
-
-def _weights_of_axes(surface: _Surface, axes: _Axes) -> Weights:
-    if surface.axis_shares is None:
-        return {}
-    return _tidy(dict(zip(axes.columns, surface.axis_shares.tolist(), strict=True)))
-
-
-def _stays_out(surface: _Surface, reason: str) -> str:
-    return f"{surface.place} is the {_spoken(surface)} ({surface.reason}), and stays out: {reason}"
+        mixing.lines.append(f"{surface}, {mix}: {surface.reason}{surface.mixer_reason}")
 
 
 def _command_entry(column: str, scale: float, offset: float) -> Any:
@@ -486,10 +438,6 @@ def _command_entry(column: str, scale: float, offset: float) -> Any:
         return column
     entry = {"column": column, "scale": float(f"{scale:.10g}")}
     return entry | ({"offset": float(f"{offset:.10g}")} if offset else {})
-
-
-def _spoken(surface: _Surface) -> str:
-    return surface.name.replace("_", " ").replace("vtail", "V-tail").replace("atail", "A-tail")
 
 
 def load_vehicle_for_logs(

@@ -5,10 +5,10 @@ JSON; every key is checked when it is read, as in any other file a user names.
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
@@ -33,145 +33,155 @@ Positive = Annotated[Number, Field(gt=0, le=_MAX_COEF)]
 NonNegative = Annotated[Number, Field(ge=0, le=_MAX_COEF)]
 AtLeastOne = Annotated[Number, Field(ge=1, le=_MAX_COEF)]
 
-
-class FilterSettings(Section):
-    """Prior settings of the filter."""
-
-    effectiveness_changes_per_hour: Positive = Field(
-        12.0, description="how often a surface changes its effectiveness", alias="changes_per_hour"
-    )
-    repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field(
-        default={}, description="likelier levels of effectiveness, by group", alias="levels"
-    )
-    likely_share: Share = Field(
-        0.9, description="share of faults at the likelier levels", alias="level_share"
-    )
-    trim_sd: Positive = Field(0.5, description="free spread of the trim between flights, in residual sd")
-    trim_command_shift_sd: NonNegative = Field(
-        0.0, description="spread of the trim as a shift of each group's command", alias="trim_shift"
-    )
-    trim_step_sd: list[NonNegative] = Field(
-        [3e-4] * 3,
-        min_length=3,
-        max_length=3,
-        description="drift of the trim a sample, in residual sd",
-        alias="trim_walk",
-    )
-    gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain")
-    gain_return_time_s: Positive = Field(
-        5e4, description="in which the control gain returns to the model's, s", alias="gain_time_s"
-    )
-    own_gain_spread: Number = Field(
-        0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
-    )
-    own_gain_return_s: Positive = Field(
-        2000.0, description="in which that returns to the common gain, s", alias="own_gain_time_s"
-    )
-    quick_error_share: Share = Field(
-        1.0,
-        description="error of responses quicker than the fitted flights have, as a share of them",
-        alias="quick_error",
-    )
-    max_trim_sd: Positive = Field(
-        4.0, description="farthest the trim is adapted, in its spread", alias="trim_bound"
-    )
-    max_gain_sd: Positive = Field(
-        3.0, description="farthest the gain is adapted, in its spread", alias="gain_bound"
-    )
-    command_delays_s: CoefRow = Field(
-        [0.0],
-        min_length=1,
-        max_length=9,
-        description="delays tried beside the model's, each under a sample",
-        alias="delays_s",
-    )
-    jam_rate_offset_sd: Positive = Field(
-        2.0, description="offset of the rates a sample by a stuck surface, in sd", alias="jam_sd"
-    )
-    effective_sample_share: Number = Field(
-        1.0, gt=0, le=1, description="share of a white residual's information in this one", alias="power"
-    )
-    t_degrees_of_freedom: Number = Field(
-        8.0,
-        gt=2,
-        le=_MAX_COEF,
-        description="degrees of freedom of the residual's t distribution",
-        alias="tail",
-    )
-    noise_scale_memory_s: Positive = Field(
-        60.0, description="memory of the running scale of the residual, s", alias="noise_memory_s"
-    )
-    alarm_probability: OpenShare = Field(
-        0.5, description="probability of a fault that raises the alarm", alias="alarm"
-    )
-    confirmation_s: NonNegative = Field(
-        0.0, description="for how long the probability must stand, s", alias="hold_s"
-    )
-    false_alarms_per_hour: Number | None = Field(
-        None, gt=0, le=_MAX_COEF, description="the rate that was asked for"
-    )
-    alarm_threshold: Number | None = Field(
-        None,
-        gt=0,
-        le=_MAX_COEF,
-        description="evidence for a fault that raises the alarm, instead of both: for that rate",
-        alias="threshold",
-    )
-    name_evidence_ratio: AtLeastOne = Field(
-        1.0, description="evidence for a name, over that for an alarm", alias="name_evidence"
-    )
-    rename_hold_s: NonNegative = Field(
-        0.0, description="for how long another name stands before it counts, s", alias="rename_s"
-    )
-    one_faulty_group: bool = Field(
-        False,
-        description="whether one group alone is at fault: a name has every group that is not excluded",
-        alias="one_group",
-    )
-    effectiveness_level_step: Number = Field(
-        0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness", alias="level_step"
-    )
-    credible_mass: OpenShare = Field(0.9, description="posterior mass inside the bounds", alias="bounds")
+_FILE_KEYS = {
+    "effectiveness_changes_per_hour": "changes_per_hour",
+    "likely_levels": "levels",
+    "likely_share": "level_share",
+    "trim_command_shift_sd": "trim_shift",
+    "trim_step_sd": "trim_walk",
+    "gain_return_time_s": "gain_time_s",
+    "own_gain_spread": "own_gain_sd",
+    "own_gain_return_s": "own_gain_time_s",
+    "quick_error_share": "quick_error",
+    "max_trim_sd": "trim_bound",
+    "max_gain_sd": "gain_bound",
+    "command_delays_s": "delays_s",
+    "jam_rate_offset_sd": "jam_sd",
+    "effective_sample_share": "power",
+    "t_degrees_of_freedom": "tail",
+    "noise_scale_memory_s": "noise_memory_s",
+    "alarm_probability": "alarm",
+    "confirmation_s": "hold_s",
+    "alarm_threshold": "threshold",
+    "name_evidence_ratio": "name_evidence",
+    "rename_hold_s": "rename_s",
+    "one_faulty_group": "one_group",
+    "effectiveness_level_step": "level_step",
+    "credible_mass": "bounds",
+    "command_ranges": "commands",
+    "rate_ranges_rad_s": "rates",
+    "airspeed_range_mps": "airspeed",
+    "rate_sd_rad_s": "spread",
+    "tied_shares": "tied",
+    "group_gain_sd": "gain_sd",
+    "longest_still_s": "still_s",
+    "misread_gain": "misread",
+    "unpowered_climb_mps": "energy_climb",
+    "alarm_peak_tail": "tail",
+    "ma_coefficients": "average",
+    "residual_covariance": "noise",
+    "ar_coefficients": "before",
+    "covariance_inflation": "wider",
+    "misread_shares": "misreads",
+    "usual_quick_power": "quick",
+    "n_rate_lags": "history",
+    "n_command_lags": "lags",
+    "past_coefficients": "past",
+    "command_response": "response",
+    "response_error": "response_sd",
+    "noise_models": "colours",
+    "fitted_ranges": "fitted",
+    "identification_results": "identified",
+}
+"""The keys of the file by attribute, where they differ: those of release 1.0.0."""
 
 
-class FittedRanges(Section):
+class FileSection(Section):
+    """A section of the model file."""
+
+    model_config = ConfigDict(alias_generator=lambda name: _FILE_KEYS.get(name, name))
+
+
+class FilterSettings(FileSection):
+    """Prior settings of the filter.
+
+    effectiveness_changes_per_hour: how often a surface changes its effectiveness
+    repair_share: share of the changes that restore health
+    likely_levels: likelier levels of effectiveness, by group
+    likely_share: share of faults at the likelier levels
+    trim_sd: free spread of the trim between flights, in residual sd
+    trim_command_shift_sd: spread of the trim as a shift of each group's command
+    trim_step_sd: drift of the trim a sample, in residual sd
+    gain_sd: spread of the control gain
+    gain_return_time_s: in which the control gain returns to the model's, s
+    own_gain_spread: spread of each group's gain about the common
+    own_gain_return_s: in which that returns to the common gain, s
+    quick_error_share: error of responses quicker than the fitted flights have, as a share of them
+    max_trim_sd: farthest the trim is adapted, in its spread
+    max_gain_sd: farthest the gain is adapted, in its spread
+    command_delays_s: delays tried beside the model's, each under a sample
+    jam_rate_offset_sd: offset of the rates a sample by a stuck surface, in sd
+    effective_sample_share: share of a white residual's information in this one
+    t_degrees_of_freedom: degrees of freedom of the residual's t distribution
+    noise_scale_memory_s: memory of the running scale of the residual, s
+    alarm_probability: probability of a fault that raises the alarm
+    confirmation_s: for how long the probability must stand, s
+    false_alarms_per_hour: the rate that was asked for
+    alarm_threshold: evidence for a fault that raises the alarm, instead of both: for that rate
+    name_evidence_ratio: evidence for a name, over that for an alarm
+    rename_hold_s: for how long another name stands before it counts, s
+    one_faulty_group: whether one group alone is at fault: a name has every group that is not excluded
+    effectiveness_level_step: step of the grid of effectiveness
+    credible_mass: posterior mass inside the bounds
+    """
+
+    effectiveness_changes_per_hour: Positive = 12.0
+    repair_share: Number = Field(0.1, ge=0, lt=1)
+    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field({})
+    likely_share: Share = 0.9
+    trim_sd: Positive = 0.5
+    trim_command_shift_sd: NonNegative = 0.0
+    trim_step_sd: list[NonNegative] = Field([3e-4] * 3, min_length=3, max_length=3)
+    gain_sd: Number = Field(0.15, gt=0, lt=0.5)
+    gain_return_time_s: Positive = 5e4
+    own_gain_spread: Number = Field(0.0, ge=0, lt=0.5)
+    own_gain_return_s: Positive = 2000.0
+    quick_error_share: Share = 1.0
+    max_trim_sd: Positive = 4.0
+    max_gain_sd: Positive = 3.0
+    command_delays_s: CoefRow = Field([0.0], min_length=1, max_length=9)
+    jam_rate_offset_sd: Positive = 2.0
+    effective_sample_share: Number = Field(1.0, gt=0, le=1)
+    t_degrees_of_freedom: Number = Field(8.0, gt=2, le=_MAX_COEF)
+    noise_scale_memory_s: Positive = 60.0
+    alarm_probability: OpenShare = 0.5
+    confirmation_s: NonNegative = 0.0
+    false_alarms_per_hour: Number | None = Field(None, gt=0, le=_MAX_COEF)
+    alarm_threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
+    name_evidence_ratio: AtLeastOne = 1.0
+    rename_hold_s: NonNegative = 0.0
+    one_faulty_group: bool = False
+    effectiveness_level_step: Number = Field(0.1, ge=0.01, le=0.5)
+    credible_mass: OpenShare = 0.9
+
+
+class FittedRanges(FileSection):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
-    credible."""
+    credible.
 
-    command_ranges: CoefRows = Field(
-        description="least and largest command of each surface, share of travel", alias="commands"
-    )
-    rate_ranges_rad_s: CoefRows = Field(description="least and largest p, q and r, rad/s", alias="rates")
-    airspeed_range_mps: CoefRow | None = Field(
-        default=None, description="least and largest airspeed, m/s", alias="airspeed"
-    )
-    rate_sd_rad_s: CoefRow = Field(
-        default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
-    )
-    tied_shares: CoefRow = Field(
-        default=[],
-        description="share of each group's effect that past, signals and other groups make up",
-        alias="tied",
-    )
-    group_gain_sd: CoefRow = Field(
-        default=[], description="standard error of each group's gain", alias="gain_sd"
-    )
-    longest_still_s: dict[str, Number] = Field(
-        default={}, description="longest time each column stood still, s", alias="still_s"
-    )
-    misread_gain: NonNegative = Field(
-        0.0,
-        description="how much likelier at most a sample of a part not fitted was with its columns read "
-        "wrongly, in natural logarithms",
-        alias="misread",
-    )
-    unpowered_climb_mps: Number | None = Field(
-        default=None, description="rate of the energy height as without power, m/s", alias="energy_climb"
-    )
-    alarm_peak_tail: PeakTail | None = Field(
-        default=None, description="highest alarm statistic on parts not fitted", alias="tail"
-    )
+    command_ranges: least and largest command of each surface, share of travel
+    rate_ranges_rad_s: least and largest p, q and r, rad/s
+    airspeed_range_mps: least and largest airspeed, m/s
+    rate_sd_rad_s: standard deviation of p, q and r, rad/s
+    tied_shares: share of each group's effect that past, signals and other groups make up
+    group_gain_sd: standard error of each group's gain
+    longest_still_s: longest time each column stood still, s
+    misread_gain: how much likelier at most a sample of a part not fitted was with its columns read
+    wrongly, in natural logarithms
+    unpowered_climb_mps: rate of the energy height as without power, m/s
+    alarm_peak_tail: highest alarm statistic on parts not fitted
+    """
+
+    command_ranges: CoefRows
+    rate_ranges_rad_s: CoefRows
+    airspeed_range_mps: CoefRow | None = None
+    rate_sd_rad_s: CoefRow = Field([])
+    tied_shares: CoefRow = Field([])
+    group_gain_sd: CoefRow = Field([])
+    longest_still_s: dict[str, Number] = Field({})
+    misread_gain: NonNegative = 0.0
+    unpowered_climb_mps: Number | None = None
+    alarm_peak_tail: PeakTail | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -182,76 +192,55 @@ class FittedRanges(Section):
         return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
 
 
-class NoiseModel(Section):
-    """The noise of some flights: another gyro, air or law colours what is not explained."""
+class NoiseModel(FileSection):
+    """The noise of some flights: another gyro, air or law colours what is not explained.
 
-    ma_coefficients: CoefRow = Field(
-        min_length=1,
-        max_length=1000,
-        description="1, c1, ...: its moving average, newest first",
-        alias="average",
-    )
-    residual_covariance: CoefRows = Field(
-        description="covariance of the residual whitened by that, (3, 3), (rad/s)2", alias="noise"
-    )
-    ar_coefficients: CoefRows = Field(
-        default=[],
-        description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
-        alias="before",
-    )
-    covariance_inflation: AtLeastOne = Field(
-        1.0,
-        description="how many times as far, in squares, gains left out and other laws' differ",
-        alias="wider",
-    )
-    misread_shares: list[ShareBelowOne] = Field(
-        default=[],
-        description="share of its effect by which the fit may misread each group in this noise",
-        alias="misreads",
-    )
-    usual_quick_power: Number | None = Field(
-        default=None,
-        ge=0,
-        le=_MAX_COEF,
-        description="power of the quick part of the responses, in variances of the noise, that the fitted "
-        "flights exceed in a tenth of their samples",
-        alias="quick",
-    )
+    ma_coefficients: 1, c1, ...: its moving average, newest first
+    residual_covariance: covariance of the residual whitened by that, (3, 3), (rad/s)2
+    ar_coefficients: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
+    covariance_inflation: how many times as far, in squares, gains left out and other laws' differ
+    misread_shares: share of its effect by which the fit may misread each group in this noise
+    usual_quick_power: power of the quick part of the responses, in variances of the noise, that the
+    fitted flights exceed in a tenth of their samples
+    """
+
+    ma_coefficients: CoefRow = Field(min_length=1, max_length=1000)
+    residual_covariance: CoefRows
+    ar_coefficients: CoefRows = Field([])
+    covariance_inflation: AtLeastOne = 1.0
+    misread_shares: list[ShareBelowOne] = Field([])
+    usual_quick_power: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
 
 
-class Model(Section):
-    """How one vehicle's rates answer their own past and the commands, and how well that is known."""
+class Model(FileSection):
+    """How one vehicle's rates answer their own past and the commands, and how well that is known.
+
+    groups: surfaces that move together when healthy
+    past_coefficients: (3 history + regressor_columns x signal lags, 3)
+    command_response: (groups, lags, 3), a share of command to rad/s a sample
+    response_error: standard errors of `response`, colour included
+    residual_covariance: covariance of the residual, (3, 3), (rad/s)2
+    noise_models: noises that flights were seen to have, for `moving_air`
+    fitted_ranges: what it was fitted on; None: nothing is known
+    identification_results: what it was found from, and how well
+    """
 
     vehicle: Vehicle
     rate_hz: Number = Field(ge=0.1, le=1000)
     groups: list[Annotated[list[str], Field(min_length=1)]] = Field(
-        min_length=1, max_length=_MAX_SURFACE_GROUPS, description="surfaces that move together when healthy"
+        min_length=1, max_length=_MAX_SURFACE_GROUPS
     )
-    n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
-    n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
+    n_rate_lags: Whole = Field(ge=1, le=50)
+    n_command_lags: Whole = Field(ge=1, le=50)
     intercept: CoefRow = Field(min_length=3, max_length=3)
-    past_coefficients: CoefRows = Field(
-        description="(3 history + regressor_columns x signal lags, 3)", alias="past"
-    )
-    command_response: list[CoefRows] = Field(
-        description="(groups, lags, 3), a share of command to rad/s a sample", alias="response"
-    )
-    response_error: list[CoefRows] = Field(
-        description="standard errors of `response`, colour included", alias="response_sd"
-    )
-    residual_covariance: CoefRows = Field(
-        description="covariance of the residual, (3, 3), (rad/s)2", alias="noise"
-    )
-    noise_models: list[NoiseModel] = Field(
-        default=[], description="noises that flights were seen to have, for `moving_air`", alias="colours"
-    )
+    past_coefficients: CoefRows
+    command_response: list[CoefRows]
+    response_error: list[CoefRows]
+    residual_covariance: CoefRows
+    noise_models: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted_ranges: FittedRanges | None = Field(
-        default=None, description="what it was fitted on; None: nothing is known", alias="fitted"
-    )
-    identification_results: dict[str, object] = Field(
-        default={}, description="what it was found from, and how well", alias="identified"
-    )
+    fitted_ranges: FittedRanges | None = None
+    identification_results: dict[str, object] = Field({})
 
     @model_validator(mode="after")
     def _check_arrays(self) -> "Model":
@@ -259,8 +248,7 @@ class Model(Section):
         n, n_past = len(self.past_coefficients), 3 * self.n_rate_lags + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
-        conflicts += [*self._group_mistakes(), *self._shape_mistakes(n)]
-        refuse(conflicts)  # before any of it is computed with
+        refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
         refuse(self._covariance_mistakes())
         return self
 
@@ -282,47 +270,42 @@ class Model(Section):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
-    def _shape_mistakes(self, n_past: int) -> Iterator[Conflict]:
-        """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
-        G = len(self.groups)
-        expected: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.past_coefficients, (n_past, 3)),
-            (("response",), self.command_response, (G, self.n_command_lags, 3)),
-            (("response_sd",), self.response_error, (G, self.n_command_lags, 3)),
+    def _shape_mistakes(self) -> Iterator[Conflict]:
+        """Arrays whose shape contradicts groups, lags and rates; empty ones that may be are not checked."""
+        G, L = len(self.groups), self.n_command_lags
+        arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
+            (("response",), self.command_response, (G, L, 3)),
+            (("response_sd",), self.response_error, (G, L, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
         ]
+        optional: list[tuple[Location, Any, tuple[int, ...]]] = [
+            (("past",), self.past_coefficients, (len(self.past_coefficients), 3))
+        ]
         for i, noise in enumerate(self.noise_models):
-            at = ("colours", i)
-            n_ar = -(-len(noise.ar_coefficients) // 3) * 3
-            expected += [
-                ((*at, "noise"), noise.residual_covariance, (3, 3)),
-                ((*at, "before"), noise.ar_coefficients, (n_ar, 3)),
-            ]
-            if misreads := noise.misread_shares:
-                expected += [((*at, "misreads"), misreads, (G,))]
+            at, n_ar = ("colours", i), -(-len(noise.ar_coefficients) // 3) * 3
+            arrays.append(((*at, "noise"), noise.residual_covariance, (3, 3)))
+            optional.append(((*at, "before"), noise.ar_coefficients, (n_ar, 3)))
+            optional.append(((*at, "misreads"), noise.misread_shares, (G,)))
             if noise.ma_coefficients[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (ranges := self.fitted_ranges) is not None:
-            fitted: list[tuple[str, object, tuple[int, ...]]] = [
-                ("commands", ranges.command_ranges, (len(ranges.command_ranges), 2)),
-                ("rates", ranges.rate_ranges_rad_s, (3, 2)),
-                ("airspeed", ranges.airspeed_range_mps, (2,)),
-                ("spread", ranges.rate_sd_rad_s, (3,)),
-                ("tied", ranges.tied_shares, (G,)),
-                ("gain_sd", ranges.group_gain_sd, (G,)),
-            ]  # fmt: skip
-            expected += [(("fitted", key), array, shape) for key, array, shape in fitted if array]
-        for key_path, array, shape in expected:
-            if not _has_shape(array, shape):
-                sizes = " x ".join(map(str, shape))
-                yield key_path, f"has another shape, allowed: {sizes} numbers"
+            optional += [
+                (("fitted", "commands"), ranges.command_ranges, (len(ranges.command_ranges), 2)),
+                (("fitted", "rates"), ranges.rate_ranges_rad_s, (3, 2)),
+                (("fitted", "airspeed"), ranges.airspeed_range_mps, (2,)),
+                (("fitted", "spread"), ranges.rate_sd_rad_s, (3,)),
+                (("fitted", "tied"), ranges.tied_shares, (G,)),
+                (("fitted", "gain_sd"), ranges.group_gain_sd, (G,)),
+            ]
+        for key_path, lists, shape in [*arrays, *(one for one in optional if one[1])]:
+            if _shape(lists) != shape:
+                yield key_path, f"has another shape, allowed: {' x '.join(map(str, shape))} numbers"
 
     def _covariance_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
         covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.residual_covariance)]
-        covariances += [
-            (("colours", i, "noise"), noise.residual_covariance) for i, noise in enumerate(self.noise_models)
-        ]
+        for i, noise in enumerate(self.noise_models):
+            covariances.append((("colours", i, "noise"), noise.residual_covariance))
         for key_path, rows in covariances:
             R = np.array(rows)
             if abs(R - R.T).max() > 1e-6 * abs(R).max():
@@ -343,52 +326,40 @@ class Model(Section):
         return self.model_copy(update={"noise_models": [noise]})
 
     def with_noise_of(self, average: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its `inflation_of`; the
-        model itself where none was fitted.
+        """The model with the noise fitted for flights of this moving average, times its inflation.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        if self._noise_of(average) is None:
-            return self
         R = self.inflation_of(average) * self.covariance_of_noise(average)
         return self.model_copy(update={"residual_covariance": R.tolist()})
 
+    def _noise_of(self, average: Sequence[float]) -> NoiseModel:
+        """The noise fitted for flights of this moving average; that of all flights where none was fitted."""
+        fitted = [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
+        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.residual_covariance)
+
     def covariance_of_noise(self, average: Sequence[float]) -> Floats:
-        """Covariance (3, 3) of the noise fitted for flights of this moving average, (rad/s)2; that of all
-        flights where none was fitted."""
-        return np.array((self._noise_of(average) or self).residual_covariance)
-
-    def _noises_of(self, average: Sequence[float]) -> list[NoiseModel]:
-        return [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
-
-    def _noise_of(self, average: Sequence[float]) -> NoiseModel | None:
-        return next(iter(self._noises_of(average)), None)
+        """Covariance (3, 3) of the noise of flights of this moving average, (rad/s)2."""
+        return np.array(self._noise_of(average).residual_covariance)
 
     def inflation_of(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        noise = self._noise_of(average)
-        return float(noise.covariance_inflation) if noise else 1.0
+        return float(self._noise_of(average).covariance_inflation)
 
     def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
-        errors = [noise.misread_shares for noise in self._noises_of(average) if noise.misread_shares]
-        return np.array(errors[0]) if errors else np.zeros(len(self.groups))
+        return np.array(self._noise_of(average).misread_shares or [0.0] * len(self.groups))
 
     def usual_quick_power(self, average: Sequence[float]) -> float:
         """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
         the noise; infinite where that is not known."""
-        powers = [
-            noise.usual_quick_power
-            for noise in self._noises_of(average)
-            if noise.usual_quick_power is not None
-        ]
-        return powers[0] if powers else float("inf")
+        power = self._noise_of(average).usual_quick_power
+        return float("inf") if power is None else power
 
     def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        noises = self._noises_of(average)
-        return np.reshape(np.array(noises[0].ar_coefficients if noises else []), (-1, 3, 3))
+        return np.reshape(np.array(self._noise_of(average).ar_coefficients), (-1, 3, 3))
 
     def whitened_intercept(self, average: Sequence[float]) -> Floats:
         """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
@@ -405,15 +376,12 @@ class Model(Section):
         )
 
 
-def _has_shape(lists: object, shape: tuple[int, ...]) -> bool:
-    """Whether nested lists have these lengths, each."""
-    if not shape:
-        return not isinstance(lists, list)
-    return (
-        isinstance(lists, list)
-        and len(lists) == shape[0]
-        and all(_has_shape(element, shape[1:]) for element in lists)
-    )
+def _shape(lists: Any) -> tuple[int, ...] | None:
+    """Lengths of nested lists; None where those of one depth differ."""
+    try:
+        return np.shape(lists)
+    except ValueError:
+        return None
 
 
 def load_model(path: Path) -> Model:

@@ -1,19 +1,18 @@
 """The pages of recorded flights: of an identification and of a diagnosed flight, with its files."""
 
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
-from beaver_ftc.results import as_json, result_folder
+from beaver_ftc.results import Document, as_json, result_folder
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
@@ -21,7 +20,6 @@ from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Regression, spectral_density
-from beaver_ftc_logs.replay import diagnosis_columns
 from beaver_ftc_logs.samples import Samples
 
 if TYPE_CHECKING:
@@ -43,30 +41,48 @@ def load_template(name: str) -> "Template":
     return Environment(loader=files, autoescape=True, undefined=StrictUndefined).get_template(name)
 
 
-def render_diagnosis(samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]) -> str:
-    """The report as HTML text."""
-    quiet = f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}."
-    predicts = (
+@dataclass(frozen=True)
+class Words:
+    """What a flight's page says of its diagnosis: what its bounds are called, what is said without an event,
+    and of the model."""
+
+    bounds: str
+    quiet: str
+    predicts: str
+
+
+def words_of_model(model: Model) -> Words:
+    """Of an identified model."""
+    return Words(
+        "90 % bounds",
+        f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}.",
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
-        f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands."
+        f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands.",
     )
-    words = {"bounds": "90 % bounds", "quiet": quiet, "predicts": predicts}
-    return _render_flight_page(samples, list(model.vehicle.surfaces), rows, verdict, words)
 
 
-def _render_flight_page(
-    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: dict[str, Any], words: dict[str, str]
+def words_of_aircraft(name: str, window_s: float) -> Words:
+    """Of an aircraft's own model. window_s: for how long a fault has to stand for its bounds to hold."""
+    return Words(
+        "bounds",
+        "No residual left the bound of the errors declared.",
+        f"The model is that of {name}; the bounds hold while one surface alone is at fault, has stood for "
+        f"{window_s:g} s, and the errors declared hold.",
+    )
+
+
+def render_diagnosis(
+    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: Document, words: Words
 ) -> str:
-    """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
+    """The report of a flight as HTML text."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
         duration_text=duration_text(verdict),
         events=events_to_show(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
         words=words,
-        picture=_encode_png(flight_figure(samples, surfaces, rows, words["bounds"])),
-        ages=samples.held_age_s,
-        notes=[*_log_notes(samples), words["predicts"]],
+        picture=_encode_png(flight_figure(samples, surfaces, rows, words.bounds)),
+        notes=[*_log_notes(samples), words.predicts],
     )
 
 
@@ -139,50 +155,11 @@ def _shade_alarms(axis: Any, rows: LogRows) -> None:
         axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
-def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
-    """Columns of diagnosis.parquet, by the vehicle's surfaces."""
-    names = (f"{surface}_{suffix}" for surface in surfaces for suffix in ("effectiveness", "low", "high"))
-    return ("t_s", "faulty", "named", *names, "fault_probability", "credible")
-
-
-def write_diagnosis(
-    parent: Path, samples: Samples, model: Model, rows: LogRows, verdict: dict[str, Any]
-) -> Path:
-    """Write the folder `parent/<flight>` whole or not at all; returns it."""
-    levels = rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T
-    head = rows.t_s, rows.faulty, rows.isolated_surfaces.tolist()
-    columns = (*head, *chain(*zip(*levels, strict=True)), rows.fault_probability, rows.credible)
-    table = dict(zip(diagnosis_column_names(model.vehicle.surfaces), columns, strict=True))
-    page = render_diagnosis(samples, model, rows, verdict)
-    return write_results(parent, samples.name, table, verdict, page)
-
-
-def write_aircraft_diagnosis(
-    parent: Path,
-    samples: Samples,
-    surfaces: Sequence[str],
-    rows: LogRows,
-    verdict: dict[str, Any],
-    extra: Callable[[Path], None] | None = None,
-) -> Path:
-    """The same of a flight that an aircraft's own model diagnosed; extra: writes into the folder, too."""
-    from beaver_ftc_logs.stepped import BOUND_WINDOW_S
-
-    words = {
-        "bounds": "bounds",
-        "quiet": "No residual left the bound of the errors declared.",
-        "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
-        f"is at fault, has stood for {BOUND_WINDOW_S:g} s, and the errors declared hold.",
-    }
-    page = _render_flight_page(samples, surfaces, rows, verdict, words)
-    return write_results(parent, samples.name, diagnosis_columns(rows, surfaces), verdict, page, extra)
-
-
 def write_results(
     parent: Path,
     name: str,
-    table: dict[str, Any],
-    verdict: dict[str, Any],
+    table: Document,
+    verdict: Document,
     page: str | None = None,
     extra: Callable[[Path], None] | None = None,
 ) -> Path:
@@ -260,22 +237,16 @@ def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
 
 
 def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[Floats, Floats, Floats]:
-    """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
+    """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
+    known, for lines to end."""
     rows, residual = fitting.one_step_residual(model, held_out)
-    rates = np.full_like(held_out.samples.rates, np.nan)
-    r = np.full_like(held_out.samples.rates, np.nan)
-    rates[rows], r[rows] = held_out.samples.rates[rows], residual
-    first = _liveliest_row(rates, rows, n)
+    samples = held_out.samples
+    rates, r = np.full((2, *samples.rates.shape), np.nan)
+    rates[rows], r[rows] = samples.rates[rows], residual
+    total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
+    first = int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
     window = slice(first, first + n)
-    return held_out.samples.t_s[window], rates[window], r[window]
-
-
-def _liveliest_row(rates: Floats, rows: NDArray[np.int64], n: int) -> int:
-    """First sample of the window in which the rates known moved most."""
-    squares = np.zeros(len(rates))
-    squares[rows] = (rates[rows] ** 2).sum(axis=1)
-    total = np.concatenate([[0.0], np.cumsum(squares)])
-    return int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
+    return samples.t_s[window], rates[window], r[window]
 
 
 def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:

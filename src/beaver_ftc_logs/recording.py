@@ -4,7 +4,7 @@ Which rows of an autopilot's log are in order, and what is said of the others.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Parameters = Mapping[str, tuple[float, ...]]
 """Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
 _S_PER_US = 1e-6
@@ -76,21 +78,11 @@ def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
-    sorted_names = sorted(names)
-    ranked_names = sorted(
-        sorted_names, key=lambda name: -SequenceMatcher(None, name.lower(), wanted_name.lower()).ratio()
-    )
-    nearest_text = (
-        ", ".join(
-            name if name.isprintable() else repr(name) for name in ranked_names[:_N_LISTED_NEAREST_NAMES]
-        )
-        or "none"
-    )
-    return (
-        nearest_text
-        if len(sorted_names) <= _N_LISTED_NEAREST_NAMES
-        else f"{nearest_text}, and {len(sorted_names) - _N_LISTED_NEAREST_NAMES} more"
-    )
+    wanted, ranked = wanted_name.lower(), sorted(names)
+    ranked.sort(key=lambda name: -SequenceMatcher(None, name.lower(), wanted).ratio())
+    nearest = [name if name.isprintable() else repr(name) for name in ranked[:_N_LISTED_NEAREST_NAMES]]
+    n_more = len(ranked) - len(nearest)
+    return (", ".join(nearest) or "none") + (f", and {n_more} more" if n_more else "")
 
 
 @contextmanager
@@ -110,6 +102,8 @@ def package_errors_as_bad_input(
             f"reading a {log_kind} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
         )
         raise BadInput(f"{path}: {missing_package_text}") from None
+    except BadInput:
+        raise
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
         reason = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(
@@ -117,60 +111,52 @@ def package_errors_as_bad_input(
         ) from None
 
 
-def columns_and_time_origin(
-    topics: dict[str, dict[str, Any]], stamp_field: str, other_first_stamps_us: Iterable[float] = ()
-) -> tuple[dict[str, Column], float]:
-    """The fields of all topics as columns `topic.field`, and the first stamp, from which time counts, s.
+@dataclass(frozen=True)
+class Topic:
+    """What an autopilot's log has of one topic.
 
-    topics: each topic's fields by name, one of them the stamps in us; they are used up, so that no number is
-    in memory twice. other_first_stamps_us: of topics that are not kept.
+    stamps_us (n,). fields: the names of the others. values: gives the numbers of a field, (n,).
     """
-    stamps_of_topic = {name: _as_float_array(fields.pop(stamp_field)) for name, fields in topics.items()}
-    kept_rows_and_note_of_topic: dict[str, tuple[NDArray[np.int64] | None, str]] = {}
-    first_stamps_us = [*other_first_stamps_us]
-    for name, stamps in stamps_of_topic.items():
-        kept_rows, note = rows_with_increasing_time(name, stamps)
-        first_stamps_us += stamps[kept_rows[:1]].tolist()
-        kept_rows_and_note_of_topic[name] = (kept_rows if len(kept_rows) < len(stamps) else None), note
-    origin_us = min(first_stamps_us, default=0.0)
+
+    stamps_us: Floats
+    fields: list[str]
+    values: Callable[[str], Any]
+
+
+def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
+    """The names of the columns of all topics."""
+    return tuple(f"{name}.{field}" for name, topic in topics.items() for field in topic.fields)
+
+
+def columns_of_topics(
+    topics: Mapping[str, Topic],
+    wanted: Collection[str] | None,
+    all_topics: Mapping[str, Topic] | None = None,
+) -> tuple[dict[str, Column], tuple[str, ...], float | None]:
+    """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
+    topics, from which time counts, s.
+
+    Where no column is wanted, all have no rows, and there is no first stamp: a log's names are known then.
+    all_topics: of the log, where these are some of them.
+    """
+    names = names_of_topics(all_topics or topics)
+    if wanted is not None and not {*wanted} & {*names}:
+        return dict.fromkeys(names, Column(np.empty(0), np.empty(0))), (), None
+    kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
+    first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
+    origin_us = min(first_us, default=0.0)
     columns: dict[str, Column] = {}
-    for name, fields in topics.items():
-        kept_rows_or_all, note = kept_rows_and_note_of_topic.pop(name)
-        t_s = (_selected_rows(stamps_of_topic.pop(name), kept_rows_or_all) - origin_us) * _S_PER_US
-        for field_name in list(fields):
-            values = _selected_rows(_as_float_array(fields.pop(field_name)), kept_rows_or_all)
-            columns[f"{name}.{field_name}"] = Column(t_s, values, note)
-    return columns, origin_us * _S_PER_US
+    for name, topic in topics.items():
+        rows, note = kept[name]
+        t_s = (topic.stamps_us[rows] - origin_us) * _S_PER_US
+        for field_name in topic.fields:
+            if wanted is None or f"{name}.{field_name}" in wanted:
+                values = np.asarray(topic.values(field_name)[rows], dtype=float)
+                columns[f"{name}.{field_name}"] = Column(t_s, values, note)
+    return columns, tuple(name for name in names if name not in columns), float(origin_us * _S_PER_US)
 
 
-def columns_without_numbers(
-    fields_by_topic: Mapping[str, Iterable[str]], stamp_field: str
-) -> dict[str, Column]:
-    """The columns of all topics by their names, each without a row: those of a log that has none that is
-    wanted."""
-    no_rows = Column(np.empty(0), np.empty(0))
-    return dict.fromkeys(column_names_of_topics(fields_by_topic, stamp_field), no_rows)
-
-
-def column_names_of_topics(fields_by_topic: Mapping[str, Iterable[str]], stamp_field: str) -> tuple[str, ...]:
-    """The names of the columns of all topics, without their stamps."""
-    return tuple(
-        f"{topic}.{field_name}"
-        for topic, field_names in fields_by_topic.items()
-        for field_name in field_names
-        if field_name != stamp_field
-    )
-
-
-def _as_float_array(values: Any) -> Floats:
-    return np.asarray(values, dtype=float)
-
-
-def _selected_rows(values: Floats, rows_or_all: NDArray[np.int64] | None) -> Floats:
-    return values if rows_or_all is None else values[rows_or_all]
-
-
-def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.int64], str]:
+def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:
     """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
 
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
@@ -184,30 +170,27 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.in
     misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or stamps[k] != stamps[k - 1]]
     if not misplaced_rows:
         return kept_rows, ""
-    n_further = len(misplaced_rows) - 1
-    others_text = (
-        f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(stamps)}" if n_further else ""
-    )
-    return (
-        kept_rows,
-        f"{topic}: row {misplaced_rows[0] + 1}: its stamp is out of order, the row is left out{others_text}",
-    )
+    n_more = len(misplaced_rows) - 1
+    others = f", as {'is' if n_more == 1 else 'are'} {n_more} more of {len(stamps)}" if n_more else ""
+    first = f"{topic}: row {misplaced_rows[0] + 1}"
+    return kept_rows, f"{first}: its stamp is out of order, the row is left out{others}"
 
 
-def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
+def _longest_increasing_rows(stamps: Floats) -> Ints:
     """Places of a longest strictly increasing subsequence, by patience sorting from the end.
 
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
-    negated_first_stamp_by_length: list[float] = []
-    first_row_by_length: list[int] = []
+    # by length of a subsequence: its largest first stamp, negated, and the row of that
+    first_stamps: list[float] = []
+    first_rows: list[int] = []
     next_rows = np.full(len(stamps), -1)
     for k in range(len(stamps) - 1, -1, -1):
-        longest_following_length = bisect_left(negated_first_stamp_by_length, -stamps[k])
-        next_rows[k] = first_row_by_length[longest_following_length - 1] if longest_following_length else -1
-        negated_first_stamp_by_length[longest_following_length : longest_following_length + 1] = [-stamps[k]]
-        first_row_by_length[longest_following_length : longest_following_length + 1] = [k]
-    kept_rows = first_row_by_length[-1:]
+        length = bisect_left(first_stamps, -stamps[k])
+        next_rows[k] = first_rows[length - 1] if length else -1
+        first_stamps[length : length + 1] = [-stamps[k]]
+        first_rows[length : length + 1] = [k]
+    kept_rows = first_rows[-1:]
     while kept_rows and next_rows[kept_rows[-1]] >= 0:
         kept_rows.append(int(next_rows[kept_rows[-1]]))
     return np.array(kept_rows, dtype=np.int64)

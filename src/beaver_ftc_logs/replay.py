@@ -5,7 +5,6 @@ of any sensor but the gyros were declared, that is what the diagnosis was
 given, and the verdicts are the same to the bit.
 """
 
-from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -34,55 +33,38 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
     groups = [*stepped.input_columns(aircraft), ["altitude_m"]]
-    log = _read_columns(path, ["t_s", *chain.from_iterable(groups)])
-    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
-    arrays = [np.column_stack([log[name] for name in names]) for names in groups]
-    replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
-    rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
-    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
-
-
-def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
-    """These columns of a log, and what it says of its own detection if it does."""
+    names = ["t_s", *chain.from_iterable(groups)]
     log = read_numbers(path, [*names, "detected"])
-    missing = [name for name in names if name not in log]
-    if missing:
+    if missing := [name for name in names if name not in log]:
         raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
     check_time(path, log["t_s"])
-    return log
-
-
-def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
-    """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
-    bounds are 0 and 1."""
-    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty}
-    columns["named"] = rows.isolated_surfaces.tolist()
-    for i, surface in enumerate(surfaces):
-        columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
-        columns[f"{surface}_low"] = rows.effectiveness_low[:, i]
-        columns[f"{surface}_high"] = rows.effectiveness_high[:, i]
-    return columns | {"credible": rows.credible}
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.error_sections(scenario))
+    arrays = [np.column_stack([log[name] for name in group]) for group in groups]
+    replay = stepped.replay_samples(diagnosis, arrays, scenario.rate_hz)
+    rows = stepped.rows_of_replay(log["t_s"], replay, aircraft.surfaces, scenario.fdi)
+    return rows.table(aircraft.surfaces), _replay_verdict(path, scenario, log, replay.verdicts)
 
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log["t_s"]
     detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
+    detection_s = detected[0] if detected else None
     isolation_s, name = _last_isolation(t_s, verdicts)
     pairs = zip(log.get("detected", []), verdicts, strict=False)
-    verdict: Document = {
+    return {
         "flight": scenario.name,
         "replay": True,
         "duration_s": float(t_s[-1] - t_s[0]),
         "faulty": bool(detected),
         "credible": {"share": 1.0, "reasons": []},
-        "detection_s": detected[0] if detected else None,
+        "detection_s": detection_s,
         "isolation_s": isolation_s,
         "isolated": name,
         "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
         "left_out": _lacking_inputs(scenario),
+        "as_flown": _is_as_flown(path, detection_s, isolation_s),
     }
-    return verdict | {"as_flown": _is_as_flown(path, verdict)}
 
 
 def _last_isolation(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
@@ -102,8 +84,9 @@ def _lacking_inputs(scenario: Any) -> list[str]:
     return [f"the declared errors of {name}: the log has the true value" for name in lacking]
 
 
-def _is_as_flown(path: Path, verdict: Document) -> bool | None:
-    """Whether detection and isolation are those of metrics.json; None where there is none beside the log."""
+def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:
+    """Whether detection and isolation are those of metrics.json, whose times are rounded otherwise; None if
+    there is none beside the log."""
     metrics_path = path.with_name("metrics.json")
     if not metrics_path.is_file():
         return None
@@ -111,15 +94,11 @@ def _is_as_flown(path: Path, verdict: Document) -> bool | None:
         metrics = Metrics.of(read_metrics(metrics_path))
     except (OSError, ValueError):
         raise BadInput(f"{metrics_path}: cannot be read, allowed: the metrics.json of the flight") from None
-    flown = metrics.detection.time_s, metrics.isolation.time_s
-    return all(map(_is_same_time, flown, (verdict["detection_s"], verdict["isolation_s"])))
-
-
-def _is_same_time(flown_s: float | None, now_s: float | None) -> bool:
-    """The log's times are rounded otherwise than those of metrics.json."""
-    if flown_s is None or now_s is None:
-        return flown_s is now_s
-    return abs(flown_s - now_s) < TIME_TOLERANCE_S
+    flown_s = metrics.detection.time_s, metrics.isolation.time_s
+    return all(
+        flown is now if flown is None or now is None else abs(flown - now) < TIME_TOLERANCE_S
+        for flown, now in zip(flown_s, times_s, strict=True)
+    )
 
 
 def as_text(verdict: Document) -> str:

@@ -7,21 +7,20 @@ that a log has as many as its rows ask for, whatever its clock does.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
-from beaver_ftc_logs.readers import read_flight, read_parts, split_long_recording
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight
+from beaver_ftc_logs.readers import read_parts, split_long_recording
+from beaver_ftc_logs.recording import Column, Floats, Ints, LoggedFailure, Mask, RecordedFlight
 from beaver_ftc_logs.units import TIME_UNITS
-from beaver_ftc_logs.vehicle import Vehicle
+from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 MIN_HZ, _MAX_HZ = 4.0, 1e5
 _MIN_ROWS = 50
@@ -66,7 +65,7 @@ class Samples:
     commands: Floats
     signals: Floats
     labels: Floats
-    stretch_number: NDArray[np.int64]
+    stretch_number: Ints
     dt_s: float
     held_age_s: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
@@ -74,7 +73,7 @@ class Samples:
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
     unchanged_s: Mapping[str, Floats] = field(default_factory=dict)
-    is_rate_clipped: NDArray[np.bool_] | None = None
+    is_rate_clipped: Mask | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
@@ -90,10 +89,10 @@ _PER_SAMPLE_FIELDS = (
 
 def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     """Put a log on one time base. Raises BadInput with the reason where the log cannot be used."""
-    rate_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    rate_names = vehicle.rate_columns
     used = list(dict.fromkeys([*rate_names, *vehicle.command_columns, *vehicle.signal_columns]))
     log = convert_to_si(log, vehicle)
-    _refuse_columns(log, used, rate_names=rate_names)
+    _refuse_columns(log, used, rate_names)
     confirmed = _check_attitude(log, vehicle)
     stamps = log.columns[rate_names[0]].t_s
     t_s, stretch, step_s = _time_base(log.name, stamps, vehicle.max_sample_rate_hz)
@@ -105,23 +104,38 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     def stacked_columns(names: list[str]) -> Floats:
         return np.column_stack([held[name][0] for name in names]) if names else np.empty((len(t_s), 0))
 
+    def sampled(quantity: QuantityColumn | None, min_rows: int = 0) -> Floats | None:
+        column = log.columns.get(quantity.column) if quantity else None
+        return sample_column(column, t_s, step_s)[0] if column and len(column.t_s) >= min_rows else None
+
+    heights = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
+    logged = [one for quantity in heights if (one := sampled(quantity, 2)) is not None]
+    climb_mps = energy.energy_climb_mps(t_s, logged[0], logged[1], stretch) if len(logged) == 2 else None
+    rates = [log.columns[name] for name in rate_names]
+    clipped = [signals.find_clipped_rows(rate.values).astype(float) for rate in rates]
+    was_clipped = [_latest_values(t_s, rate.t_s, rows) for rate, rows in zip(rates, clipped, strict=True)]
+    labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
+    for i, surface in enumerate(vehicle.surfaces):
+        quantity = vehicle.labels.get(surface)
+        if quantity and (column := log.columns.get(quantity.column)):
+            labels[:, i] = _latest_values(t_s, column.t_s, quantity.to_si(column.values))
     samples = Samples(
         name=log.name,
         t_s=t_s,
         rates=stacked_columns(rate_names),
         commands=_mixed_commands(log.name, stacked_columns(vehicle.command_columns), vehicle),
         signals=stacked_columns(vehicle.signal_columns),
-        labels=_sampled_labels(log, vehicle, t_s),
+        labels=labels,
         stretch_number=stretch,
         dt_s=step_s,
         held_age_s={name: age_s for name, (_, age_s) in held.items() if age_s is not None},
         logged_failures=log.logged_failures,
         log_stamps_s=stamps,
         notes=(*log.notes, *dict.fromkeys(_defects(log, used, rate_names))),
-        airspeed=_sampled_airspeed(log, vehicle, t_s, step_s),
+        airspeed=sampled(vehicle.airspeed),
         unchanged_s={name: _unchanged_s(log.columns[name], t_s) for name in used},
-        is_rate_clipped=_is_rate_clipped([log.columns[name] for name in rate_names], t_s),
-        energy_height_rate_mps=_sampled_height_rate(log, vehicle, (t_s, stretch, step_s)),
+        is_rate_clipped=np.asarray(np.nan_to_num(was_clipped).any(axis=0)),
+        energy_height_rate_mps=climb_mps,
         confirmed_rates=confirmed,
     )
     V0 = vehicle.reference_airspeed_mps
@@ -175,37 +189,11 @@ def _unchanged_s(column: Column, t_s: Floats) -> Floats:
     return np.nan_to_num(since_s + _held_age_s(column, t_s))
 
 
-def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
+def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
     """Whether at each sample a gap has opened since the last number of a column."""
     column = _finite_rows(column)
     usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
-
-
-def _is_rate_clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
-    """Whether a rate is clipped at each sample."""
-    clipped = [signals.find_clipped_rows(rate.values).astype(float) for rate in rates]
-    held = [_latest_values(t_s, rate.t_s, rows) for rate, rows in zip(rates, clipped, strict=True)]
-    return np.asarray(np.nan_to_num(held).any(axis=0))
-
-
-def _sampled_airspeed(log: RecordedFlight, vehicle: Vehicle, t_s: Floats, step_s: float) -> Floats | None:
-    """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
-    column = log.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
-    return None if column is None else sample_column(column, t_s, step_s)[0]
-
-
-def _sampled_height_rate(
-    log: RecordedFlight, vehicle: Vehicle, grid: tuple[Floats, NDArray[np.int64], float]
-) -> Floats | None:
-    """As in Samples; grid: times, stretches and step of the samples."""
-    quantities = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    columns = [log.columns[quantity.column] for quantity in quantities if quantity.column in log.columns]
-    if len(columns) < 2 or not all(len(column.t_s) > 1 for column in columns):
-        return None
-    t_s, stretch, step_s = grid
-    altitude, airspeed = (sample_column(column, t_s, step_s)[0] for column in columns)
-    return energy.energy_climb_mps(t_s, altitude, airspeed, stretch)
 
 
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
@@ -213,22 +201,18 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     contradict one another: what is in another unit."""
     columns, attitude, mistake = log.columns, vehicle.attitude, None
     confirmed = frozenset[str]()
-    rates = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    rates = {name: columns[name] for name in vehicle.rate_columns}
     if attitude and not signals.find_clipped_rows(next(iter(rates.values())).values).any():
-        quantities = [attitude.roll, attitude.pitch, attitude.yaw]
         angles = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
-            for quantity in quantities
+            for quantity in (attitude.roll, attitude.pitch, attitude.yaw)
         ]
-        possible = [
-            *vehicle.signal_columns,
-            *(quantity.column for quantity in vehicle.flow.values()),
-            *vehicle.command_columns,
-        ]
-        candidates = {name: columns[name] for name in dict.fromkeys(possible) if name in columns}
+        flow = [quantity.column for quantity in vehicle.flow.values()]
+        possible = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
+        candidates = {name: columns[name] for name in possible if name in columns}
         mistake = physics.attitude_mistake(rates, angles, candidates)
         confirmed = physics.confirmed_rates(rates, angles)
-    az = vehicle.acceleration and log.columns.get(vehicle.acceleration.column)
+    az = vehicle.acceleration and columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and az:
         mistake = physics.gravity_remark(az, vehicle.acceleration.column)
     if mistake:
@@ -238,15 +222,11 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
 
 def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
     """A log with the columns that a vehicle names in SI."""
-    quantities = {quantity.column: quantity for _, quantity in vehicle.located_model_quantities()}
-    quantities |= {quantity.column: quantity for quantity in vehicle.flow.values()}
-    quantities |= {quantity.column: quantity for _, _, quantity in vehicle.typed_quantities()}
-    columns = {
-        name: replace(column, values=quantities[name].to_si(column.values))
-        for name, column in log.columns.items()
-        if name in quantities
-    }
-    return replace(log, columns={**log.columns, **columns})
+    columns = dict(log.columns)
+    for name, quantity in {quantity.column: quantity for quantity in vehicle.measured_quantities()}.items():
+        if name in columns:
+            columns[name] = replace(columns[name], values=quantity.to_si(columns[name].values))
+    return replace(log, columns=columns)
 
 
 def mixer_matrix(vehicle: Vehicle) -> Floats:
@@ -273,11 +253,10 @@ def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> F
 def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str]) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
-    missing = [name for name in used if name not in log.columns]
-    if missing:
-        nearest = log.nearest_columns_text(missing[0])
-        reason = f"no column {missing[0]}, allowed: a log that has it; it has {nearest}"
-        raise BadInput(f"{log.name}: {reason}")
+    for name in used:
+        if name not in log.columns:
+            nearest = log.nearest_columns_text(name)
+            raise BadInput(f"{log.name}: no column {name}, allowed: a log that has it; it has {nearest}")
     largest = {}
     for name in used:
         values = log.columns[name].values
@@ -297,7 +276,7 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
             )
 
 
-def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
+def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
@@ -327,7 +306,7 @@ def _other_time_unit_hint(rate_hz: float) -> str:
     return ""
 
 
-def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
+def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
     """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1
@@ -389,17 +368,6 @@ def _means_and_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
     return np.where(count > 0, mean, held), 0.5 * h
 
 
-def _sampled_labels(log: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
-    """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
-    labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
-    for i, surface in enumerate(vehicle.surfaces):
-        quantity = vehicle.labels.get(surface)
-        column = log.columns.get(quantity.column) if quantity else None
-        if quantity is not None and column is not None:
-            labels[:, i] = _latest_values(t_s, column.t_s, quantity.to_si(column.values))
-    return labels
-
-
 def constant_stretches(values: Floats) -> list[tuple[int, int]]:
     """Begin and end of each stretch of equal rows; nan is equal to nan."""
     known = np.nan_to_num(values, nan=-1.0)
@@ -410,12 +378,12 @@ def constant_stretches(values: Floats) -> list[tuple[int, int]]:
 def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
-    return read_flight(path, *_reader_arguments(vehicle, reader))
+    return next(_read_vehicle_log(path, vehicle, reader, in_parts=False))
 
 
 def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[RecordedFlight]:
     """The same, a long log in parts."""
-    for log in read_parts(path, *_reader_arguments(vehicle, reader)):
+    for log in _read_vehicle_log(path, vehicle, reader, in_parts=True):
         column = log.columns.get(vehicle.rates.p.column)
         if column is None:  # said where the columns are used
             yield log
@@ -424,11 +392,11 @@ def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) 
         yield from split_long_recording(log, column.t_s, max(ratio, 1.0))
 
 
-def _reader_arguments(
-    vehicle: Vehicle, reader: str | None
-) -> tuple[str | None, tuple[str, str] | None, list[str]]:
+def _read_vehicle_log(
+    path: Path, vehicle: Vehicle, reader: str | None, in_parts: bool
+) -> Iterator[RecordedFlight]:
     time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
-    return reader or vehicle.reader, time, vehicle.column_names()
+    return read_parts(path, reader or vehicle.reader, time, vehicle.column_names(), in_parts)
 
 
 def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
@@ -440,9 +408,8 @@ def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None =
     for path, samples in zip(paths, flights, strict=True):
         if samples is not None:
             yield samples
-            continue
-        for log in read_vehicle_parts(path, vehicle, reader):
-            yield resample(log, vehicle)
+        else:
+            yield from (resample(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader))
 
 
 def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
@@ -464,39 +431,32 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
 
 def select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
-    fields = {name: getattr(samples, name) for name in _PER_SAMPLE_FIELDS}
-    chosen = {name: values[rows].copy() for name, values in fields.items() if values is not None}
-    unchanged = {name: values[rows].copy() for name, values in samples.unchanged_s.items()}
-    return replace(samples, log_stamps_s=chosen["t_s"], unchanged_s=unchanged, **chosen)
+    return _rebuilt([samples], lambda arrays: arrays[0][rows].copy())
+
+
+def _rebuilt(parts: list[Samples], join: Callable[[list[Any]], Any]) -> Samples:
+    """Samples whose arrays are made of those of others."""
+    first = parts[0]
+    names = [name for name in _PER_SAMPLE_FIELDS if getattr(first, name) is not None]
+    fields = {name: join([getattr(part, name) for part in parts]) for name in names}
+    unchanged = {name: join([part.unchanged_s[name] for part in parts]) for name in first.unchanged_s}
+    return replace(first, log_stamps_s=fields["t_s"], unchanged_s=unchanged, **fields)
 
 
 def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> Samples:
     """Samples of stretches one after the other, with a gap between."""
-    names = [name for name in _PER_SAMPLE_FIELDS if getattr(stretches[0], name) is not None]
-    joined: dict[str, Any] = {
-        name: np.concatenate([getattr(stretch, name) for stretch in stretches]) for name in names
-    }
-    is_begin = np.diff(joined["stretch_number"], prepend=joined["stretch_number"][0]) != 0
+    joined = _rebuilt(stretches, np.concatenate)
+    is_begin = np.diff(joined.stretch_number, prepend=joined.stretch_number[0]) != 0
     is_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
-    joined["stretch_number"] = np.cumsum(is_begin)
-    unchanged = {
-        name: np.concatenate([stretch.unchanged_s[name] for stretch in stretches])
-        for name in stretches[0].unchanged_s
-    }
     kept = f"{len(is_begin)} samples of it, spread evenly, are looked at"
-    notes = (
-        f"a long log, read in {n_parts} parts: {kept}",
-        *dict.fromkeys(note for stretch in stretches for note in stretch.notes),
-    )
+    notes = dict.fromkeys(note for stretch in stretches for note in stretch.notes)
     return replace(
-        stretches[0],
+        joined,
         name=name,
-        notes=notes,
+        notes=(f"a long log, read in {n_parts} parts: {kept}", *notes),
         n_log_parts=n_parts,
-        log_stamps_s=joined["t_s"],
-        unchanged_s=unchanged,
+        stretch_number=np.cumsum(is_begin),
         confirmed_rates=frozenset.intersection(*(stretch.confirmed_rates for stretch in stretches)),
-        **joined,
     )
 
 

@@ -5,16 +5,13 @@ fitted to show for how long.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from beaver_ftc_logs.recording import Column, Floats
+from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
 _CLIPPED_IN_TURN, _CLIPPED_IN_ALL = 3, 10
 _SPIKE_RATIO, _MAX_SPIKE_SHARE = 40.0, 0.01
-
-Mask = NDArray[np.bool_]
 
 
 def time_since_change_s(column: Column) -> Floats:
@@ -49,7 +46,7 @@ def find_clipped_rows(values: Floats) -> Mask:
     return clipped
 
 
-def _count_at_previous(at_top: Mask, ordinal: NDArray[np.int64]) -> NDArray[np.int64]:
+def _count_at_previous(at_top: Mask, ordinal: Ints) -> Ints:
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
     reached. ordinal (n,): number of the present largest value, counted from 1."""
     total = np.cumsum(at_top)
@@ -57,7 +54,7 @@ def _count_at_previous(at_top: Mask, ordinal: NDArray[np.int64]) -> NDArray[np.i
     return (total - at_top)[firsts][ordinal - 1] if len(firsts) else np.zeros(len(ordinal), dtype=np.int64)
 
 
-def find_spike_rows(values: Floats) -> NDArray[np.int64]:
+def find_spike_rows(values: Floats) -> Ints:
     """Indices of single rows that differ from both neighbours by more than 40 times the usual step; none if
     they are more than 1 % of the rows."""
     finite = np.flatnonzero(np.isfinite(values))

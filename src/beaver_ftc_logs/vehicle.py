@@ -50,22 +50,18 @@ FaultKind = Literal["loss", "stuck"]
 
 class QuantityColumn(Section):
     """A column of the log: the value in `unit` is `scale` times its number, plus `offset`. For SI units, the
-    name of the column is enough."""
+    name of the column is enough.
 
-    column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
-    unit: Literal[tuple(SI_UNITS)] | None = Field(  # type: ignore[valid-type]
-        default=None, description="unit of the numbers; left out: the SI unit", examples=["deg/s"]
-    )
-    scale: Number = number(
-        1.0, unit="1", says="factor on the numbers in the log", range="not 0", examples=[0.01]
-    )
-    offset: Number = number(
-        0.0,
-        unit="as the column",
-        says="constant that is added",
-        range="any",
-        examples=[-1.5],
-    )
+    column: name of the column in the log
+    unit: unit of the numbers; left out: the SI unit
+    scale: factor on the numbers in the log, 1
+    offset: constant that is added, as the column
+    """
+
+    column: ColumnName = Field(examples=["gyro_x"])
+    unit: Literal[tuple(SI_UNITS)] | None = Field(default=None, examples=["deg/s"])  # type: ignore[valid-type]
+    scale: Number = number(1.0, unit="1", range="not 0", examples=[0.01])
+    offset: Number = number(0.0, unit="as the column", range="any", examples=[-1.5])
 
     @model_validator(mode="after")
     def _check_scale_not_zero(self) -> "QuantityColumn":
@@ -100,170 +96,133 @@ ColumnSpec = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
 
 
 class TimeColumn(Section):
-    """The column of the time, if the log is a table."""
+    """The column of the time, if the log is a table.
 
-    column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
-    unit: Literal[tuple(TIME_UNITS)] = Field(  # type: ignore[valid-type]
-        default="s", description="unit of the numbers", examples=["us"]
-    )
+    column: name of the column
+    unit: unit of the numbers
+    """
+
+    column: ColumnName = Field(examples=["TimeUS"])
+    unit: Literal[tuple(TIME_UNITS)] = Field(default="s", examples=["us"])  # type: ignore[valid-type]
 
 
 class RateColumns(Section):
-    """The columns of the body rates."""
+    """The columns of the body rates.
 
-    p: ColumnSpec = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
-    q: ColumnSpec = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
-    r: ColumnSpec = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+    p: column of the roll rate, rad/s
+    q: column of the pitch rate, rad/s
+    r: column of the yaw rate, rad/s
+    """
+
+    p: ColumnSpec = Field(examples=["p_rad_s"])
+    q: ColumnSpec = Field(examples=["q_rad_s"])
+    r: ColumnSpec = Field(examples=["r_rad_s"])
 
 
 class AttitudeColumns(Section):
     """Columns of the attitude angles, which show wrong units and signs of the rates. `diagnose --aircraft`
-    requires them if turbulence is declared."""
+    requires them if turbulence is declared.
 
-    roll: ColumnSpec = Field(description="column of the roll angle, rad", examples=["roll_rad"])
-    pitch: ColumnSpec | None = Field(
-        default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
-    )
-    yaw: ColumnSpec | None = Field(
-        default=None, description="column of the yaw angle, rad", examples=["yaw_rad"]
-    )
+    roll: column of the roll angle, rad
+    pitch: column of the pitch angle, rad
+    yaw: column of the yaw angle, rad
+    """
+
+    roll: ColumnSpec = Field(examples=["roll_rad"])
+    pitch: ColumnSpec | None = Field(default=None, examples=["pitch_rad"])
+    yaw: ColumnSpec | None = Field(default=None, examples=["yaw_rad"])
 
 
 class EnergyColumns(Section):
-    """Columns that show an engine failure: altitude and airspeed fall together."""
+    """Columns that show an engine failure: altitude and airspeed fall together.
 
-    altitude: ColumnSpec = Field(description="column of the altitude, m", examples=["altitude_m"])
-    airspeed: ColumnSpec = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
+    altitude: column of the altitude, m
+    airspeed: column of the airspeed, m/s
+    """
+
+    altitude: ColumnSpec = Field(examples=["altitude_m"])
+    airspeed: ColumnSpec = Field(examples=["airspeed_m_s"])
 
 
 class Vehicle(Section):
-    """The vehicle, and the columns of its logs."""
+    """The vehicle, and the columns of its logs.
 
-    name: VehicleName = Field(description="name of the vehicle", examples=["flying-wing"])
-    reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
-        default=None,
-        description="format of the logs. `table`: CSV or Parquet. `ulog`: PX4. `alfa`: folder of the ALFA "
-        "data set; left out: found from the path",
-    )
-    time: TimeColumn | None = Field(
-        default=None,
-        description="column with the time. Only a table without the column `t_s` needs this section",
-    )
-    rates: RateColumns = Field(description="columns of the three body rates")
-    commands: list[ColumnSpec] = Field(
-        min_length=1,
-        max_length=20,
-        description="columns of the commands to the servos, not of measured positions. Not required if the "
-        "parameters of a PX4 or ArduPilot log state the surfaces",
-        examples=[["roll_cmd", "pitch_cmd"]],
-    )
-    signals: list[ColumnSpec] = Field(
-        default=[],
-        max_length=12,
-        description="columns of other measured quantities that affect the body rates",
-        examples=[["roll_rad", "pitch_rad"]],
-    )
+    name: name of the vehicle
+    reader: format of the logs. `table`: CSV or Parquet. `ulog`: PX4. `alfa`: folder of the ALFA data set;
+    left out: found from the path
+    time: column with the time. Only a table without the column `t_s` needs this section
+    rates: columns of the three body rates
+    commands: columns of the commands to the servos, not of measured positions. Not required if the
+    parameters of a PX4 or ArduPilot log state the surfaces
+    signals: columns of other measured quantities that affect the body rates
+    surfaces: mixer: the deflection of each healthy surface is a weighted sum of commands. Required as
+    `commands`
+    labels: columns with the true effectiveness of each surface, for `identify` and `diagnose --score`
+    attitude: columns of the attitude angles. They show wrong units and signs of the body rates
+    acceleration: column of the specific force along the z axis, about 1 g
+    airspeed: column of the airspeed, to draw conclusions only in the range of the fit
+    energy: columns that show an engine failure. While altitude and airspeed fall as after an engine
+    failure, the diagnosis names no surface
+    flow: columns of `alpha_rad`, `beta_rad`, `qdyn_pa` and signals, for `diagnose --aircraft`
+    full_deflection_rad: deflection of each surface at a command of 1, for `diagnose --aircraft`; left
+    out: 1
+    reference_airspeed_mps: V0 of the factor (airspeed / V0)^n on each command; left out: `identify`
+    chooses V0, if a factor improves the fit
+    airspeed_powers: exponent n of each surface. With `other_laws: true`, `identify` estimates n; left
+    out: 2
+    outputs: columns of the servo outputs, for the freeze rule of `compare --flights`
+    false_alarms_per_hour: accepted false alarms in each hour of healthy flight; left out: 1 for logs
+    without labels, 1/h
+    faults: fault types to test
+    other_laws: true: the diagnosed flights can have another law, so more evidence is required; left out:
+    false for logs with labels, otherwise true
+    moving_air: true: gusts can move the aircraft, so the spectrum of the noise is estimated; left out:
+    false for logs with labels, otherwise true
+    max_rate_hz: sample rate to which a faster log is averaged; left out: 100 with `moving_air: true`,
+    otherwise 20, Hz
+    """
+
+    name: VehicleName = Field(examples=["flying-wing"])
+    reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = None
+    time: TimeColumn | None = None
+    rates: RateColumns
+    commands: list[ColumnSpec] = Field(min_length=1, max_length=20, examples=[["roll_cmd", "pitch_cmd"]])
+    signals: list[ColumnSpec] = Field(default=[], max_length=12, examples=[["roll_rad", "pitch_rad"]])
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
         max_length=20,
-        description="mixer: the deflection of each healthy surface is a weighted sum of commands. Required "
-        "as `commands`",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
-    labels: dict[str, ColumnSpec] = Field(
-        default={},
-        description="columns with the true effectiveness of each surface, for `identify` and `diagnose "
-        "--score`",
-        examples=[{"left": "left_truth"}],
-    )
-    attitude: AttitudeColumns | None = Field(
-        default=None,
-        description="columns of the attitude angles. They show wrong units and signs of the body rates",
-    )
+    labels: dict[str, ColumnSpec] = Field(default={}, examples=[{"left": "left_truth"}])
+    attitude: AttitudeColumns | None = None
     acceleration: ColumnSpec | None = Field(
-        default=None,
-        description="column of the specific force along the z axis, about 1 g",
-        json_schema_extra={"unit": "m/s²"},
-        examples=["az_m_s2"],
+        default=None, json_schema_extra={"unit": "m/s²"}, examples=["az_m_s2"]
     )
     airspeed: ColumnSpec | None = Field(
-        default=None,
-        description="column of the airspeed, to draw conclusions only in the range of the fit",
-        json_schema_extra={"unit": "m/s"},
-        examples=["airspeed_m_s"],
+        default=None, json_schema_extra={"unit": "m/s"}, examples=["airspeed_m_s"]
     )
-    energy: EnergyColumns | None = Field(
-        default=None,
-        description="columns that show an engine failure. While altitude and airspeed fall as after an "
-        "engine failure, the diagnosis names no surface",
-    )
+    energy: EnergyColumns | None = None
     flow: dict[str, ColumnSpec] = Field(
-        default={},
-        description="columns of `alpha_rad`, `beta_rad`, `qdyn_pa` and signals, for `diagnose --aircraft`",
-        examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}],
+        default={}, examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}]
     )
     full_deflection_rad: dict[str, Number] = Field(
-        default={},
-        description="deflection of each surface at a command of 1, for `diagnose --aircraft`; left out: 1",
-        json_schema_extra={"unit": "rad", "range": "any"},
-        examples=[{"left": 0.4}],
+        default={}, json_schema_extra={"unit": "rad", "range": "any"}, examples=[{"left": 0.4}]
     )
     reference_airspeed_mps: Number | None = Field(
-        default=None,
-        gt=0,
-        description="V0 of the factor (airspeed / V0)^n on each command; left out: `identify` chooses V0, "
-        "if a factor improves the fit",
-        json_schema_extra={"unit": "m/s"},
-        examples=[20.0],
+        default=None, gt=0, json_schema_extra={"unit": "m/s"}, examples=[20.0]
     )
     airspeed_powers: dict[str, Number] = Field(
-        default={},
-        description="exponent n of each surface. With `other_laws: true`, `identify` estimates n; left "
-        "out: 2",
-        json_schema_extra={"unit": "1", "range": "any"},
-        examples=[{"left": 1}],
+        default={}, json_schema_extra={"unit": "1", "range": "any"}, examples=[{"left": 1}]
     )
-    outputs: dict[str, ColumnSpec] = Field(
-        default={},
-        description="columns of the servo outputs, for the freeze rule of `compare --flights`",
-        examples=[{"left": "left_pwm"}],
-    )
+    outputs: dict[str, ColumnSpec] = Field(default={}, examples=[{"left": "left_pwm"}])
     false_alarms_per_hour: Number | None = number(
-        None,
-        gt=0,
-        le=MAX_ALARMS_PER_HOUR,
-        unit="1/h",
-        says="accepted false alarms in each hour of healthy flight; left out: 1 for logs without labels",
-        examples=[2],
+        None, gt=0, le=MAX_ALARMS_PER_HOUR, unit="1/h", examples=[2]
     )
-    faults: list[FaultKind] = Field(
-        default=["loss"],
-        min_length=1,
-        description="fault types to test",
-        examples=[["loss", "stuck"]],
-    )
-    other_laws: bool | None = Field(
-        default=None,
-        description="true: the diagnosed flights can have another law, so more evidence is required; left "
-        "out: false for logs with labels, otherwise true",
-        examples=[True],
-    )
-    moving_air: bool | None = Field(
-        default=None,
-        description="true: gusts can move the aircraft, so the spectrum of the noise is estimated; left "
-        "out: false for logs with labels, otherwise true",
-        examples=[True],
-    )
-    max_rate_hz: Number | None = number(
-        None,
-        gt=0,
-        le=1000,
-        unit="Hz",
-        says="sample rate to which a faster log is averaged; left out: 100 with `moving_air: true`, "
-        "otherwise 20",
-        examples=[50],
-    )
+    faults: list[FaultKind] = Field(default=["loss"], min_length=1, examples=[["loss", "stuck"]])
+    other_laws: bool | None = Field(default=None, examples=[True])
+    moving_air: bool | None = Field(default=None, examples=[True])
+    max_rate_hz: Number | None = number(None, gt=0, le=1000, unit="Hz", examples=[50])
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
@@ -326,6 +285,17 @@ class Vehicle(Section):
         found += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
         return found + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
 
+    def measured_quantities(self) -> list[QuantityColumn]:
+        """Every column but those of labels and outputs."""
+        located = [quantity for _, quantity in self.located_model_quantities()]
+        typed = [quantity for *_, quantity in self.typed_quantities()]
+        return [*located, *self.flow.values(), *typed]
+
+    @property
+    def rate_columns(self) -> list[str]:
+        """The columns of p, q and r."""
+        return [self.rates.p.column, self.rates.q.column, self.rates.r.column]
+
     @property
     def command_columns(self) -> list[str]:
         """The commands' columns."""
@@ -358,15 +328,12 @@ class Vehicle(Section):
     def regressor_columns(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.scale_by_airspeed`)."""
-        rate_names = [getattr(self.rates, axis).column for axis in "pqr"]
-        scaled = rate_names + self.signal_columns if self.reference_airspeed_mps is not None else []
+        scaled = self.rate_columns + self.signal_columns if self.reference_airspeed_mps is not None else []
         return self.signal_columns + [f"{name} by airspeed" for name in scaled]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [quantity for *_, quantity in self.located_model_quantities()]
-        quantities += [quantity for *_, quantity in self.typed_quantities()]
-        quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
+        quantities = [*self.measured_quantities(), *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 

@@ -1,11 +1,10 @@
-"""Readers of recorded flights, by name. A new format is one file here and one line in `READER_NAMES`."""
+"""Readers of recorded flights, by name. A new format is one file here and one row of `READERS`."""
 
 import re
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,15 +17,28 @@ SAMPLES_PER_PART = 400_000
 """Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000."""
 LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
-READER_NAMES = ("table", "alfa", "ulog", "ardupilot")
-SELECTIVE_READERS = ("ulog", "ardupilot")
-"""Of an autopilot's logs the columns that are wanted, the names alone where there are none of these."""
-_READER_OF_SUFFIX = {
-    ".csv": "table", ".tsv": "table", ".txt": "table", ".parquet": "table",
-    ".ulg": "ulog", ".bin": "ardupilot", ".log": "ardupilot",
-}  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Reader:
+    """A format of logs. suffixes: of its files; time: its own column of the time and its unit, None where the
+    vehicle file names it; of_autopilot: whether a log has parameters, and so many columns that only those
+    wanted are read, the names alone where there are none of these."""
+
+    suffixes: tuple[str, ...]
+    time: tuple[str, str] | None = None
+    of_autopilot: bool = False
+
+
+READERS = {
+    "table": Reader((".csv", ".tsv", ".txt", ".parquet")),
+    "alfa": Reader((), ("%time", "ns")),
+    "ulog": Reader((".ulg",), ("timestamp", "us"), of_autopilot=True),
+    "ardupilot": Reader((".bin", ".log"), ("TimeUS", "us"), of_autopilot=True),
+}
+"""The formats by name; each has a module here."""
+SELECTIVE_READERS = tuple(name for name, reader in READERS.items() if reader.of_autopilot)
+_READER_OF_SUFFIX = {suffix: name for name, reader in READERS.items() for suffix in reader.suffixes}
 _BLACKBOX_PHRASE = (
     "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
 )
@@ -44,9 +56,6 @@ _LARGE_FILE_STORES = {
 }
 """How pointers begin: the name of the store, and the command that fetches the file."""
 
-_OWN_TIMES = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilot": ("TimeUS", "us")}
-"""Time column and its unit in formats that define them."""
-
 
 def read_flight(
     path: Path,
@@ -56,11 +65,11 @@ def read_flight(
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
-    reader: one of READER_NAMES; by the path's own form where None. time: of a table.
+    reader: one of READERS; by the path's own form where None. time: of a table.
     columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
     why the log cannot be used.
     """
-    return next(_read_with_reader(path, reader, time, {"columns": columns, "part_rows": None}))
+    return next(read_parts(path, reader, time, columns, in_parts=False))
 
 
 def read_parts(
@@ -68,26 +77,21 @@ def read_parts(
     reader: str | None = None,
     time: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
+    in_parts: bool = True,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read_with_reader(path, reader, time, {"columns": columns, "part_rows": ROWS_PER_PART})
-
-
-def _read_with_reader(
-    path: Path, reader: str | None, time: tuple[str, str] | None, options: dict[str, Any]
-) -> Iterator[RecordedFlight]:
     check_exists(path)
     reader = reader or reader_name_for_path(path)
-    if reader not in READER_NAMES:
-        raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READER_NAMES)}")
-    module = import_module(f"beaver_ftc_logs.readers.{reader}")
-    if reader == "table":
-        yield from module.read_parts(path, *(time or ()), **options)
+    if reader not in READERS:
+        raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READERS)}")
+    module, own_time = import_module(f"beaver_ftc_logs.readers.{reader}"), READERS[reader].time
+    if own_time is None:
+        yield from module.read_parts(path, time, columns, ROWS_PER_PART if in_parts else None)
         return
-    if time is not None and time != _OWN_TIMES[reader]:
-        column, unit = _OWN_TIMES[reader]
-        raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    yield (module.read(path, options["columns"]) if reader in SELECTIVE_READERS else module.read(path))
+    if time not in (None, own_time):
+        reason = f"{' in '.join(time)} is not its time, allowed: {' in '.join(own_time)}"
+        raise BadInput(f"{path}: time: {reason}")
+    yield module.read(path, columns)
 
 
 def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> Iterator[RecordedFlight]:
@@ -145,6 +149,6 @@ def reader_name_for_path(path: Path) -> str:
         raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
     reader = _READER_OF_SUFFIX.get(path.suffix.lower())
     if reader is None:
-        allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READER_NAMES)}"
+        allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READERS)}"
         raise BadInput(f"{path}: what kind of log this is cannot be seen, allowed: {allowed}")
     return reader

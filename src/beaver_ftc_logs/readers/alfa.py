@@ -15,11 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, rows_with_increasing_time
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    Ints,
+    LoggedFailure,
+    RecordedFlight,
+    rows_with_increasing_time,
+)
 
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"
@@ -49,8 +55,8 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
     return sections
 
 
-def read(path: Path) -> RecordedFlight:
-    """The flight in a folder of topics. Raises BadInput if it has none of the gyro."""
+def read(path: Path, _wanted: Any = None) -> RecordedFlight:
+    """The flight in a folder of topics, with all its columns. Raises BadInput if it has none of the gyro."""
     if not path.is_dir():
         raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
     tables = dict(_read_topic_tables(path))
@@ -76,7 +82,7 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 
 
 def _read_columns(
-    tables: dict[str, TopicTable], kept: dict[str, tuple[NDArray[np.int64], str]], zero_ns: float
+    tables: dict[str, TopicTable], kept: dict[str, tuple[Ints, str]], zero_ns: float
 ) -> Iterator[tuple[str, Column]]:
     for name, (topic, field, unit) in _alfa_names()["columns"].items():
         if field in tables.get(topic, {}):

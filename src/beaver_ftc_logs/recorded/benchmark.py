@@ -6,8 +6,9 @@ in turn, with settings fitted to the whole flight. Rivals stand beside ours.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ from beaver_ftc_logs.samples import Samples, read_vehicle_columns, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
+Cell = Callable[[Document], str]
+_METHOD: Cell = itemgetter("method")
 LABEL_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
@@ -201,13 +204,13 @@ def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
     """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
     counts: an aileron before a rudder."""
     kinds = [min(_KIND_OF_SURFACE.get(one, one) for one in score["failure"].split("+")) for score in failed]
-    kin = [score for score, first in zip(failed, kinds, strict=True) if first == kind]
-    delays_s = [score["delay_s"] for score in kin if score["detected"]]
+    delays_s = [score["delay_s"] for score, first in zip(failed, kinds, strict=True) if first == kind]
+    found = [delay for delay in delays_s if delay is not None]
     return {
-        "failures": len(kin),
-        "found": len(delays_s),
-        "within_5_s": sum(delay <= MAX_SHORT_DELAY_S for delay in delays_s),
-        "mean": float(np.mean(delays_s)) if delays_s else None,
+        "failures": len(delays_s),
+        "found": len(found),
+        "within_5_s": sum(delay <= MAX_SHORT_DELAY_S for delay in found),
+        "mean": float(np.mean(found)) if found else None,
     }
 
 
@@ -227,67 +230,76 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
         return _tables_of_other_days(document["other_days"])
     tables = []
     for data in document["sets"]:
-        by_labels = data["scored_by"] == "labels"
-        head = LABEL_HEADER if by_labels else FAILURE_HEADER
-        rows = [
-            [row["method"], *_score_texts(row, LABEL_TITLES)] if by_labels else _failure_score_cells(row)
-            for row in (*data["rows"], *data["published"])
-        ]
-        tables.append((f"{data['set']}: left out, {data['left_out']}", (head, rows)))
+        columns = LABEL_COLUMNS if data["scored_by"] == "labels" else FAILURE_COLUMNS
+        rows = [[cell_of(row) for cell_of in columns.values()] for row in (*data["rows"], *data["published"])]
+        tables.append((f"{data['set']}: left out, {data['left_out']}", ([*columns], rows)))
     return tables
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    head = ["day", *LABEL_TITLES.values(), "classes by sliding least squares"]
+    columns = {title: _share(key) for key, title in LABEL_TITLES.items()}
+    columns["classes by sliding least squares"] = _share("beside")
     tables = []
     for data in document["sets"]:
-        rows = [[day["day"], *_day_score_cells(day)] for day in data["rows"] if day["kind"] == "one change"]
-        for summary in data["summary"]:
-            for key in ("mean", "worst"):
-                rows.append([f"{summary['kind']}: {key}", *_day_score_cells(summary[key])])
-        tables.append((f"{data['set']}: other days made of it, halves left out in turn", (head, rows)))
+        days = [(day["day"], day) for day in data["rows"] if day["kind"] == "one change"]
+        for one in data["summary"]:
+            days += [(f"{one['kind']}: {key}", one[key]) for key in ("mean", "worst")]
+        rows = [[title, *(cell_of(day) for cell_of in columns.values())] for title, day in days]
+        tables.append(
+            (f"{data['set']}: other days made of it, halves left out in turn", (["day", *columns], rows))
+        )
     return tables
 
 
-def _day_score_cells(day: Document) -> list[str]:
-    return [f"{day[key]:.3f}" for key in (*LABEL_TITLES, "beside")]
+def _share(key: str) -> Cell:
+    """A figure of a method; one that its authors did not publish is left empty."""
+    return lambda row: "" if row.get(key) is None else f"{row[key]:.3f}"
 
 
-LABEL_HEADER = ["method", *LABEL_TITLES.values()]
-FAILURE_HEADER = [
-    "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
-    "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
-    "wrong group",
-]  # fmt: skip
+def _delay(kind: str) -> Cell:
+    """The mean delay of a kind of surface, and of how many failures."""
+
+    def cell_of(row: Document) -> str:
+        delay = row["delay_s"].get(kind, {})
+        if delay.get("mean") is None:
+            return "not found" if delay.get("failures") else ""
+        return f"{delay['mean']:.1f}" + (
+            " ({found} of {failures})".format(**delay) if "found" in delay else ""
+        )
+
+    return cell_of
 
 
-def _failure_score_cells(row: Document) -> list[str]:
-    """Return the cells of a method's row; figures that its authors did not publish are left empty."""
-    delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
-    cells = [row["method"], *_score_texts(row, FAILURE_HEADER[1:4]), *map(_mean_delay_text, delays)]
-    if "false_alarms_per_hour" not in row:
-        return cells + [""] * (len(FAILURE_HEADER) - len(cells))
-    n_soon, n_failed = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
-    alarms = row["false_alarms_per_hour"]
-    return [
-        *cells,
-        f"{n_soon} of {n_failed}",
-        f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})",
-        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
-        str(row["wrong_group"]),
-    ]
+def _ours(text_of: Cell) -> Cell:
+    """A cell of the methods that are flown here."""
+    return lambda row: text_of(row) if "false_alarms_per_hour" in row else ""
 
 
-def _score_texts(row: Document, keys: Iterable[str]) -> list[str]:
-    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
+def _soon_text(row: Document) -> str:
+    delays = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
+    return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 
 
-def _mean_delay_text(delay: Document) -> str:
-    if delay.get("mean") is None:
-        return "not found" if delay.get("failures") else ""
-    counts = f" ({delay['found']} of {delay['failures']})" if "found" in delay else ""
-    return f"{delay['mean']:.1f}{counts}"
+LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
+FAILURE_COLUMNS = {
+    "method": _METHOD,
+    "precision": _share("precision"),
+    "recall": _share("recall"),
+    "accuracy": _share("accuracy"),
+    "mean delay, s: aileron": _delay("aileron"),
+    "rudder": _delay("rudder"),
+    "elevator": _delay("elevator"),
+    "ailerons and rudders within 5 s": _ours(_soon_text),
+    "false alarms an hour (95 %)": _ours(
+        lambda row: "{value:.1f} ({low:.1f} to {high:.1f})".format(**row["false_alarms_per_hour"])
+    ),
+    "healthy flights with an alarm": _ours(
+        lambda row: f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}"
+    ),
+    "wrong group": _ours(lambda row: str(row["wrong_group"])),
+}
+"""Tables of methods: the head of each column, and its cell of a method's row."""
 
 
 def as_text(document: Document) -> str:

@@ -78,10 +78,6 @@ def test_labels_are_read_for_the_score_alone(folder, tmp_path, options):
 @pytest.mark.parametrize(("name", "change", "says"), [
     ("p_rad_s", lambda p: p * np.nan, "column p_rad_s holds no number"),
     ("p_rad_s", lambda p: 0.0 * p + 0.1, "rate p does not move"),
-    ("q_rad_s", lambda q: None, "no column q_rad_s"),
-    ("t_s", lambda t: np.where(np.arange(len(t)) == 50, 0.0, t), "t_s: row 51: time does not increase"),
-    ("p_rad_s", lambda p: p * 1e9, "column p_rad_s holds"),
-    ("p_rad_s", lambda p: p * 1e3, "allowed: rates in rad/s, up to 60"),
     ("p_rad_s", lambda p: np.where(np.arange(len(p)) < 30, p, np.nan), "samples known to be healthy"),
 ])  # fmt: skip
 def test_a_spoilt_log_is_one_line_and_nothing_is_written(folder, tmp_path, name, change, says):

@@ -25,6 +25,11 @@ def test_a_flight_in_a_picture(changed, flown):
     assert not changed(picture(figure))
 
 
+def rendered(samples, rows, verdict):
+    words = pages.words_of_model(MODEL)
+    return pages.render_diagnosis(samples, list(MODEL.vehicle.surfaces), rows, verdict, words)
+
+
 @pytest.mark.parametrize(
     ("share", "says"), [(0.876, "No fault shows"), (0.1, "No fault"), (0.099, "No verdict")]
 )
@@ -33,7 +38,7 @@ def test_a_page_says_where_nothing_is_said_and_why(monkeypatch, flown, share, sa
     samples, rows = flown[0], small.rows([(9, *SOUND)])
     reasons = [{"says": "a rate is <odd>", "share": 0.1234}, {"says": "p stands still", "share": 0.0321}]
     verdict = verdict_document(samples, MODEL, rows) | {"credible": {"share": share, "reasons": reasons}}
-    text = pages.render_diagnosis(samples, MODEL, rows, verdict)
+    text = rendered(samples, rows, verdict)
     assert f'<p class="verdict">{says}' in text
     assert "<li>a rate is &lt;odd&gt;: 12.3 % of the rows</li>" in text
 
@@ -42,7 +47,7 @@ def test_the_page_of_a_flight(changed, monkeypatch, flown):
     monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     samples, rows = flown
     verdict = verdict_document(samples, MODEL, rows) | {"score": {"classes": 0.98765, "rows": 4}}
-    assert not changed(page(pages.render_diagnosis(samples, MODEL, rows, verdict)))
+    assert not changed(page(rendered(samples, rows, verdict)))
 
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):

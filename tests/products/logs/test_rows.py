@@ -24,23 +24,6 @@ def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
         diagnose.check_log_fits_model(samples, model)
 
 
-LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
-
-
-@pytest.mark.parametrize(("mass", "bounds"), [
-    ([0.0, 0.9, 0.1, 0.0], (0.125, 0.375)),
-    ([0.1, 0.5, 0.4, 0.0], (0.125, 0.75)),  # two hold it: half a step more each way
-    ([0.8, 0.1, 0.1, 0.0], (0.0, 0.125)),  # just so much is enough
-    ([0.79, 0.01, 0.0, 0.2], (0.0, 1.0)),
-    ([0.1, 0.0, 0.0, 0.9], (0.75, 1.0)),
-    ([0.3, 0.3, 0.3, 0.1], (0.0, 0.75)),
-    ([0.4, 0.0, 0.5, 0.1], (0.0, 0.75)),  # what lies between is inside
-])  # fmt: skip
-def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
-    low, high = diagnose._credible_bounds(LEVELS, np.array([mass]), 0.8)
-    assert (low[0], high[0]) == bounds
-
-
 def posterior(bank, *shares):
     """A row each: {level of each group: probability}."""
     rows = np.zeros((len(shares), len(bank.hypothesis_kind)))

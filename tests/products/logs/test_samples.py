@@ -20,18 +20,6 @@ def stamps(step, n=60):
     return np.arange(n) * step
 
 
-def test_the_mean_over_the_interval_that_ends_at_a_sample():
-    """Its end is in it, its begin is not, to a millionth of a step; of nothing, the last value."""
-    fast = column([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.2], [1.0, 2.0, 4.0, np.nan, 16.0, 32.0, 64.0])
-    t_s = np.array([-0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.2])
-    values, delay_s = of._means_and_age(fast, t_s, 0.2)
-    np.testing.assert_allclose(values, [np.nan, 1.0, 3.0, 16.0, 32.0, 32.0, 64.0])
-    assert delay_s == pytest.approx(0.1)
-    for early, mean in ((1e-8, [1.5, 4.0]), (1e-6, [1.0, 3.0])):
-        near = column([0.1, 0.2 + early, 0.3], [1.0, 2.0, 4.0])
-        np.testing.assert_allclose(of._means_and_age(near, np.array([0.2, 0.4]), 0.2)[0], mean)
-
-
 def recording(n=60, step=0.1, **changes):
     t_s = stamps(step, n)
     values = {"p_rad_s": 0.1, "q_rad_s": 0.2, "r_rad_s": 0.3, "roll": 0.4, "pitch": 0.6}

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import load
@@ -21,7 +22,7 @@ from beaver_ftc.studies.power.survey import WITHIN_S
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
 from beaver_ftc.studies.sweep.one_flight import FIXED
-from beaver_ftc_logs import pages
+from beaver_ftc_logs.diagnose import LogRows
 
 TEXTS = Path(__file__).with_name("columns.yaml")
 NUMBER, TEXT, FLAG = "number", "text", "flag"
@@ -76,7 +77,9 @@ def _mismatch_frames() -> Columns:
 
 def _diagnosis() -> Columns:
     kinds = {"faulty": FLAG, "named": TEXT}
-    return {name: kinds.get(name, NUMBER) for name in pages.diagnosis_column_names(["SURFACE"])}
+    no_rows, no_surfaces = np.empty(0), np.empty((0, 1))
+    rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows)
+    return {name: kinds.get(name, NUMBER) for name in rows.table(["SURFACE"], with_probability=True)}
 
 
 TABLES: dict[str, Callable[[], Columns]] = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.results.metrics import evaluate
+from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Expect
 

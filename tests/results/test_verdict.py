@@ -3,8 +3,8 @@
 import pytest
 
 from beaver_ftc.results import verdict
+from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import expectations_in_words
 from beaver_ftc.scenario.schema import Expect
 
 # Each key of `expect:` with what the metrics say of it, whether it passes, and the sentence

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log, verdict
+from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
@@ -84,7 +85,7 @@ def _verdict_entry(metrics: Document, scenario: str) -> Document:
         "description": yaml.safe_load(scenario).get("description", ""),
         "facts": verdict.verdict_lines(found),
         "tracking": verdict.tracking_rms_in_words(found),
-        "expectations": verdict.expectations_in_words(found),
+        "expectations": expectations_in_words(found),
         "scenario": scenario,
     }
 

@@ -6,15 +6,15 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 import io
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
+from beaver_ftc.results.expectations import expectations_in_words, value_text
 from beaver_ftc.results.model import (
     AxisAuthority,
     CertificateCounts,
     ChangeInFlight,
     DeclaredFault,
     Detection,
-    Expectation,
     Fault,
     Isolation,
     Metrics,
@@ -168,85 +168,7 @@ def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
     """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
     of = metrics.tracking
     tracked = ("before", of.pre_fault_rms_deg_s), ("after", of.post_fault_rms_deg_s)
-    return [
-        (when, _value_text(rms.p), _value_text(rms.q), _value_text(rms.r)) for when, rms in tracked if rms
-    ]
-
-
-class ExpectationInWords(NamedTuple):
-    """An expectation compared with the flight.
-
-    limit: what is expected. actual: what the flight gave, empty if it adds nothing. share_of_limit: actual
-    over limit, None if the expectation is no limit.
-    """
-
-    name: str
-    limit: str
-    actual: str
-    passed: bool
-    share_of_limit: float | None
-
-    @property
-    def sentence(self) -> str:
-        """Expected and actual in one line."""
-        return f"{self.limit}, got {self.actual}" if self.actual else self.limit
-
-
-def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
-    """Each expectation in words."""
-    return [_expectation_in_words(found) for found in metrics.expectations]
-
-
-_QUANTITY_AND_UNIT_OF_LIMIT = {  # quantity and unit of the expectations that are limits
-    "detected_within_s": ("detection delay", "s"), "isolated_within_s": ("isolation delay", "s"),
-    "altitude_within_m": ("altitude deviation", "m"),
-    "airspeed_within_mps": ("airspeed deviation (10 s mean)", "m/s"),
-    "airspeed_within_limits_mps": ("deviation from the limited airspeed (10 s mean)", "m/s"),
-    "heading_within_deg": ("heading deviation", "deg"),
-    "arrives.altitude_m": ("altitude deviation at the end", "m"),
-    "arrives.airspeed_mps": ("airspeed deviation at the end", "m/s"),
-    "arrives.heading_deg": ("heading deviation at the end", "deg"),
-    **{
-        f"{key}_rms_deg_s.{axis}": (f"{name} rate RMS {when} the fault", "deg/s")
-        for key, when in (("pre_fault", "before"), ("post_fault", "after"))
-        for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
-    },
-}  # fmt: skip
-_TRUE_AND_FALSE_TEXT_OF_FLAG = {  # what is said of true, and of false
-    "no_false_alarm": ("no false alarm", "a false alarm"),
-    "no_departure": ("no departure", "a departure"),
-    "stays_in_envelope": ("stays in the envelope", "leaves the envelope"),
-    "arrives.in_envelope": ("inside the envelope at the end", "outside the envelope at the end"),
-}  # fmt: skip
-_TITLE_OF_NAME_EXPECTATION = {
-    "isolated_as": "isolated fault", "isolated_type": "fault type",
-    "candidate_type": "possible fault types include",
-}  # fmt: skip
-
-
-def _expectation_in_words(found: Expectation) -> ExpectationInWords:
-    actual, share = _value_text(found.actual), None
-    if found.name in _TRUE_AND_FALSE_TEXT_OF_FLAG:
-        limit = _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.expected]
-        actual = (
-            ""
-            if found.passed or found.actual is None
-            else _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.actual]
-        )
-    elif found.name in _QUANTITY_AND_UNIT_OF_LIMIT:
-        quantity, unit = _QUANTITY_AND_UNIT_OF_LIMIT[found.name]
-        limit = f"{quantity} ≤ {_value_text(found.expected)} {unit}"
-        if found.actual is not None:
-            share = abs(float(found.actual)) / found.expected if found.expected else None
-            actual += f" {unit}{'' if share is None else f' ({_three_digits(100 * share)} % of the limit)'}"
-    else:
-        what = _TITLE_OF_NAME_EXPECTATION.get(found.name, _without_underscores(found.name))
-        limit = f"{what} {_value_text(found.expected)}"
-        actual = "" if found.passed and found.actual == found.expected else actual
-    reason = found.reason if actual or not found.passed else ""
-    return ExpectationInWords(
-        found.name, limit, "; ".join(filter(None, (actual, reason))), found.passed, share
-    )
+    return [(when, value_text(rms.p), value_text(rms.q), value_text(rms.r)) for when, rms in tracked if rms]
 
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
@@ -364,9 +286,9 @@ def _profile_text(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
     profile = metrics.profile
     worst = {name: getattr(profile, name, None) for name in _DEVIATION_FORMAT_OF_CHANNEL}
-    at_once = _value_text(profile.airspeed_at_one_instant_mps) if profile else ""
+    at_once = value_text(profile.airspeed_at_one_instant_mps) if profile else ""
     off = ", ".join(
-        _DEVIATION_FORMAT_OF_CHANNEL[name].format(_value_text(by), at_once)
+        _DEVIATION_FORMAT_OF_CHANNEL[name].format(value_text(by), at_once)
         for name, by in worst.items()
         if by is not None
     )
@@ -425,7 +347,7 @@ def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
         return f"{when} (the fault is over then)" if is_over else when
     if isolation.estimate_deg is None:
         return f"{when} (true {TYPES[str(isolation.type)].size_in_words(size)})"
-    return f"{when} (true {_value_text(math.degrees(size))} deg)"
+    return f"{when} (true {value_text(math.degrees(size))} deg)"
 
 
 def _detection_text(metrics: Metrics) -> str:
@@ -530,7 +452,7 @@ def _estimate_text(isolation: Isolation | Named) -> str:
         from beaver_ftc.scenario.faults import TYPES
 
         return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
-    return f", estimated {_value_text(isolation.estimate_deg)} deg"
+    return f", estimated {value_text(isolation.estimate_deg)} deg"
 
 
 def _supervisor_text(metrics: Metrics) -> str:
@@ -635,19 +557,3 @@ def _seconds_text(seconds: float | None) -> str:
     if seconds is None:
         return "none"
     return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"
-
-
-def _value_text(value: Any) -> str:
-    """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
-    if value is None or value == ():
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, tuple):
-        return ", ".join(_value_text(entry) for entry in value)
-    return value if isinstance(value, str) else _three_digits(value)
-
-
-def _three_digits(value: float) -> str:
-    """A number of three significant digits, without an exponent below a million: 1230, not 1.23e+03."""
-    return f"{float(f'{value:.3g}'):g}"

@@ -98,7 +98,7 @@ def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
     assert document["frames"] == 20
     assert [document for _, document in drawn] == [document]
     written = np.genfromtxt(tmp_path / "short" / "flight.csv", delimiter=",", names=True)
-    flap = log.read(tmp_path / "short" / "log.parquet", ["flap_cmd_rad"])["flap_cmd_rad"]
+    flap = log.StoredLog(tmp_path / "short" / "log.parquet").read(["flap_cmd_rad"])["flap_cmd_rad"]
     stops = flown.airframe.travel["flap"]
     assert stops.max_rad > abs(stops.min_rad)
     assert written["flap_command"] == pytest.approx(flap / stops.max_rad)

@@ -95,30 +95,26 @@ def _escape_acmi_text(text: str) -> str:
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])
+    source = log.StoredLog(log_path)
+    start_m = float(next(source.read_chunks(["altitude_m"]))["altitude_m"][0])
     columns: tuple[str, ...] = _ACMI_COLUMNS
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
     if full_rad is not None:
         columns += (f"{FLAP}_pos_rad",)
-    for row in _rows_at_acmi_rate(log_path, columns):
+    for row in _rows_at_acmi_rate(source, columns):
         place = _acmi_position(row, EARTH_RADIUS_M + start_m)
         yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
         while events and events[0].time_s <= row["t_s"] + 1e-9:
             yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
-def _rows_at_acmi_rate(log_path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
-    every, seen = _acmi_row_stride(log_path), 0
-    for chunk in log.read_chunks(log_path, columns):
+def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
+    every, seen = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9)), 0
+    for chunk in source.read_chunks(columns):
         rows = len(chunk["t_s"])
         for i in range(-seen % every, rows, every):
             yield {name: float(values[i]) for name, values in chunk.items()}
         seen += rows
-
-
-def _acmi_row_stride(log_path: Path) -> int:
-    first = next(log.read_chunks(log_path, ["t_s"]))["t_s"][:2]
-    return max(1, ceil(1.0 / (ACMI_RATE_HZ * float(np.diff(first)[0])) - 1e-9)) if len(first) == 2 else 1
 
 
 def _acmi_position(row: dict[str, float], radius_m: float) -> str:
@@ -150,8 +146,7 @@ def write_recording(
         "flow": {name: name for name in (*_FLOW_COLUMNS, *signals)},
     }
     wanted = ["t_s", *(column for part in source_of.values() for column in part.values())]
-    chunks = list(log.read_chunks(log_path, list(dict.fromkeys(wanted))))
-    known = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+    known = log.StoredLog(log_path).read(list(dict.fromkeys(wanted)))
     named = {
         part: {
             name: pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])

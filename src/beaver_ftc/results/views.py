@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
-from pathlib import Path
 
 import numpy as np
 
@@ -440,18 +439,11 @@ def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
     return tuple(_curve_panel(label, (column, label, "actual")) for column, label in named)
 
 
-def read_series(
-    path: Path,
+def series_of(
+    source: log.Log,
     columns: Sequence[str],
     window_s: tuple[float, float] = WHOLE_FLIGHT_S,
     max_points: int = MAX_CURVE_POINTS,
-) -> ValuesOfColumns:
-    """What `series_of` makes of the log in a parquet file."""
-    return series_of(log.StoredLog(path), columns, window_s, max_points)
-
-
-def series_of(
-    source: log.Log, columns: Sequence[str], window_s: tuple[float, float], max_points: int = MAX_CURVE_POINTS
 ) -> ValuesOfColumns:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
@@ -459,11 +451,10 @@ def series_of(
     lowest value and the highest in the order in which they occur, so that no peak is lost.
     """
     wanted = tuple(dict.fromkeys(("t_s", *columns)))
-    frame_s = _frame_s(source)
-    rows = min(source.row_count(), (window_s[1] - window_s[0]) / frame_s)
+    rows = min(source.row_count(), (window_s[1] - window_s[0]) / source.frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
     whole = _unwrap_heading(source.read_chunks(source_columns(wanted)))
-    whole = _add_mean_airspeed(whole, frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
+    whole = _add_mean_airspeed(whole, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
     chunks = (_with_derived_columns(_rows_in_window(chunk, window_s), wanted) for chunk in whole)
     parts = [
         chunk if stretch == 1 else _extremes_by_stretch(chunk, stretch)
@@ -512,12 +503,6 @@ def _residual_over_threshold(chunk: ValuesOfColumns, names: Sequence[str]) -> np
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(residual / bound)
     return np.where(np.isfinite(ratio), ratio, np.nan)
-
-
-def _frame_s(source: log.Log) -> float:
-    """Time from one row to the next, s; infinite in a log of a single row."""
-    first = next(source.read_chunks(["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
-    return float(first[1] - first[0]) if first.size == 2 else math.inf
 
 
 def _rows_in_window(chunk: ValuesOfColumns, window_s: tuple[float, float]) -> ValuesOfColumns:

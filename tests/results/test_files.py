@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from synthetic import Flight
+from synthetic import landed
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
@@ -71,7 +71,7 @@ def own(tmp_path_factory):
 
 def test_an_own_aircraft_is_kept_with_its_flight(own, tmp_path):
     for _ in range(2):  # also where it lies already
-        writer.write_documents(tmp_path, own, metrics(Flight()))
+        writer.write_documents(tmp_path, own, metrics(landed()))
     files = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
     model = {
         str(path.relative_to(own.airframe.folder.parent))

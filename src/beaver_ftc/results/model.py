@@ -10,7 +10,7 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import cache, partial
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from beaver_ftc.documents import files
 from beaver_ftc.scenario.faults import DAMAGE, LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor
@@ -27,7 +27,13 @@ Known = Annotated[Value | None, _KNOWN]
 
 @dataclass(frozen=True)
 class Part:
-    """A section of the document."""
+    """A section of the document, its keys in the order of its fields.
+
+    _first, _last: keys that stand elsewhere than their fields.
+    """
+
+    _first: ClassVar[tuple[str, ...]] = ()
+    _last: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, found: Any) -> Self:
@@ -64,11 +70,13 @@ Reader = Callable[[Any], Any]
 
 @cache
 def _fields_of(part: Any) -> dict[str, tuple[Reader, bool]]:
-    """How each field of a section is read, and whether the document has it only where it is known."""
+    """How each field of a section is read, and whether the document has it only where it is known; in the
+    document's order."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
+    others = [one.name for one in fields(part) if one.name not in part._first + part._last]
     return {
-        one.name: (_reader_of_type(hints[one.name]), _KNOWN in get_args(marks[one.name]))
-        for one in fields(part)
+        name: (_reader_of_type(hints[name]), _KNOWN in get_args(marks[name]))
+        for name in (*part._first, *others, *part._last)
     }
 
 
@@ -343,7 +351,7 @@ class Withdrawn(Part):
 
 
 @dataclass(frozen=True)
-class Isolation(Part):
+class Isolation(Named):
     """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
 
     - `isolated`: True if a fault was named.
@@ -357,27 +365,15 @@ class Isolation(Part):
     """
 
     isolated: bool
-    fault: str | None
-    type: str | None
-    time_s: float | None
-    delay_s: float | None
-    correct: bool | None
-    estimate: float | None
-    candidates: tuple[str, ...]
-    type_correct: bool | None
-    type_delay_s: float | None
-    estimate_deg: float | None
-    estimate_interval: Span | None
-    frequency_rad_s: float | None
-    so_far: bool | None
-    premature: bool | None
     withdrawn: tuple[Withdrawn, ...]
     names: tuple[str, ...]
     probing_s: Span | None
     faults: tuple[Named, ...]
     _: KW_ONLY
-    estimate_at_s: Known[float] = None
     types_withdrawn: Known[tuple[Withdrawn, ...]] = None
+
+    _first = ("isolated", "fault", "type", "time_s", "delay_s", "correct", "estimate")
+    _last = ("estimate_at_s", "types_withdrawn")
 
 
 @dataclass(frozen=True)
@@ -509,27 +505,28 @@ class EnginePowerUse(Part):
 
 
 @dataclass(frozen=True)
-class ProfileDeviations(Part):
-    """Largest deviation from the commanded profile, by channel; None where it is not flown. Those of the
-    airspeed are of a mean over 10 s, the last excepted. limited: from the commanded airspeed as far as it can
-    be held."""
+class Deviations(Part):
+    """From the commanded profile, by channel; None where it is not flown."""
 
     altitude_m: float | None
     airspeed_mps: float | None
     heading_deg: float | None
     bank_deg: float | None
+
+
+@dataclass(frozen=True)
+class ProfileDeviations(Deviations):
+    """The largest. Those of the airspeed are of a mean over 10 s, the last excepted. limited: from the
+    commanded airspeed as far as it can be held."""
+
     airspeed_limited_mps: float | None
     airspeed_at_one_instant_mps: float | None
 
 
 @dataclass(frozen=True)
-class ArrivalDeviations(Part):
-    """The mean deviation at the end, with its sign; and whether the flight ends in the envelope."""
+class ArrivalDeviations(Deviations):
+    """The mean at the end, with its sign; and whether the flight ends in the envelope."""
 
-    altitude_m: float | None
-    airspeed_mps: float | None
-    heading_deg: float | None
-    bank_deg: float | None
     in_envelope: bool
 
 

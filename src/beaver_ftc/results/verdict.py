@@ -16,7 +16,6 @@ from beaver_ftc.results.model import (
     DeclaredFault,
     Detection,
     Fault,
-    Isolation,
     Metrics,
     Named,
     ProtectionLimit,
@@ -24,6 +23,8 @@ from beaver_ftc.results.model import (
     Withdrawn,
 )
 from beaver_ftc.scenario.declared import in_words, wider
+from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
+from beaver_ftc.scenario.sensors import QUANTITIES
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -84,24 +85,21 @@ def _further_fault_texts(metrics: Metrics) -> list[str]:
     """The further faults of several at once: named, or the remaining candidates."""
     isolation = metrics.isolation
     rest = isolation.faults[1:] if isolation.isolated else []
-    return [
-        _named_fault_text(fault, metrics) if fault.fault else _candidates_text(fault.candidates)
-        for fault in rest
-    ]
+    return [_found_text(fault, metrics, _candidates_text(fault.candidates)) for fault in rest]
 
 
 def _window_text(window: Window, metrics: Metrics) -> str:
     """What was found in one window, and when of it."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
-    found = [
-        _named_fault_text(one, metrics)
-        if one.fault
-        else _candidates_text(one.candidates)
-        if one.candidates
-        else "not isolated"
-        for one in window.isolation
-    ]
+    found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
     return f"{_seconds_text(window.from_s)} to {_seconds_text(window.to_s)}: {'; '.join([alarm, *found])}"
+
+
+def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
+    """A fault that is named, or its candidates."""
+    if found.fault:
+        return _named_fault_text(found, metrics)
+    return _candidates_text(found.candidates) if found.candidates else otherwise
 
 
 MAX_LISTED_CANDIDATES = 4  # places, or types: more are counted
@@ -250,22 +248,21 @@ def _outside_class_text(metrics: Metrics) -> str:
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:
-    """A fault, and from when on another one of `faults` masks it."""
+    """A fault, and from when on another one of `faults` masks it. Older documents say less of it."""
     if fault is None:
         return "none"
-    end_s = fault.end_s if isinstance(fault, DeclaredFault) else None
-    masked = _masked_text(fault, faults) if isinstance(fault, DeclaredFault) else ""
-    until = f" to {_seconds_text(end_s)}" if end_s else ""
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
-    what = f"{place} {fault.type.replace('_', ' ')}".strip()
+    what = f"{place} {_without_underscores(fault.type)}".strip()
+    at = f"at {_seconds_text(fault.at_s)}"
+    if not isinstance(fault, DeclaredFault):
+        return f"{what} {at}"
     size = ", ".join(_fault_size_texts(fault))
-    return f"{what}{' (' + size + ')' if size else ''} at {_seconds_text(fault.at_s)}{until}{masked}"
+    until = f" to {_seconds_text(fault.end_s)}" if fault.end_s else ""
+    return f"{what}{' (' + size + ')' if size else ''} {at}{until}{_masked_text(fault, faults)}"
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     """While which other faults a fault does not act."""
-    from beaver_ftc.scenario.faults import masking
-
     later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
     spells = [
         f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
@@ -273,6 +270,20 @@ def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
         for one in later
     ]
     return f", without effect {' and '.join(spells)}" if spells else ""
+
+
+def _fault_size_texts(fault: DeclaredFault) -> list[str]:
+    """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
+    if fault.sensor:
+        unit, words = (
+            QUANTITIES[fault.sensor].unit,
+            {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"},
+        )
+        return [
+            words[fault.type].format(size, unit) for key, size in fault.size.items() if key == "magnitude"
+        ]
+    words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
+    return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
 
 
 _DEVIATION_FORMAT_OF_CHANNEL = {
@@ -284,15 +295,12 @@ _DEVIATION_FORMAT_OF_CHANNEL = {
 
 def _profile_text(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
-    profile = metrics.profile
-    worst = {name: getattr(profile, name, None) for name in _DEVIATION_FORMAT_OF_CHANNEL}
-    at_once = value_text(profile.airspeed_at_one_instant_mps) if profile else ""
-    off = ", ".join(
-        _DEVIATION_FORMAT_OF_CHANNEL[name].format(value_text(by), at_once)
-        for name, by in worst.items()
-        if by is not None
-    )
-    return f"largest deviation: {off}" if off else ""
+    off = [
+        form.format(value_text(by), value_text(metrics.at("profile.airspeed_at_one_instant_mps")))
+        for name, form in _DEVIATION_FORMAT_OF_CHANNEL.items()
+        if (by := metrics.at(f"profile.{name}")) is not None
+    ]
+    return f"largest deviation: {', '.join(off)}" if off else ""
 
 
 _LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
@@ -305,34 +313,9 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
     return f"{what} from {_seconds_text(limit.time_s)}{until}: {limit.because}"
 
 
-def _fault_size_texts(fault: Fault) -> list[str]:
-    """The size of an injected fault, in words."""
-    if not isinstance(fault, DeclaredFault):
-        return []
-    if fault.sensor:
-        return _sensor_fault_size_texts(fault, fault.sensor)
-    from beaver_ftc.scenario.faults import TYPES
-
-    row = TYPES.get(fault.type)
-    in_words = row.in_words if row else {}
-    return [in_words[key](value) for key, value in fault.size.items() if key in in_words]
-
-
-def _sensor_fault_size_texts(fault: DeclaredFault, sensor: str) -> list[str]:
-    """The same of an instrument's fault, in the unit of the instrument."""
-    from beaver_ftc.scenario.sensors import QUANTITIES
-
-    size = fault.size.get("magnitude")
-    unit = QUANTITIES[sensor].unit
-    words = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
-    return [] if size is None else [words[fault.type].format(size, unit)]
-
-
-def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     """The true size at the instant of the estimate, where the fault named is one that was injected. The
     instant too, unless the size is the same at every one."""
-    from beaver_ftc.scenario.faults import TYPES, acting_at, size_at
-
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
         return ""
@@ -384,20 +367,12 @@ def _statistical_text(metrics: Metrics) -> str:
 
 def _isolation_text(metrics: Metrics) -> str:
     isolation = metrics.isolation
-    return "; ".join(
-        [
-            _isolated_or_candidates_text(isolation, metrics),
-            *_withdrawn_texts("named before", isolation.withdrawn),
-            *_withdrawn_texts("type named before", isolation.types_withdrawn or ()),
-        ]
-    )
-
-
-def _isolated_or_candidates_text(isolation: Isolation, metrics: Metrics) -> str:
-    if isolation.isolated:
-        return _named_fault_text(isolation, metrics)
-    left = isolation.candidates
-    return _candidates_text(left) if metrics.detection.detected and left else "none"
+    left = isolation.candidates if metrics.detection.detected else ()
+    found = _named_fault_text(isolation, metrics) if isolation.isolated else "none"
+    if left and not isolation.isolated:
+        found = _candidates_text(left)
+    gone = _withdrawn_texts("named before", isolation.withdrawn)
+    return "; ".join([found, *gone, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())])
 
 
 def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
@@ -416,7 +391,7 @@ def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
     return [f"{heading}: {'; '.join(said)}"] if said else []
 
 
-def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
     """One named fault. The only remaining candidate may still be excluded by later data."""
     left = " (only remaining candidate)" if isolation.so_far else ""
     when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
@@ -428,29 +403,25 @@ def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:
 
 
 def _probing_text(metrics: Metrics) -> str:
-    instants = metrics.isolation.probing_s
-    return (
-        f"flap and elevator moved from {_seconds_text(instants[0])} to {_seconds_text(instants[1])}"
-        if instants
-        else ""
-    )
+    began_s, ended_s = metrics.isolation.probing_s or (None, None)
+    if began_s is None:
+        return ""
+    return f"flap and elevator moved from {_seconds_text(began_s)} to {_seconds_text(ended_s)}"
 
 
-def _type_text(isolation: Isolation | Named) -> str:
+def _type_text(isolation: Named) -> str:
     """The type, or those still possible; nothing where the class knows no other."""
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
         return f", {_open_types_text(isolation.candidates) if isolation.candidates else 'of no known type'}"
-    return "" if isolation.type == "unanticipated" else f", {isolation.type.replace('_', ' ')}"
+    return "" if isolation.type == "unanticipated" else f", {_without_underscores(isolation.type)}"
 
 
-def _estimate_text(isolation: Isolation | Named) -> str:
+def _estimate_text(isolation: Named) -> str:
     if isolation.estimate is None:
         return ""
     if isolation.estimate_deg is None:
-        from beaver_ftc.scenario.faults import TYPES
-
         return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
     return f", estimated {value_text(isolation.estimate_deg)} deg"
 

@@ -79,3 +79,8 @@ def flown(**keys):
     """(flight, log) of `scenario(**keys)`."""
     memory = Memory()
     return fly(scenario(**keys), memory), memory
+
+
+def same_log(one, other):
+    """Whether two logs are the same to the bit."""
+    return list(one.columns) == list(other.columns) and np.array_equal(one, other, equal_nan=True)

@@ -171,7 +171,7 @@ class ScenarioFile(FlownFile):
     """One scenario."""
 
     def _read(self) -> tuple[str, list[str]]:
-        from beaver_ftc.results.metrics import expectation_names
+        from beaver_ftc.results.expectations import expectation_names
         from beaver_ftc.scenario.schema import load
 
         self.scenario = load(self.path)

@@ -41,43 +41,43 @@ def test_what_is_no_file(tmp_path, file, says):
     assert str(caught.value) == says
 
 
-@pytest.mark.parametrize(
-    ("mode", "sticky_base", "is_ours"),
-    [
-        (0o700, False, True),
-        (0o755, False, True),
-        (0o720, False, False),
-        (0o702, False, False),
-        (0o1777, True, True),
-    ],
-)
-def test_a_folder_that_others_can_write_is_refused_and_said_once(
-    tmp_path, monkeypatch, capsys, mode, sticky_base, is_ours
-):
-    monkeypatch.delenv(files._REFUSED, raising=False)
-    folder = tmp_path / "code"
+@pytest.fixture
+def base(tmp_path, monkeypatch):
+    """The folder that the user has chosen for compiled code."""
+    monkeypatch.delenv("BEAVER_FTC_REFUSED", raising=False)
+    (tmp_path / "base").mkdir(mode=0o700)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "base"))
+    return tmp_path / "base"
+
+
+@pytest.mark.parametrize(("mode", "is_ours"), [(0o700, True), (0o755, True), (0o720, False), (0o702, False)])
+def test_a_folder_that_others_can_write_is_refused_and_said_once(base, capsys, mode, is_ours):
+    folder = base / "code"
     folder.mkdir()
     folder.chmod(mode)
     for _ in range(2):
-        assert files._is_ours(folder, base=sticky_base) is is_ours
+        assert (files.cache_of_version("code") == folder) is is_ours
     lines = capsys.readouterr().err.splitlines()
     assert lines == ([] if is_ours else [
         f"beaver-ftc: no compiled code is run from {folder}: its mode is 0{mode:o}, allowed: a folder of "
         "your own that neither group nor others can write (chmod go-w)"
     ])  # fmt: skip
-    assert (str(folder) in os.environ.get(files._REFUSED, "")) is not is_ours
+    assert (str(folder) in os.environ.get("BEAVER_FTC_REFUSED", "")) is not is_ours
 
 
-def test_links_are_followed_to_a_base_alone(tmp_path, monkeypatch):
-    monkeypatch.delenv(files._REFUSED, raising=False)
-    (tmp_path / "true").mkdir(mode=0o700)
-    (tmp_path / "link").symlink_to(tmp_path / "true")
-    assert files._is_ours(tmp_path / "link", base=True)
-    assert not files._is_ours(tmp_path / "link")
+def test_links_are_followed_to_a_base_alone(base, tmp_path, monkeypatch):
+    assert files.cache_of_version("new") == base / "new"
+    assert (base / "new").stat().st_mode & 0o777 == 0o700
+    (base / "link").symlink_to(base / "new")
+    assert files.cache_of_version("link") != base / "link"
+    base.chmod(0o1777)
+    assert files.cache_base() == base
+    (tmp_path / "link").symlink_to(base)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "link"))
+    assert files.cache_base() == tmp_path / "link"
     (tmp_path / "file").write_text("")
-    assert not files._is_ours(tmp_path / "file" / "below")
-    assert files._is_ours(tmp_path / "made" / "anew")
-    assert (tmp_path / "made" / "anew").stat().st_mode & 0o777 == 0o700
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
+    assert files.cache_base() != tmp_path / "file" / "below"
 
 
 @pytest.mark.parametrize(

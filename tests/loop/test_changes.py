@@ -1,17 +1,12 @@
 """Law, diagnosis and sensors changed in flight: when asked for, without a bump, and again to the bit."""
 
-import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from flying import loss, scenario
+from flying import loss, same_log, scenario
 
 LAWS = ("nominal", "adaptive", "fault-tolerant-published", "oracle", "indi")
 SCHEMES = ("none", "augmented-ekf", "adaptive-estimators")
-
-
-def same_log(one, other):
-    return list(one.columns) == list(other.columns) and np.array_equal(one, other, equal_nan=True)
 
 
 def flown(*changes, seconds=6.0, **more):

@@ -26,63 +26,59 @@ def deflections(*faults, **keys):
     return log, (t > faults[0]["at_s"] - 1e-9) & (t < faults[0]["end_s"] - 1e-9)
 
 
+def grown(t):
+    return 1 - np.exp(-2 * np.maximum(t, 0))
+
+
+# Type, its keys, and what the aerodynamics see of a command u, t seconds after the fault, within (low, high).
+ACTS = [
+    ("loss_of_effectiveness", {"magnitude": 0.3}, lambda u, t, *_: 0.7 * u),
+    ("loss_of_effectiveness", {"magnitude": 0.5, "profile": "incipient", "kappa_per_s": 2},
+     lambda u, t, *_: u * (1 - 0.5 * grown(t))),
+    ("stuck", {"position_deg": 3}, lambda u, t, *_: np.full_like(u, np.deg2rad(3))),
+    ("float", {}, lambda u, t, *_: np.zeros_like(u)),
+    ("bias", {"bias_deg": 2}, lambda u, t, low, high: np.clip(u + np.deg2rad(2), low, high)),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("surface", SURFACES)
-class TestOneFault:
-    def check(self, surface, kind, expected, tolerance=1e-9, **more):
-        """expected(command, time since the fault) while it is there; the command itself before and after."""
-        log, inside = deflections(fault(surface, kind, **more))
-        command, effective = log[f"{surface}_cmd_rad"], log[f"{surface}_effective_rad"]
-        since = log["t_s"] - 1.0
-        assert effective[inside] == pytest.approx(expected(command, since)[inside], abs=tolerance)
-        assert effective[~inside] == pytest.approx(command[~inside], abs=1e-12)
+@pytest.mark.parametrize(("kind", "keys", "expected"), ACTS)
+def test_it_acts_while_it_is_there_alone(surface, kind, keys, expected):
+    log, inside = deflections(fault(surface, kind, **keys))
+    command, effective = log[f"{surface}_cmd_rad"], log[f"{surface}_effective_rad"]
+    acts = expected(command, log["t_s"] - 1.0, *SURFACES[surface])
+    assert effective[inside] == pytest.approx(acts[inside], abs=1e-9)
+    assert effective[~inside] == pytest.approx(command[~inside], abs=1e-12)
 
-    def test_loss(self, surface):
-        self.check(surface, "loss_of_effectiveness", lambda u, t: 0.7 * u, magnitude=0.3)
 
-    def test_incipient_loss(self, surface):
-        def expected(u, t):
-            return u * (1 - 0.5 * (1 - np.exp(-2 * np.maximum(t, 0))))
+@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_a_hardover_runs_to_its_stop(surface, direction):
+    log, inside = deflections(fault(surface, "hardover", direction=direction))
+    effective = log[f"{surface}_effective_rad"][inside]
+    stop = SURFACES[surface][direction > 0]
+    moves = np.diff(effective) * direction * 100
+    running = np.abs(effective[1:] - stop) > 1e-9
+    assert moves[running] == pytest.approx(RUNAWAY_RAD_S, abs=1e-3)
+    assert (moves >= -1e-9).all()
+    if surface != "flap" or direction < 0:
+        assert effective[-1] == pytest.approx(stop)
 
-        more = {"magnitude": 0.5, "profile": "incipient", "kappa_per_s": 2}
-        self.check(surface, "loss_of_effectiveness", expected, **more)
 
-    def test_stuck(self, surface):
-        self.check(surface, "stuck", lambda u, t: np.full_like(u, np.deg2rad(3)), position_deg=3)
+@pytest.mark.parametrize("surface", SURFACES)
+def test_an_oscillation_swings_about_the_command(surface):
+    swinging = fault(surface, "oscillatory", end_s=2.4, amplitude_deg=2, frequency_rad_s=20)
+    log, inside = deflections(swinging)
+    swing = (log[f"{surface}_effective_rad"] - log[f"{surface}_cmd_rad"])[inside]
+    assert [swing.max(), -swing.min()] == pytest.approx([np.deg2rad(2)] * 2, rel=0.02)
+    assert np.sum(np.diff(np.sign(swing)) != 0) == pytest.approx(1.4 * 20 / np.pi, abs=1)
 
-    def test_float(self, surface):
-        self.check(surface, "float", lambda u, t: np.zeros_like(u))
 
-    @pytest.mark.parametrize("direction", [-1, 1])
-    def test_hardover(self, surface, direction):
-        low, high = SURFACES[surface]
-        log, inside = deflections(fault(surface, "hardover", direction=direction))
-        effective = log[f"{surface}_effective_rad"][inside]
-        stop = high if direction > 0 else low
-        moves = np.diff(effective) * direction * 100
-        running = np.abs(effective[1:] - stop) > 1e-9
-        assert moves[running] == pytest.approx(RUNAWAY_RAD_S, abs=1e-3)
-        assert (moves >= -1e-9).all()
-        if surface != "flap" or direction < 0:
-            assert effective[-1] == pytest.approx(stop)
-
-    def test_bias(self, surface):
-        low, high = SURFACES[surface]
-        self.check(surface, "bias", lambda u, t: np.clip(u + np.deg2rad(2), low, high), bias_deg=2)
-
-    def test_oscillation(self, surface):
-        log, inside = deflections(
-            fault(surface, "oscillatory", end_s=2.4, amplitude_deg=2, frequency_rad_s=20)
-        )
-        swing = (log[f"{surface}_effective_rad"] - log[f"{surface}_cmd_rad"])[inside]
-        assert swing.max() == pytest.approx(np.deg2rad(2), rel=0.02)
-        assert swing.min() == pytest.approx(-np.deg2rad(2), rel=0.02)
-        flips = np.sum(np.diff(np.sign(swing)) != 0)
-        assert flips == pytest.approx(1.4 * 20 / np.pi, abs=1)
-
-    def test_rate_limit(self, surface):
-        log, inside = deflections(fault(surface, "rate_limit", scale=0.01))
-        moves = np.abs(np.diff(log[f"{surface}_effective_rad"][inside])) * 100
-        assert moves.max() <= 0.01 * RUNAWAY_RAD_S + 1e-6
+@pytest.mark.parametrize("surface", SURFACES)
+def test_a_rate_limit_is_kept(surface):
+    log, inside = deflections(fault(surface, "rate_limit", scale=0.01))
+    moves = np.abs(np.diff(log[f"{surface}_effective_rad"][inside])) * 100
+    assert moves.max() <= 0.01 * RUNAWAY_RAD_S + 1e-6
 
 
 def test_faults_on_several_surfaces_and_several_on_one_overlap():

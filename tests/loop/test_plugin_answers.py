@@ -3,108 +3,85 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import Verdict
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.schema import Scenario
+import beaver_ftc as bf
+from beaver_ftc import SimulationFailed, Verdict
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
 
 
 class Answers:
-    """A detector or a law that answers what it was given, and keeps what it was asked."""
+    """A detector or a law that answers what it was given; from an instant on it fails."""
 
-    def __init__(self, answer=None, error=None):
-        self.answer, self.error, self.contexts, self.asked = answer, error, [], []
+    def __init__(self, answer, fails_at_s=np.inf):
+        self.answer, self.fails_at_s = answer, fails_at_s
 
     def reset(self, context):
-        self.contexts.append(context)
+        pass
 
-    def step(self, *asked):
-        self.asked.append(asked)
-        if self.error is not None:
-            raise self.error
+    def step(self, measured, *more):
+        if measured.t_s > self.fails_at_s:
+            raise LookupError("no more")
         return self.answer
 
 
-def _scenario(**keys):
-    return Scenario.model_validate({"name": "x", "duration_s": 1, **keys})
+def flown(detector=None, law=None):
+    keys = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "lqr" if law else "fault-tolerant"}}
+    return bf.fly({"name": "x", "duration_s": 0.2, **keys}, detector=detector, law=law)
 
 
-@pytest.fixture(scope="module")
-def frame():
-    """A frame with a detector and a law, of a flight that has a scheme and a law of those names."""
-    keys = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "nominal", "options": {}}}
-    loop = Loop(_scenario(**keys), Answers(Verdict()), Answers(np.zeros(4)))
-    return loop.plugin_frame, loop.frames[0]["fdi"]["plugin_verdict"]
+NAMES = "allowed: None, unanticipated, aileron, elevator, rudder, flap"
+REFUSED = [
+    (True, "step returned bool, allowed: a Verdict"),
+    (Verdict(axis="yaw"), "verdict.axis is 'yaw', allowed: p, q, r or None"),
+    (Verdict(isolated="nose"), f"verdict.isolated is 'nose', {NAMES}"),
+    (Verdict(detected=np.nan), "verdict.detected is nan, allowed: True or False"),
+    (Verdict(isolated=["flap"]), f"verdict.isolated is ['flap'], {NAMES}"),
+    (Verdict(type=3), "verdict.type is 3, allowed: a str or None"),
+    (Verdict(statistic=1j), "verdict.statistic is 1j, allowed: a number"),
+    (Verdict(candidates=(1,)), "verdict.candidates is (1,), allowed: a tuple of str"),
+    (Verdict(effectiveness=[1, 1, 1, 1j]), "verdict.effectiveness has type list, allowed: 4 numbers"),
+    (Verdict(estimate=float("inf")), "verdict.estimate is inf, allowed: a finite number"),
+    (Verdict(effectiveness=[1, 2, 3]), "verdict.effectiveness has shape (3,), allowed: 4 numbers"),
+    (Verdict(effectiveness=[1, 2, 3, np.nan]),
+     "verdict.effectiveness is not finite: [1.0, 2.0, 3.0, nan]"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("answer", "says"),
-    [
-        (True, "step returned bool, allowed: a Verdict"),
-        (Verdict(axis="yaw"), "verdict.axis is 'yaw', allowed: p, q, r or None"),
-        (Verdict(isolated="nose"), "verdict.isolated is 'nose', allowed: None, unanticipated, aileron, "
-                                   "elevator, rudder, flap"),
-        (Verdict(detected=np.nan), "verdict.detected is nan, allowed: True or False"),
-        (Verdict(isolated=["flap"]), "verdict.isolated is ['flap'], allowed: None, unanticipated, aileron, "
-                                     "elevator, rudder, flap"),
-        (Verdict(type=3), "verdict.type is 3, allowed: a str or None"),
-        (Verdict(statistic=1j), "verdict.statistic is 1j, allowed: a number"),
-        (Verdict(candidates=(1,)), "verdict.candidates is (1,), allowed: a tuple of str"),
-        (Verdict(effectiveness=[1, 1, 1, 1j]), "verdict.effectiveness has type list, allowed: 4 numbers"),
-        (Verdict(estimate=float("inf")), "verdict.estimate is inf, allowed: a finite number"),
-        (Verdict(effectiveness=[1, 2, 3]), "verdict.effectiveness has shape (3,), allowed: 4 numbers"),
-        (Verdict(effectiveness=[1, 2, 3, np.nan]),
-         "verdict.effectiveness is not finite: [1.0, 2.0, 3.0, nan]"),
-    ],
-)  # fmt: skip
-def test_an_answer_that_is_no_verdict(frame, answer, says):
-    plugins, taken = frame
+@pytest.mark.parametrize(("answer", "says"), REFUSED)
+def test_an_answer_that_is_no_verdict(answer, says):
     with pytest.raises(SimulationFailed) as failed:
-        plugins._checked(answer, taken)
+        flown(Answers(answer))
     assert str(failed.value) == f"plug-in augmented-ekf at 0 s: {says}"
 
 
 @pytest.mark.parametrize(
-    ("verdict", "taken"),
+    "verdict",
     [
-        (Verdict(), (0, 0, NOT_ISOLATED, 0.0, 0)),
-        (Verdict(True, "q", "elevator", None, -0.5), (1, 1, 1, -0.5, 0)),
-        (Verdict(True, "r", "flap", None, 1), (1, 2, 3, 1.0, 0)),
-        (Verdict(1, "p", "unanticipated", None, np.float32(0.25)), (1, 0, UNANTICIPATED, 0.25, 0)),
-        (Verdict(effectiveness=(1, 0.5, 0.25, 0)), (0, 0, NOT_ISOLATED, 0.0, 1)),
+        Verdict(),
+        Verdict(True, "q", "elevator", None, -0.5),
+        Verdict(True, "r", "flap", None, 1),
+        Verdict(1, "p", "unanticipated", None, np.float32(0.25)),
     ],
 )
-def test_what_is_taken_of_a_verdict(frame, verdict, taken):
-    plugins, record = frame
-    record["effectiveness"] = 7.0
-    assert plugins._checked(verdict, record) is verdict
-    found = tuple(
-        record[name].item() for name in ("detected", "axis", "isolated", "theta", "has_effectiveness")
-    )
-    assert found == taken
-    expected = verdict.effectiveness if taken[-1] else [7.0] * 4
-    assert record["effectiveness"].tolist() == list(expected)
+def test_what_is_taken_of_a_verdict(verdict):
+    found = flown(Answers(verdict))
+    assert (found.detection.detected, found.detection.axis) == (bool(verdict.detected), verdict.axis)
+    assert (found.isolation.fault, found.isolation.estimate) == (verdict.isolated, verdict.estimate)
 
 
-class Late(Answers):
-    """Fails from 0.05 s on."""
-
-    def step(self, measured, *more):
-        if measured.t_s > 0.045:
-            raise LookupError("no more")
-        return self.answer
+def test_the_law_is_given_the_effectiveness_that_a_detector_answers():
+    log = flown(Answers(Verdict(True, "q", "elevator", effectiveness=(1, 0.5, 0.25, 0)))).log
+    assert [log[f"{s}_effectiveness_estimate"].iloc[-1] for s in SURFACES] == [1.0, 0.5, 0.25, 0.0]
 
 
 @pytest.mark.parametrize(
     ("detector", "law", "blamed"),
     [
-        (Late(Verdict()), Answers(np.zeros(4)), "augmented-ekf"),
-        (Answers(Verdict()), Late(np.zeros(4)), "lqr"),
+        (Answers(Verdict(), 0.045), Answers(np.zeros(4)), "augmented-ekf"),
+        (Answers(Verdict()), Answers(np.zeros(4), 0.045), "lqr"),
     ],
 )
 def test_who_fails_in_flight_is_blamed_and_when(detector, law, blamed):
-    loop = Loop(_scenario(fdi={"scheme": "augmented-ekf"}, control={"law": "lqr"}), detector, law)
     with pytest.raises(SimulationFailed) as failed:
-        loop.fly_chunk(0, 20)
+        flown(detector, law)
     assert str(failed.value) == f"plug-in {blamed} at 0.05 s: step raised LookupError: no more"

@@ -5,7 +5,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop import loop, simulation
-from flying import loss, scenario
+from flying import loss, same_log, scenario
 
 SECOND = {"duration_s": 1.0, "faults": [loss(at_s=0.305)]}
 # Frames of each step, the stick's pitch rate meanwhile (rad/s), and what is done after it.
@@ -37,8 +37,9 @@ def small(monkeypatch):
     monkeypatch.setattr(loop, "CHUNK_ROWS", 16)
 
 
-def test_steps_across_chunks(small, monkeypatch):
-    """The same with chunks of 16 rows and of 8192; each step's rows are those of the log; the stick adds."""
+def test_steps_across_chunks(small, monkeypatch, tmp_path):
+    """The same with chunks of 16 rows and of 8192, and flown again, from its file too; each step's rows are
+    those of the log; the stick adds."""
     sim = bf.Simulation(scenario(**SECOND))
     pieces = _flown(sim)
     assert sim.done
@@ -53,9 +54,12 @@ def test_steps_across_chunks(small, monkeypatch):
     found = log["q_reference_rad_s"] - plain["q_reference_rad_s"]
     assert found.to_numpy() == pytest.approx(added, abs=1e-15)
     again = bf.fly(sim.scenario_flown())
-    assert np.array_equal(again.log, log, equal_nan=True)
+    assert same_log(again.log, log)
+    assert again.metrics == sim.land().metrics
+    folder = sim.save(tmp_path, report=False)
+    assert same_log(bf.fly(folder / "scenario.yaml").log, bf.open_run(folder).log)
     monkeypatch.undo()
     other = bf.Simulation(scenario(**SECOND))
     _flown(other)
-    assert np.array_equal(other.log, log, equal_nan=True)
+    assert same_log(other.log, log)
     assert other.land().metrics == sim.land().metrics

@@ -2,10 +2,6 @@
 
 import subprocess
 import sys
-import threading
-
-import beaver_ftc as bf
-from beaver_ftc.loop.loop import ONE_FLIES
 
 # Threads come first, so that they load aircraft themselves; they end, and what one thread gets follows.
 SCRIPT = """
@@ -74,23 +70,3 @@ def test_a_thread_may_end_after_another_has_loaded_an_aircraft():
     )
     shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert shown.returncode == 0, shown.stderr
-
-
-def test_nothing_else_flies_while_a_simulation_is_made_ready():
-    free = []
-
-    def look():
-        free.append(ONE_FLIES.acquire(blocking=False))
-        if free[-1]:
-            ONE_FLIES.release()
-
-    def look_from_outside():
-        other = threading.Thread(target=look)
-        other.start()
-        other.join()
-
-    simulation = object.__new__(bf.Simulation)
-    simulation._set_up = look_from_outside
-    simulation._make_ready()
-    look_from_outside()
-    assert free == [False, True]

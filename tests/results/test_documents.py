@@ -1,10 +1,9 @@
 """All that is written of flights made by hand: metrics, recordings, the data of a report, JUnit, words."""
 
 import math
-from types import SimpleNamespace
 
 import pytest
-from synthetic import Expect, Fault, Flight, Scenario
+from synthetic import LOSS, landed, scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import verdict
@@ -14,24 +13,20 @@ from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Expectation, Judged, Metrics
 
-SENSOR = SimpleNamespace(
-    sensor="q", type="bias", at_s=5.0, end_s=None, profile="abrupt",
-    model_dump=lambda exclude, exclude_none: {"magnitude": 3.0},
-)  # fmt: skip
-EXPECT = Expect(
-    detected_within_s=0.1, isolated_as="elevator", no_departure=True,
-    arrives={"altitude_m": 5.0, "in_envelope": True}, post_fault_rms_deg_s={"q": 0.5},
-)  # fmt: skip
+SENSOR = {"sensor": "q", "type": "bias", "magnitude": 3.0, "at_s": 5.0}
+JAM = {"type": "stuck", "actuator": "flap", "at_s": 20.0, "end_s": 25.0}
+EXPECT = {
+    "detected_within_s": 0.1, "isolated_as": "elevator", "no_departure": True,
+    "arrives": {"altitude_m": 5.0, "in_envelope": True}, "post_fault_rms_deg_s": {"q": 0.5},
+}  # fmt: skip
 FLIGHTS = {
-    "quiet": Flight(
-        scenario=Scenario(faults=()), detection_time_s=None, detection_axis=None, guaranteed_delay_s=None,
+    "quiet": landed(
+        scenario(), detection_time_s=None, detection_axis=None, guaranteed_delay_s=None,
         isolation_time_s=None, isolated=None, isolation_type=None, candidates=(), estimate=None,
         post_fault_rms_rad_s=None, supervisor=[(0.0, "nominal")], mode_changes=1, end=(45.5, 1830.0),
     ),
-    "eventful": Flight(
-        scenario=Scenario(
-            faults=(Fault(), Fault(at_s=20.0, actuator="flap", type="stuck", end_s=25.0)), expect=EXPECT
-        ),
+    "eventful": landed(
+        scenario(LOSS, JAM, expect=EXPECT),
         mode_changes=9, exits=4, outside_s=2.25, envelope_exits=[(13.0, 14.5), (20.0, 30.0)],
         outside_at_end=True,
         end=(39.0, 1500.0), isolation_type="stuck", estimate=0.1, estimate_interval=(0.05, math.nan),
@@ -65,8 +60,8 @@ FLIGHTS = {
         }),
         supervisor=[(0.0, "nominal"), (12.07, "adaptive"), (14.0, "reallocated")],
     ),
-    "lost": Flight(
-        scenario=Scenario(faults=(SENSOR,), expect=EXPECT), frames=1450, departure=(14.5, "alpha_rad"),
+    "lost": landed(
+        scenario(SENSOR, expect=EXPECT), frames=1450, departure=(14.5, "alpha_rad"),
         detection_axis=None, isolated="sensor q", isolation_type=None, estimate=None, candidates=(),
         detection_time_s=5.5, isolation_time_s=5.75, arrival={"altitude_m": 1.0},
     ),

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.results.figures import draw, pictures_of
-from beaver_ftc.results.log import column_names, read
+from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.style import LOOKS, marks
-from beaver_ftc.results.views import read_series, views
+from beaver_ftc.results.views import series_of, views
 
 EVERY = {
     "candidates", "tracking", "surfaces", "detection", "isolation", "ratio", "effectiveness", "supervisor",
@@ -23,8 +23,10 @@ def test_every_view_becomes_a_picture_with_its_closeups(log_path, found, tmp_pat
 @pytest.fixture
 def panels(log_path, found):
     """The axes of a view, drawn."""
-    known = {view.name: view for view in views(column_names(log_path))}
-    return lambda name: draw(known[name], read_series(log_path, known[name].columns), marks(found), "x").axes
+    known = {view.name: view for view in views(StoredLog(log_path).columns)}
+    return lambda name: (
+        draw(known[name], series_of(StoredLog(log_path), known[name].columns), marks(found), "x").axes
+    )
 
 
 @pytest.mark.parametrize("name", ["tracking", "surfaces", "detection"])
@@ -35,7 +37,10 @@ def test_instants_are_marked_in_every_panel(panels, found, name):
 
 
 def test_degrees_are_shown_and_said_and_a_threshold_on_both_sides(panels, log_path):
-    log = {name: np.degrees(of) for name, of in read(log_path, ["q_rad_s", "q_threshold_rad_s"]).items()}
+    log = {
+        name: np.degrees(of)
+        for name, of in StoredLog(log_path).read(["q_rad_s", "q_threshold_rad_s"]).items()
+    }
     pitch, detection = panels("tracking")[1], panels("detection")[1]
     assert "deg/s" in pitch.get_title()
     drawn = next(line for line in pitch.lines if line.get_label() == "aircraft")
@@ -46,7 +51,7 @@ def test_degrees_are_shown_and_said_and_a_threshold_on_both_sides(panels, log_pa
 
 
 def test_no_two_curves_of_one_figure_look_the_same(log_path):
-    for view in views(column_names(log_path)):
+    for view in views(StoredLog(log_path).columns):
         if view.n_panel_columns > 1:
             continue
         looks = {}

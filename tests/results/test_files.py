@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from synthetic import Flight
+from synthetic import landed
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
@@ -71,7 +71,7 @@ def own(tmp_path_factory):
 
 def test_an_own_aircraft_is_kept_with_its_flight(own, tmp_path):
     for _ in range(2):  # also where it lies already
-        writer.write_documents(tmp_path, own, metrics(Flight()))
+        writer.write_documents(tmp_path, own, metrics(landed()))
     files = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
     model = {
         str(path.relative_to(own.airframe.folder.parent))
@@ -98,7 +98,7 @@ def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
     assert document["frames"] == 20
     assert [document for _, document in drawn] == [document]
     written = np.genfromtxt(tmp_path / "short" / "flight.csv", delimiter=",", names=True)
-    flap = log.read(tmp_path / "short" / "log.parquet", ["flap_cmd_rad"])["flap_cmd_rad"]
+    flap = log.StoredLog(tmp_path / "short" / "log.parquet").read(["flap_cmd_rad"])["flap_cmd_rad"]
     stops = flown.airframe.travel["flap"]
     assert stops.max_rad > abs(stops.min_rad)
     assert written["flap_command"] == pytest.approx(flap / stops.max_rad)

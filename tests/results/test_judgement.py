@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.results.metrics import DeclaredFault
+from beaver_ftc.results.model import DeclaredFault
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.log import ParquetLog, read, row_count
+from beaver_ftc.results.log import ParquetLog, StoredLog
 
 COLUMNS = ("t_s", "q_rad_s", "residual_rad_s")
 
@@ -35,7 +35,7 @@ def test_reads_back_bit_for_bit_however_it_is_cut(tmp_path, chunk, rows_per_grou
 def test_flight_of_no_rows_is_a_readable_log(tmp_path):
     path = tmp_path / "log.parquet"
     _write(path, np.zeros((0, 3)), 1, 8)
-    assert read(path)["q_rad_s"].size == 0
+    assert StoredLog(path).read()["q_rad_s"].size == 0
 
 
 def test_log_that_failed_is_not_mistaken_for_a_whole_one(tmp_path):
@@ -44,7 +44,7 @@ def test_log_that_failed_is_not_mistaken_for_a_whole_one(tmp_path):
         log.open(COLUMNS)
         log.write(np.ones((12, 3)))
         raise RuntimeError
-    assert row_count(path) == 8
+    assert StoredLog(path).row_count() == 8
 
 
 @pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
@@ -52,7 +52,7 @@ def test_a_row_group_of_a_million_rows_at_most_is_read(tmp_path, rows, allowed):
     table = pa.table({"t_s": pa.array(np.zeros(rows))})
     parquet.write_table(table, tmp_path / "log.parquet", row_group_size=rows)
     if allowed:
-        assert row_count(tmp_path / "log.parquet") == rows
+        assert StoredLog(tmp_path / "log.parquet").row_count() == rows
         return
     with pytest.raises(BadInput, match=r"has 1,000,001 rows in a row group, allowed: up to 1,000,000"):
-        row_count(tmp_path / "log.parquet")
+        StoredLog(tmp_path / "log.parquet").row_count()

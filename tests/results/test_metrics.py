@@ -2,7 +2,7 @@ import json
 import math
 
 import pytest
-from synthetic import Flight, Scenario
+from synthetic import landed
 
 from beaver_ftc.results.metrics import as_json, metrics
 
@@ -15,12 +15,8 @@ KEYS = [
 ]  # fmt: skip
 
 
-def _of(scenario=None, **changes):
-    return metrics(Flight(scenario=scenario or Scenario(), **changes))
-
-
 def test_published_case_has_every_key_of_the_contract_in_order():
-    document = _of()
+    document = metrics(landed())
     assert list(document) == KEYS
     assert document["fault"] == {"actuator": "elevator", "type": "loss_of_effectiveness", "at_s": 12.0}
     assert document["detection"] == {
@@ -40,7 +36,7 @@ def test_published_case_has_every_key_of_the_contract_in_order():
 
 
 def test_what_is_not_finite_becomes_null_and_json_stays_json():
-    document = _of(estimate=math.nan, post_fault_rms_rad_s=(math.inf, 0.0, 0.0))
+    document = metrics(landed(estimate=math.nan, post_fault_rms_rad_s=(math.inf, 0.0, 0.0)))
     assert json.loads(as_json(document)) == document
     assert document["isolation"]["estimate"] is None
     assert document["tracking"]["post_fault_rms_deg_s"]["p"] is None

@@ -9,7 +9,7 @@ import pytest
 from browser import PROGRAM, Browser
 
 import beaver_ftc as bf
-from beaver_ftc.results.log import read
+from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.report import render, write_report
@@ -94,7 +94,7 @@ def test_pointing_reads_the_value_of_the_log_with_its_unit(page, folder):
     page.evaluate("beaverReport.setTime(10)")
     page.settle()
     said = page.evaluate("document.querySelector('#states output').value")
-    airspeed_mps = read(folder / "log.parquet", ["airspeed_mps"])["airspeed_mps"][1000]
+    airspeed_mps = StoredLog(folder / "log.parquet").read(["airspeed_mps"])["airspeed_mps"][1000]
     assert said == f"{airspeed_mps:.2f} m/s"
 
 

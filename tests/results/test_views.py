@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from synthetic import COLUMNS, Fault, Flight, Scenario
+from synthetic import LOSS, landed, scenario
 
 from beaver_ftc.results.figures import draw
+from beaver_ftc.results.log import Log
 from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.results.style import closeup_window, marks
 from beaver_ftc.results.views import (
     Panel,
@@ -24,7 +26,7 @@ MORE = (
         ("altitude", "_m"), ("airspeed", "_mps"), ("heading", "_rad"), ("bank", "_rad"))),
     "airspeed_limited_mps", "manifold_pressure_inhg",
 )  # fmt: skip
-EVERY = COLUMNS + MORE
+EVERY = Simulation({"name": "x", "duration_s": 1}).columns + MORE
 ALL = {view.name: view for view in views(EVERY, power=True)}
 
 
@@ -53,7 +55,7 @@ def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it
         means.append(asked + mean)
     whole = {"t_s": dt * np.arange(n), "airspeed_mps": flown, "airspeed_command_mps": command}
 
-    class Chunks(dict):
+    class Chunks(dict, Log):
         def row_count(self):
             return n
 
@@ -62,7 +64,7 @@ def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it
                 rows = slice(start, {0: 250, 250: 600, 600: n}[start])
                 yield {name: self[name][rows] for name in {*names, "t_s"}}
 
-    drawn = series_of(Chunks(whole), ["airspeed_mean_mps"], (-np.inf, np.inf))
+    drawn = series_of(Chunks(whole), ["airspeed_mean_mps"])
     np.testing.assert_allclose(drawn["airspeed_mean_mps"], means, rtol=1e-12)
     (panel,) = [p for p in views(EVERY, within_mps=3.5)[1].panels if p.label == "airspeed"]
     assert [t.offset for t in panel.traces if t.role == "bound"] == [3.5, -3.5]
@@ -83,12 +85,11 @@ def test_a_ratio_that_is_never_positive_is_drawn_without_a_warning(ratio, recwar
 
 
 def test_a_window_without_a_fault():
-    lost = marks(measure(Flight(
-        scenario=Scenario(faults=(Fault(at_s=25.0),)), detection_time_s=None, isolation_time_s=None,
-        departure=(14.5, "alpha_rad"),
-    )))  # fmt: skip
+    late_fault = scenario(LOSS | {"at_s": 25.0})
+    unseen = {"detection_time_s": None, "isolation_time_s": None}
+    lost = marks(measure(landed(late_fault, **unseen, departure=(14.5, "alpha_rad"))))
     assert [mark.name for mark in lost] == ["departure"]
     assert closeup_window(lost) == (14.0, 16.5)
-    late = marks(measure(Flight(detection_time_s=12.25, isolation_time_s=22.5, departure=(29.0, "beta"))))
+    late = marks(measure(landed(detection_time_s=12.25, isolation_time_s=22.5, departure=(29.0, "beta"))))
     assert closeup_window(late) == (11.5, 24.0)  # ten seconds of events are enough to look at closely
     assert closeup_window([one for one in late if one.name != "isolation"]) == (11.5, 14.25)

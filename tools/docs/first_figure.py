@@ -37,15 +37,16 @@ def write_figure(path: Path) -> Path:
     from tempfile import TemporaryDirectory
 
     from beaver_ftc.results.figures import draw
+    from beaver_ftc.results.log import StoredLog
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.style import marks
-    from beaver_ftc.results.views import read_series
+    from beaver_ftc.results.views import series_of
     from beaver_ftc.results.writer import run
     from beaver_ftc.scenario.schema import load_scenario
 
     with TemporaryDirectory() as folder:
         metrics = Metrics.of(run(load_scenario("elevator-partial-loss"), Path(folder), report=False))
-        series = read_series(Path(folder, metrics.scenario, "log.parquet"), VIEW.columns, SPAN_S)
+        series = series_of(StoredLog(Path(folder, metrics.scenario, "log.parquet")), VIEW.columns, SPAN_S)
     said = "detected, isolated, and pitch handed over to the flap"
     draw(VIEW, series, marks(metrics), said).savefig(path, metadata={"Software": "beaver-ftc"})
     return path

@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import beaver_ftc as bf
-from beaver_ftc.results.metrics import DeclaredFault, Truth, is_late
+from beaver_ftc.results.metrics import Truth, is_late
+from beaver_ftc.results.model import DeclaredFault
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.schema import load_text
@@ -175,7 +176,7 @@ def _instrument(
     watched = scenario.fdi.monitors_sensors and _began_s(metrics) < fault.at_s
     if surfaces or len(sensors) > 1 or not watched:
         return
-    if named is not None and not DeclaredFault.of(fault).is_named_by(named):
+    if named is not None and not DeclaredFault.of_scenario(fault).is_named_by(named):
         yield f"wrong name: {named}, broken is sensor {fault.sensor}"
 
 
@@ -203,7 +204,7 @@ def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) ->
     if scenario.fdi.fault_profile == "abrupt" and len(faults) > 1:
         return
     kinds = _kinds(faults)
-    if named is not None and not DeclaredFault.of(faults[0]).is_named_by(named):
+    if named is not None and not DeclaredFault.of_scenario(faults[0]).is_named_by(named):
         yield f"{'excluded' if named == UNANTICIPATED else 'wrong name'}: {named}, broken is {surface}"
     elif named is None and scenario.fdi.pairs:
         yield from _left_of_pair(isolation, {surface: kinds})

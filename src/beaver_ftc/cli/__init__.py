@@ -8,6 +8,7 @@ checked before the first one flies.
 
 import contextlib
 import errno
+import math
 import os
 import signal
 import sys
@@ -178,34 +179,18 @@ FIRST_S = 5.0  # before the first line of a log
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     """Yield what a run calls with how far it has come (0 to 1)."""
     with contextlib.ExitStack() as stack:
-        begin = (lambda: _bar(label, stack)) if sys.stderr.isatty() else (lambda: _lines(label))
-        patience_s = PATIENCE_S if sys.stderr.isatty() else FIRST_S
+        begin, patience_s = (_bar, PATIENCE_S) if sys.stderr.isatty() else (_lines, FIRST_S)
         started, advance = time.monotonic(), None
 
         def show(done: float) -> None:
             """Shows itself only once the run has taken longer than anyone waits without asking."""
             nonlocal advance
             if advance is None and time.monotonic() - started > patience_s:
-                advance = begin()
+                advance = begin(label, stack)
             if advance:
                 advance(done)
 
         yield show
-
-
-def _lines(label: str) -> Callable[[float], None]:
-    started, first, next_s = time.monotonic(), None, 0.0
-
-    def tell(done: float) -> None:
-        nonlocal first, next_s
-        first, passed_s = done if first is None else first, time.monotonic() - started
-        if passed_s >= next_s and done < 1.0:
-            next_s = passed_s + LOG_S
-            to_come = f", {_span((1.0 - done) / (done - first) * passed_s)} left" if done > first else ""
-            sys.stderr.write(f"{label}: {done:.0%}{to_come}\n")
-            sys.stderr.flush()
-
-    return tell
 
 
 def _bar(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
@@ -217,75 +202,71 @@ def _bar(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
     return lambda done: progress.update(task, completed=done)
 
 
-@contextlib.contextmanager
-def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
-    """Yield what a sweep calls with its counts (campaign.run_sweep)."""
-    progress = _Progress(name, sys.stderr.isatty())
-    try:
-        yield progress
-    finally:
-        progress.end()
+def _lines(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
+    tell, started, first = stack.enter_context(told(0.0, LOG_S)), time.monotonic(), None
+
+    def show(done: float) -> None:
+        nonlocal first
+        first, passed_s = done if first is None else first, time.monotonic() - started
+        to_come = f", {_span((1.0 - done) / (done - first) * passed_s)} left" if done > first else ""
+        if done < 1.0:
+            tell(f"{label}: {done:.0%}{to_come}")
+
+    return show
 
 
 @contextlib.contextmanager
-def told() -> Iterator[Callable[[str], None]]:
-    """Yield what a study calls with a line on how far it has come: shown on a terminal only."""
-    shown = sys.stderr.isatty()
+def told(terminal_s: float = 0.0, log_s: float = math.inf) -> Iterator[Callable[[str], None]]:
+    """Yield what a study calls with a line on how far it has come: one in place on a terminal, each on its
+    own in a log. terminal_s, log_s: least time between two lines; infinite: none."""
+    terminal = sys.stderr.isatty()
+    every_s, last_s = terminal_s if terminal else log_s, -math.inf
 
     def tell(line: str) -> None:
-        if shown:
-            sys.stderr.write(f"\r\033[K{line}")
-            sys.stderr.flush()
+        nonlocal last_s
+        if math.isfinite(every_s) and time.monotonic() - last_s >= every_s:
+            last_s = time.monotonic()
+            _write_error(f"\r\033[K{line}" if terminal else f"{line}\n")
 
     try:
         yield tell
     finally:
-        if shown:
-            sys.stderr.write("\r\033[K")
+        if terminal:
+            _write_error("\r\033[K")
 
 
-class _Progress:
-    def __init__(self, name: str, terminal: bool) -> None:
-        self._name, self._terminal = name, terminal
-        self._last = self._begun = time.monotonic()
-        self._first: int | None = None
-        self._shown = ""
+def _write_error(text: str) -> None:
+    sys.stderr.write(text)
+    sys.stderr.flush()
 
-    def __call__(self, counts: Counter[str]) -> None:
+
+@contextlib.contextmanager
+def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
+    """Yield what a sweep calls with its counts (campaign.run_sweep)."""
+    first, begun = None, 0.0
+
+    def show(counts: Counter[str]) -> None:
+        nonlocal first, begun
         now = time.monotonic()
-        if self._first is None:
-            self._first, self._begun = counts["done"], now
-        if now - self._last < (TERMINAL_S if self._terminal else LOG_S):
-            return
-        self._last = now
-        self._show(self.line(counts, now))
+        if first is None:
+            first, begun = counts["done"], now
+        elif now - begun >= (TERMINAL_S if sys.stderr.isatty() else LOG_S):
+            tell(_counted(name, counts, (counts["done"] - first) / (now - begun)))
 
-    def line(self, counts: Counter[str], now: float) -> str:
-        """Done, rate, time left, running detection rate."""
-        assert self._first is not None
-        done, total = counts["done"], counts["total"]
-        rate = (done - self._first) / max(now - self._begun, 1e-9)
-        to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
-        parts = [f"{self._name}: {done} of {total} flights, {_rate(rate)}/s{to_come}"]
-        if counts["faulted"]:
-            parts.append(f"detected {counts['detected'] / counts['faulted']:.1%}")
-        if counts["failed"]:
-            parts.append(f"{counts['failed']} not flown")
-        return ", ".join(parts)
+    with told(TERMINAL_S, LOG_S) as tell:
+        yield show
 
-    def _show(self, line: str) -> None:
-        if self._terminal:
-            sys.stderr.write("\r" + line.ljust(len(self._shown)))
-            self._shown = line
-        else:
-            sys.stderr.write(line + "\n")
-        sys.stderr.flush()
 
-    def end(self) -> None:
-        """Leave the terminal's line clean."""
-        if self._shown:
-            sys.stderr.write("\r" + " " * len(self._shown) + "\r")
-            sys.stderr.flush()
+def _counted(name: str, counts: Counter[str], rate: float) -> str:
+    """Done, rate, time left, running detection rate. rate: flights a second."""
+    done, total = counts["done"], counts["total"]
+    to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
+    parts = [f"{name}: {done} of {total} flights, {_rate(rate)}/s{to_come}"]
+    if counts["faulted"]:
+        parts.append(f"detected {counts['detected'] / counts['faulted']:.1%}")
+    if counts["failed"]:
+        parts.append(f"{counts['failed']} not flown")
+    return ", ".join(parts)
 
 
 def _rate(per_s: float) -> str:

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
+    from beaver_ftc.results.expectations import evaluate as evaluate_expectations
+    from beaver_ftc.results.expectations import margin as margin_of_expectation
     from beaver_ftc.results.flight import Flight, Proof
     from beaver_ftc.results.log import Columns, Log, MemoryLog, ParquetLog, SpooledLog, StoredLog
-    from beaver_ftc.results.metrics import DeclaredFault, Onset, as_json, faults_of, measure, versions
-    from beaver_ftc.results.metrics import evaluate as evaluate_expectations
-    from beaver_ftc.results.metrics import margin as margin_of_expectation
-    from beaver_ftc.results.model import Document, Expectation, Judged, Metrics, read_metrics
+    from beaver_ftc.results.metrics import Onset, as_json, faults_of, measure, versions
+    from beaver_ftc.results.model import DeclaredFault, Document, Expectation, Judged, Metrics, read_metrics
     from beaver_ftc.results.model import Link as LinkMetrics
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.results.style import SERIES as SERIES_COLOURS

@@ -8,15 +8,14 @@ and the commands to the surfaces as shares of travel. `vehicle.yaml` beside it n
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
 
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, cos, degrees, radians
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.results import log
@@ -37,10 +36,25 @@ ColumnsByTopic = dict[str, ValuesByColumn]
 """Fields of each message; every message has the stamps `t_s`."""
 
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
-_RATE_AXES, _ANGLE_OF_ARDUPILOT_FIELD = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
+# What each kind calls what it records, in its order: `topic.field`, or the column of a table. i: place from 0
+# on, n: from 1 on.
+_NAMES_OF_KIND = {
+    "table": {
+        "rates": "{name}_rad_s", "commands": "{name}_command", "attitude": "{name}_rad",
+        "airspeed": "airspeed_mps", "flow": "{name}",
+    },
+    "ulog": {
+        "rates": "vehicle_angular_velocity.xyz[{i}]", "commands": "actuator_servos.control[{i}]",
+        "airspeed": "airspeed.true_airspeed_m_s", "attitude": "attitude.{name}_rad", "flow": "flow.{name}",
+    },
+    "ardupilot": {
+        "rates": "IMU.Gyr{axis}", "commands": "SRFC.C{n}", "airspeed": "ARSP.Airspeed",
+        "attitude": "ATT.{title}", "flow": "FL{i}.V",
+    },
+}  # fmt: skip
+_COLUMN_OF_ANGLE = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
 _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
-_ANGLE_NAMES = ("roll", "pitch", "yaw")
 _FIRST_STAMP_US = 1_000_000
 """A clock on board does not start with the log."""
 
@@ -81,30 +95,26 @@ def _escape_acmi_text(text: str) -> str:
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])
+    source = log.StoredLog(log_path)
+    start_m = float(next(source.read_chunks(["altitude_m"]))["altitude_m"][0])
     columns: tuple[str, ...] = _ACMI_COLUMNS
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
     if full_rad is not None:
         columns += (f"{FLAP}_pos_rad",)
-    for row in _rows_at_acmi_rate(log_path, columns):
+    for row in _rows_at_acmi_rate(source, columns):
         place = _acmi_position(row, EARTH_RADIUS_M + start_m)
         yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
         while events and events[0].time_s <= row["t_s"] + 1e-9:
             yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
-def _rows_at_acmi_rate(log_path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
-    every, seen = _acmi_row_stride(log_path), 0
-    for chunk in log.read_chunks(log_path, columns):
+def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
+    every, seen = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9)), 0
+    for chunk in source.read_chunks(columns):
         rows = len(chunk["t_s"])
         for i in range(-seen % every, rows, every):
             yield {name: float(values[i]) for name, values in chunk.items()}
         seen += rows
-
-
-def _acmi_row_stride(log_path: Path) -> int:
-    first = next(log.read_chunks(log_path, ["t_s"]))["t_s"][:2]
-    return max(1, ceil(1.0 / (ACMI_RATE_HZ * float(np.diff(first)[0])) - 1e-9)) if len(first) == 2 else 1
 
 
 def _acmi_position(row: dict[str, float], radius_m: float) -> str:
@@ -128,67 +138,62 @@ def write_recording(
 
     travel_rad: the farther stop of each surface. signals: what the aircraft measures beside rates and flow.
     """
-    names = [*(f"{axis}_measured_rad_s" for axis in _RATE_AXES), "phi_rad", "theta_rad", "psi_rad"]
-    commands = [f"{surface}_cmd_rad" for surface in travel_rad]
-    further = [*_FLOW_COLUMNS, *signals]
-    chunks = list(log.read_chunks(log_path, ["t_s", *names, "airspeed_mps", *further, *commands]))
-    known = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
-    shares = {s: known[f"{s}_cmd_rad"] / travel for s, travel in travel_rad.items()}
-    write, named = _WRITER_AND_TOPICS_OF_KIND[kind]
-    topics = named(known, shares)
-    for topic, fields in _further_topics(known, further, kind).items():
-        topics[topic] = topics.get(topic, {}) | fields
-    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
-    write(folder / RECORDING_FILE_OF_KIND[kind], t_us, topics)
-    flow = _recorded_name_of_flow_column(further, kind)
-    felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
-    text = _vehicle_file_text(topics, travel_rad, kind) + f"signals: [{felt}]\n"
-    text += f"flow: {{{', '.join(f'{k}: {v}' for k, v in flow.items())}}}\n"
-    (folder / "vehicle.yaml").write_text(text, encoding="utf-8")
-
-
-def _further_topics(known: ValuesByColumn, names: Sequence[str], kind: str) -> ColumnsByTopic:
-    """What the aircraft's own model is given besides, in a message of its own each; in a table as columns."""
-    found = {name: known[name] for name in names}
-    if kind == "table":
-        return {"": found}
-    if kind == "ulog":
-        return {"flow": found}
-    return {f"FL{i}": {"V": values} for i, values in enumerate(found.values())}
-
-
-def _recorded_name_of_flow_column(names: Sequence[str], kind: str) -> dict[str, str]:
-    """For each column that `_further_topics` wrote, its name in the recording."""
-    forms = {"table": "{name}", "ulog": "flow.{name}", "ardupilot": "FL{i}.V"}
-    return {name: forms[kind].format(name=name, i=i) for i, name in enumerate(names)}
-
-
-def _table_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
-    rates = {f"{axis}_rad_s": known[f"{axis}_measured_rad_s"] for axis in _RATE_AXES}
-    commands = {f"{surface}_command": share for surface, share in shares.items()}
-    return {"": rates | commands | _attitude_columns(known) | {"airspeed_mps": known["airspeed_mps"]}}
-
-
-def _px4_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
-    rates = {f"xyz[{i}]": known[f"{axis}_measured_rad_s"] for i, axis in enumerate(_RATE_AXES)}
-    controls = {f"control[{i}]": share for i, share in enumerate(shares.values())}
-    return {
-        "vehicle_angular_velocity": rates,
-        "actuator_servos": controls,
-        "airspeed": {"true_airspeed_m_s": known["airspeed_mps"]},
-        "attitude": _attitude_columns(known),
+    source_of = {
+        "rates": {axis: f"{axis}_measured_rad_s" for axis in AXES},
+        "commands": {surface: f"{surface}_cmd_rad" for surface in travel_rad},
+        "attitude": _COLUMN_OF_ANGLE,
+        "airspeed": {"airspeed": "airspeed_mps"},
+        "flow": {name: name for name in (*_FLOW_COLUMNS, *signals)},
     }
+    wanted = ["t_s", *(column for part in source_of.values() for column in part.values())]
+    known = log.StoredLog(log_path).read(list(dict.fromkeys(wanted)))
+    named = {
+        part: {
+            name: pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
+            for i, name in enumerate(source_of[part])
+        }
+        for part, pattern in _NAMES_OF_KIND[kind].items()
+    }
+    topics: ColumnsByTopic = {}
+    for part, names in named.items():
+        for name, recorded in names.items():
+            values = known[source_of[part][name]]
+            if part == "commands":
+                values = values / travel_rad[name]
+            elif part == "attitude" and kind == "ardupilot":
+                values = np.rad2deg(values)
+            topic, _, field = recorded.rpartition(".")
+            topics.setdefault(topic, {})[field] = values
+    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
+    _WRITER_OF_KIND[kind](folder / RECORDING_FILE_OF_KIND[kind], t_us, topics)
+    (folder / "vehicle.yaml").write_text(_vehicle_file_text(named, travel_rad, kind), encoding="utf-8")
 
 
-def _ardupilot_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
-    gyros = {f"Gyr{x}": known[f"{axis}_measured_rad_s"] for x, axis in zip("XYZ", _RATE_AXES, strict=True)}
-    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ANGLE_OF_ARDUPILOT_FIELD.items()}
-    controls = {f"C{i + 1}": share for i, share in enumerate(shares.values())}
-    return {"IMU": gyros, "SRFC": controls, "ARSP": {"Airspeed": known["airspeed_mps"]}, "ATT": attitude}
+def _vehicle_file_text(named: dict[str, dict[str, str]], travel_rad: dict[str, float], kind: str) -> str:
+    """The vehicle file: which column is what."""
+    angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
+    commands, flow = named["commands"], named["flow"]
+    felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
+    lines = [
+        "# Written with the log beside it: which column is what. Commands are shares of travel.",
+        f"name: {kind}-of-a-simulated-flight",
+        f"reader: {kind}",
+        f"rates: {_flow_mapping(named['rates'], '{!r}')}",
+        f"commands: [{', '.join(map(repr, commands.values()))}]",
+        f"attitude: {_flow_mapping(named['attitude'], angle)}",
+        f"airspeed: {named['airspeed']['airspeed']!r}",
+        "surfaces:",
+        *(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
+        f"full_deflection_rad: {_flow_mapping(travel_rad, '{!r}')}",
+        f"signals: [{felt}]",
+        f"flow: {_flow_mapping(flow, '{}')}",
+    ]
+    return "\n".join(lines) + "\n"
 
 
-def _attitude_columns(known: ValuesByColumn) -> ValuesByColumn:
-    return {f"{name.lower()}_rad": known[f"{of}_rad"] for name, of in _ANGLE_OF_ARDUPILOT_FIELD.items()}
+def _flow_mapping(entries: Mapping[str, object], form: str) -> str:
+    """A mapping of YAML in one line."""
+    return f"{{{', '.join(f'{key}: {form.format(value)}' for key, value in entries.items())}}}"
 
 
 def _write_table(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
@@ -265,39 +270,6 @@ def _interleave_messages(topics: Sequence[np.ndarray]) -> bytes:
     return np.hstack(rows).tobytes()
 
 
-def _vehicle_file_text(topics: ColumnsByTopic, travel_rad: dict[str, float], kind: str) -> str:
-    """The vehicle file: which column is what."""
-    columns = [f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields]
-    commands = [name for name in columns if re.search(r"command|\.control\[|^SRFC", name)]
-    full = ", ".join(f"{surface}: {stop!r}" for surface, stop in travel_rad.items())
-    attitude = ", ".join(f"{angle}: {_angle_column_entry(columns, angle, kind)}" for angle in _ANGLE_NAMES)
-    rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATE_AXES, columns, strict=False))
-    lines = [
-        "# Written with the log beside it: which column is what. Commands are shares of travel.",
-        f"name: {kind}-of-a-simulated-flight",
-        f"reader: {kind}",
-        f"rates: {{{rates}}}",
-        f"commands: [{', '.join(map(repr, commands))}]",
-        f"attitude: {{{attitude}}}",
-        f"airspeed: {next(name for name in columns if 'airspeed' in name.lower())!r}",
-        "surfaces:",
-        *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(travel_rad, commands, strict=True)),
-        f"full_deflection_rad: {{{full}}}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _angle_column_entry(columns: list[str], angle: str, kind: str) -> str:
-    """The column of an attitude angle, with its unit where it is not rad."""
-    name = next(one for one in columns if re.search(rf"(^|\.){angle}(_rad)?$", one.lower()))
-    return f"{{column: {name}, unit: deg}}" if kind == "ardupilot" else repr(name)
-
-
-TopicsWriter = Callable[[Path, NDArray[np.int64], ColumnsByTopic], None]
-_WRITER_AND_TOPICS_OF_KIND: dict[
-    str, tuple[TopicsWriter, Callable[[ValuesByColumn, ValuesByColumn], ColumnsByTopic]]
-] = {
-    "table": (_write_table, _table_topics),
-    "ulog": (_write_ulog, _px4_topics),
-    "ardupilot": (_write_dataflash, _ardupilot_topics),
-}
+_WRITER_OF_KIND: dict[str, Callable[[Path, NDArray[np.int64], ColumnsByTopic], None]] = {
+    "table": _write_table, "ulog": _write_ulog, "ardupilot": _write_dataflash,
+}  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results import log
+from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, SHADES, Mark, closeup_window, marks
 from beaver_ftc.results.views import (
@@ -19,7 +19,7 @@ from beaver_ftc.results.views import (
     Trace,
     ValuesOfColumns,
     View,
-    read_series,
+    series_of,
     views_of_flight,
 )
 
@@ -63,7 +63,8 @@ def pictures_of(
 
     formats: png, pdf, svg; PDF and SVG are drawn for papers.
     """
-    shown = views_of_flight(log.column_names(log_path), metrics)
+    source = StoredLog(log_path)
+    shown = views_of_flight(source.columns, metrics)
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
     closeups = [view for view in shown if view.closeup] if window else []
@@ -72,7 +73,7 @@ def pictures_of(
         (shown, WHOLE_FLIGHT_S, ""),
         (closeups, window or WHOLE_FLIGHT_S, "-closeup"),
     ):
-        series = read_series(log_path, [name for view in drawn for name in view.columns], span)
+        series = series_of(source, [name for view in drawn for name in view.columns], span)
         for view in drawn:
             own = {name: series[name] for name in ("t_s", *view.columns)}
             for kind in formats:

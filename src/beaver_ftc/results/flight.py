@@ -13,6 +13,7 @@ import numpy as np
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.plugins import required
 from beaver_ftc.results import model, verdict
+from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Document
@@ -230,7 +231,7 @@ class Flight:
         ]
         missed = [
             ("missed", held.sentence)
-            for held in verdict.expectations_in_words(self._typed_metrics)
+            for held in expectations_in_words(self._typed_metrics)
             if not held.passed
         ]
         return [*verdict.verdict_lines(self._typed_metrics), *tracked, *missed]

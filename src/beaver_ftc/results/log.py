@@ -5,6 +5,7 @@ other reader opens as it is, and what costs the loop least.
 """
 
 import contextlib
+import math
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -96,7 +97,37 @@ class ParquetLog:
         self._used = 0
 
 
-class MemoryLog:
+class Log:
+    """A log that can be read: the names of its columns, and its rows a chunk at a time."""
+
+    columns: tuple[str, ...] = ()
+
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the log in chunks of rows, each as name -> values, shape (rows,)."""
+        raise NotImplementedError
+
+    def row_count(self) -> int:
+        """Number of frames."""
+        raise NotImplementedError
+
+    def copy_to(self, path: Path) -> None:
+        """Write the rows into a file with the format of the log.parquet of `run`."""
+        raise NotImplementedError
+
+    def read(self, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:
+        """The whole log, or the named columns of it, as name -> values, shape (frames,)."""
+        chunks = list(self.read_chunks(columns))
+        names = self.columns if columns is None else columns
+        return {name: np.concatenate([chunk[name] for chunk in chunks] or [np.empty(0)]) for name in names}
+
+    @property
+    def frame_s(self) -> float:
+        """Time from one row to the next, s; infinite in a log of a single row."""
+        first = next(self.read_chunks(["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
+        return float(first[1] - first[0]) if first.size == 2 else math.inf
+
+
+class MemoryLog(Log):
     """A log in memory, for the argument `log` of `Simulation`.
 
     - `columns`: names of the columns, in order. Empty until `open` is called.
@@ -216,12 +247,14 @@ class SpooledLog(MemoryLog):
         return now
 
 
-class StoredLog:
+class StoredLog(Log):
     """The log in a parquet file, read when asked for."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.columns = column_names(path)
+        with open_parquet_log(path) as file:
+            self.columns = tuple(file.schema_arrow.names)
+            self._frames = int(file.metadata.num_rows)
 
     def copy_to(self, path: Path) -> None:
         """Copy the file."""
@@ -229,14 +262,15 @@ class StoredLog:
 
     def row_count(self) -> int:
         """Number of frames."""
-        return row_count(self._path)
+        return self._frames
 
     def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
         """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
-        return read_chunks(self._path, columns)
-
-
-Log = MemoryLog | StoredLog
+        with open_parquet_log(self._path) as file:
+            wanted = list(self.columns if columns is None else columns)
+            for group in range(file.num_row_groups):
+                table = file.read_row_group(group, columns=wanted)
+                yield {name: _column_values(table.column(name)) for name in wanted}
 
 
 @contextlib.contextmanager
@@ -261,40 +295,12 @@ def open_parquet_log(path: Path) -> Iterator[Any]:
             raise BadInput(f"{path}: {says}") from error
 
 
-def column_names(path: Path) -> tuple[str, ...]:
-    """Names of a log's columns, in order."""
-    with open_parquet_log(path) as file:
-        return tuple(file.schema_arrow.names)
-
-
-def row_count(path: Path) -> int:
-    """Number of frames in a log."""
-    with open_parquet_log(path) as file:
-        return int(file.metadata.num_rows)
-
-
-def read_chunks(path: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
-    """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
-    with open_parquet_log(path) as file:
-        wanted = list(columns) if columns is not None else file.schema_arrow.names
-        for group in range(file.num_row_groups):
-            table = file.read_row_group(group, columns=wanted)
-            yield {name: _column_values(table.column(name)) for name in wanted}
-
-
 def _column_values(column: Any) -> np.ndarray:
     """A column without nulls. Not its own to_numpy: that imports pandas, if installed, for nothing."""
     parts = [
         np.frombuffer(part.buffers()[1], np.float64, len(part), 8 * part.offset) for part in column.chunks
     ]
     return np.concatenate(parts or [np.empty(0)])
-
-
-def read(path: Path, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:
-    """The whole log, or the named columns of it, as name -> values, shape (frames,)."""
-    chunks = list(read_chunks(path, columns))
-    names = column_names(path) if columns is None else columns
-    return {name: np.concatenate([chunk[name] for chunk in chunks] or [np.empty(0)]) for name in names}
 
 
 def units(columns: Iterable[str]) -> dict[str, str]:
@@ -317,8 +323,7 @@ def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
     if isinstance(log, MemoryLog):
         table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)
     else:
-        chunks = list(log.read_chunks())
-        table = DataFrame({name: np.concatenate([chunk[name] for chunk in chunks]) for name in log.columns})
+        table = DataFrame(log.read())
     table.attrs = {
         "scenario": found.scenario, "seed": found.seed, "verdict": _verdict_attributes(found),
         "units": units(log.columns),

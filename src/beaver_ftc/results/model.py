@@ -4,50 +4,80 @@ A record's fields are the keys of its section of the document, in their order. T
 the flight, delays s since the first frame with the fault, rates deg/s; None is what there is not.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from functools import cache
+from dataclasses import KW_ONLY, dataclass, field, fields
+from functools import cache, partial
 from pathlib import Path
 from types import UnionType
-from typing import Any, Self, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from beaver_ftc.documents import files
+from beaver_ftc.scenario.faults import DAMAGE, LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor
+from beaver_ftc.scenario.sensors import sensor_words
 
 Document = files.Document
 Span = tuple[float, float]
 
 
-_LEFT_OUT_IF_NONE = {"left_out": True}  # a key that the document has only where its value is known
+Value = TypeVar("Value")
+_KNOWN = "a key that the document has only where its value is known"
+Known = Annotated[Value | None, _KNOWN]
 
 
 @dataclass(frozen=True)
 class Part:
-    """A section of the document."""
+    """A section of the document, its keys in the order of its fields.
+
+    _first, _last: keys that stand elsewhere than their fields.
+    """
+
+    _first: ClassVar[tuple[str, ...]] = ()
+    _last: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Self:
-        """From a section as JSON has it; a key that is not there is None, or an empty list."""
+    def of(cls, found: Any) -> Self:
+        """From a section as JSON has it, or a tuple of its values; a key that is not there is None, or an
+        empty list."""
         part: Any = cls
-        return cls(**{name: read(document.get(name)) for name, read in _reader_of_field(part)})
+        if isinstance(found, tuple):
+            return cls(*found)
+        return cls(**{name: read(found.get(name)) for name, (read, _) in _fields_of(part).items()})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
-        left_out = {one.name for one in fields(self) if "left_out" in one.metadata}
+        part: Any = type(self)
+        values = {name: getattr(self, name) for name in _fields_of(part)}
+        known = {name for name, (_, known) in _fields_of(part).items() if known}
         return {
             key: _as_json_value(value)
             for key, value in values.items()
-            if not (value is None and key in left_out)
+            if not (value is None and key in known)
         }
+
+    def at(self, path: str) -> Any:
+        """The value at a path such as `detection.delay_s`; None where a section on the way to it is."""
+        here: Any = self
+        for key in path.split("."):
+            if here is None:
+                break
+            here = here.get(key) if isinstance(here, dict) else getattr(here, key)
+        return here
 
 
 Reader = Callable[[Any], Any]
 
 
 @cache
-def _reader_of_field(part: Any) -> tuple[tuple[str, Reader], ...]:
-    """The fields of a section, and how each is read."""
-    return tuple((name, _reader_of_type(hint)) for name, hint in get_type_hints(part).items())
+def _fields_of(part: Any) -> dict[str, tuple[Reader, bool]]:
+    """How each field of a section is read, and whether the document has it only where it is known; in the
+    document's order."""
+    hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
+    others = [one.name for one in fields(part) if one.name not in part._first + part._last]
+    return {
+        name: (_reader_of_type(hints[name]), _KNOWN in get_args(marks[name]))
+        for name in (*part._first, *others, *part._last)
+    }
 
 
 def without_none(hint: Any) -> Any:
@@ -62,26 +92,25 @@ def _reader_of_type(hint: Any) -> Reader:
     bare = without_none(hint)
     kind, inner = get_origin(bare), get_args(bare)
     if kind is tuple:
-        read = _tuple_reader(_reader_of_type(inner[0]))
+        read: Reader = partial(_tuple_of, _reader_of_type(inner[0]))
     elif kind is dict:
-        read = _dict_reader(_reader_of_type(inner[1]))
+        read = partial(_dict_of, _reader_of_type(inner[1]))
     else:
-        return _optional_reader(
-            bare.of if isinstance(bare, type) and issubclass(bare, Part) else _list_as_tuple
-        )
-    return read if bare is hint else _optional_reader(read)
+        one = bare.of if isinstance(bare, type) and issubclass(bare, Part) else _list_as_tuple
+        return partial(_known, one)
+    return read if bare is hint else partial(_known, read)
 
 
-def _tuple_reader(entry: Reader) -> Reader:
-    return lambda values: tuple(map(entry, values or ()))
+def _known(read: Reader, value: Any) -> Any:
+    return None if value is None else read(value)
 
 
-def _dict_reader(entry: Reader) -> Reader:
-    return lambda values: {key: entry(value) for key, value in (values or {}).items()}
+def _tuple_of(read: Reader, values: Any) -> Any:
+    return tuple(map(read, values or ()))
 
 
-def _optional_reader(read: Reader) -> Reader:
-    return lambda value: None if value is None else read(value)
+def _dict_of(read: Reader, values: Any) -> Any:
+    return {key: read(value) for key, value in (values or {}).items()}
 
 
 def _list_as_tuple(value: Any) -> Any:
@@ -94,6 +123,19 @@ def _as_json_value(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _as_json_value(entry) for key, entry in value.items()}
     return [_as_json_value(entry) for entry in value] if isinstance(value, tuple | list) else value
+
+
+def rounded(value: Any) -> Any:
+    """A section, or a part of one, with each number to nine decimals, which have no rounding dust of frame
+    times; null for a number that is not finite."""
+    if isinstance(value, float):  # first, as most are
+        return round(float(value), 9) if math.isfinite(value) else None
+    if isinstance(value, Part):
+        part: Any = type(value)
+        return part(**{name: rounded(getattr(value, name)) for name in _fields_of(part)})
+    if isinstance(value, dict):
+        return {key: rounded(entry) for key, entry in value.items()}
+    return tuple(map(rounded, value)) if isinstance(value, tuple | list) else value
 
 
 @dataclass(frozen=True)
@@ -120,18 +162,50 @@ class Fault(Part):
     """
 
     actuator: str | None
-    sensor: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    sensor: Known[str] = field(default=None, kw_only=True)
     type: str
     at_s: float
 
 
+_NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
+
+
 @dataclass(frozen=True)
 class DeclaredFault(Fault):
-    """A fault declared. size: what else its type has."""
+    """A fault as it is declared, and as a name is held against it. size: what else its type has."""
 
-    end_s: float | None
-    profile: str
-    size: dict[str, Any]
+    end_s: float | None = None
+    profile: str = "abrupt"
+    size: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_scenario(cls, fault: Any) -> Self:
+        """One of the faults of a `schema.Scenario`."""
+        return cls(
+            getattr(fault, "actuator", None),
+            fault.type,
+            fault.at_s,
+            fault.end_s,
+            str(fault.profile),
+            fault.model_dump(exclude=_NO_SIZE, exclude_none=True),
+            sensor=fault.sensor if of_a_sensor(fault) else None,
+        )
+
+    def is_named_by(self, name: str | None, removed_surfaces: frozenset[str] = frozenset()) -> bool:
+        """Whether a name is right. removed_surfaces: surfaces that damage takes away."""
+        if self.sensor is not None:  # outside the class of surface faults is right as well
+            return name in (sensor_words(self.sensor), UNANTICIPATED)
+        if self.type == DAMAGE:  # outside of every class, unless a surface that it takes
+            return name == UNANTICIPATED or name in removed_surfaces
+        return name is not None and name == (UNANTICIPATED if self.type == UNANTICIPATED else self.actuator)
+
+    def is_of_type(self, kind: str | None) -> bool | None:
+        """Whether a type is right; None while none is named, as an instrument's never is."""
+        if self.sensor is not None:
+            return None
+        if self.type == DAMAGE:  # a surface that is gone has lost all its effect
+            return None if kind in (None, UNANTICIPATED) else kind == LOSS_OF_EFFECTIVENESS
+        return None if kind is None else kind == self.type
 
 
 @dataclass(frozen=True)
@@ -221,7 +295,8 @@ class Named(Part):
     frequency_rad_s: float | None
     so_far: bool | None
     premature: bool | None
-    estimate_at_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    estimate_at_s: Known[float] = None
 
 
 @dataclass(frozen=True)
@@ -232,7 +307,8 @@ class NameInWindow(Named):
       type then.
     """
 
-    true_size: float | None = field(default=None, kw_only=True)
+    _: KW_ONLY
+    true_size: float | None = None
 
 
 @dataclass(frozen=True)
@@ -269,12 +345,13 @@ class Withdrawn(Part):
     fault: str
     from_s: float
     to_s: float
-    type: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    because: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    type: Known[str] = None
+    because: Known[str] = None
 
 
 @dataclass(frozen=True)
-class Isolation(Part):
+class Isolation(Named):
     """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
 
     - `isolated`: True if a fault was named.
@@ -288,28 +365,15 @@ class Isolation(Part):
     """
 
     isolated: bool
-    fault: str | None
-    type: str | None
-    time_s: float | None
-    delay_s: float | None
-    correct: bool | None
-    estimate: float | None
-    candidates: tuple[str, ...]
-    type_correct: bool | None
-    type_delay_s: float | None
-    estimate_deg: float | None
-    estimate_interval: Span | None
-    frequency_rad_s: float | None
-    so_far: bool | None
-    premature: bool | None
     withdrawn: tuple[Withdrawn, ...]
     names: tuple[str, ...]
     probing_s: Span | None
     faults: tuple[Named, ...]
-    estimate_at_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    types_withdrawn: tuple[Withdrawn, ...] | None = field(
-        default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True
-    )
+    _: KW_ONLY
+    types_withdrawn: Known[tuple[Withdrawn, ...]] = None
+
+    _first = ("isolated", "fault", "type", "time_s", "delay_s", "correct", "estimate")
+    _last = ("estimate_at_s", "types_withdrawn")
 
 
 @dataclass(frozen=True)
@@ -360,7 +424,8 @@ class ChangeInFlight(Part):
     sensors: bool
     detection_time_s: float | None
     isolated: str | None
-    false_alarm: bool | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    false_alarm: Known[bool] = None
     renewed: bool = True
 
     def document(self) -> Document:
@@ -411,12 +476,13 @@ class AxisAuthority(Part):
 
     given_share: float
     beyond_s: float
-    least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    healthy_least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    healthy_greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    engines_least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    engines_greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    least_rad_s2: Known[float] = None
+    greatest_rad_s2: Known[float] = None
+    healthy_least_rad_s2: Known[float] = None
+    healthy_greatest_rad_s2: Known[float] = None
+    engines_least_rad_s2: Known[float] = None
+    engines_greatest_rad_s2: Known[float] = None
 
 
 @dataclass(frozen=True)
@@ -439,27 +505,28 @@ class EnginePowerUse(Part):
 
 
 @dataclass(frozen=True)
-class ProfileDeviations(Part):
-    """Largest deviation from the commanded profile, by channel; None where it is not flown. Those of the
-    airspeed are of a mean over 10 s, the last excepted. limited: from the commanded airspeed as far as it can
-    be held."""
+class Deviations(Part):
+    """From the commanded profile, by channel; None where it is not flown."""
 
     altitude_m: float | None
     airspeed_mps: float | None
     heading_deg: float | None
     bank_deg: float | None
+
+
+@dataclass(frozen=True)
+class ProfileDeviations(Deviations):
+    """The largest. Those of the airspeed are of a mean over 10 s, the last excepted. limited: from the
+    commanded airspeed as far as it can be held."""
+
     airspeed_limited_mps: float | None
     airspeed_at_one_instant_mps: float | None
 
 
 @dataclass(frozen=True)
-class ArrivalDeviations(Part):
-    """The mean deviation at the end, with its sign; and whether the flight ends in the envelope."""
+class ArrivalDeviations(Deviations):
+    """The mean at the end, with its sign; and whether the flight ends in the envelope."""
 
-    altitude_m: float | None
-    airspeed_mps: float | None
-    heading_deg: float | None
-    bank_deg: float | None
     in_envelope: bool
 
 
@@ -489,7 +556,8 @@ class Expectation(Part):
     passed: bool
     expected: Any
     actual: Any
-    reason: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    reason: Known[str] = None
 
     @property
     def expected_and_actual_text(self) -> str:
@@ -599,10 +667,11 @@ class Metrics(Part):
     expectations: tuple[Expectation, ...]
     passed: bool
     versions: dict[str, str]
-    windows: tuple[Window, ...] | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    interrupted_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    link: Link | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    certificate: CertificateCounts | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    _: KW_ONLY
+    windows: Known[tuple[Window, ...]] = None
+    interrupted_s: Known[float] = None
+    link: Known[Link] = None
+    certificate: Known[CertificateCounts] = None
 
     @property
     def judged(self) -> Judged:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log, verdict
+from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
@@ -23,7 +24,7 @@ from beaver_ftc.results.views import (
     Panel,
     View,
     expected_airspeed_mps,
-    read_series,
+    series_of,
     surfaces,
     surfaces_by_kind,
     views,
@@ -84,7 +85,7 @@ def _verdict_entry(metrics: Document, scenario: str) -> Document:
         "description": yaml.safe_load(scenario).get("description", ""),
         "facts": verdict.verdict_lines(found),
         "tracking": verdict.tracking_rms_in_words(found),
-        "expectations": verdict.expectations_in_words(found),
+        "expectations": expectations_in_words(found),
         "scenario": scenario,
     }
 
@@ -116,7 +117,7 @@ def _page_data(
     shown: Sequence[View] | None,
 ) -> Document:
     """What the page draws from."""
-    logs = [folder / "log.parquet" for folder in folders]
+    logs = [log.StoredLog(folder / "log.parquet") for folder in folders]
     shown = _common_views(logs, documents) if shown is None else shown
     columns = tuple(
         dict.fromkeys([*_FLIGHT_PATH_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
@@ -126,36 +127,36 @@ def _page_data(
     found = [Metrics.of(document) for document in documents]
     named = zip(logs, found, names or [each.scenario for each in found], strict=True)
     return {
-        "runs": [_run_entry(path, metrics, columns, name, points) for path, metrics, name in named],
+        "runs": [_run_entry(source, metrics, columns, name, points) for source, metrics, name in named],
         "views": [_view_entry(view) for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
     }
 
 
-def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[View, ...]:
+def _common_views(logs: Sequence[log.Log], documents: Sequence[Document]) -> tuple[View, ...]:
     """Every view that all runs have; with what is expected of the airspeed, if that is the same in all."""
     flown = [Metrics.of(document) for document in documents]
     within_mps = {expected_airspeed_mps(metrics) for metrics in flown}
     common = within_mps.pop() if len(within_mps) == 1 else None
     first, *rest = (
-        views(log.column_names(path), bool(metrics.engine_power), common)
-        for path, metrics in zip(logs, flown, strict=True)
+        views(source.columns, bool(metrics.engine_power), common)
+        for source, metrics in zip(logs, flown, strict=True)
     )
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _run_entry(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
+def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
-    levels = [read_series(path, columns, max_points=points)]
+    levels = [series_of(source, columns, max_points=points)]
     t_s = levels[0]["t_s"]
-    if window and t_s.size < log.row_count(path):
+    if window and t_s.size < source.row_count():
         around = window[0] - AROUND_S, window[1] + AROUND_S
-        levels.append(read_series(path, columns, around, AT_FULL_RATE))
+        levels.append(series_of(source, columns, around, AT_FULL_RATE))
     return {
         "name": name,
-        "jet": not {"spoiler", "stabiliser"}.isdisjoint(surfaces_by_kind(surfaces(log.column_names(path)))),
+        "jet": not {"spoiler", "stabiliser"}.isdisjoint(surfaces_by_kind(surfaces(source.columns))),
         "damage": [_damage_entry(fault) for fault in metrics.faults if fault.type == "damage"],
         "marks": [asdict(mark) for mark in event_marks],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),

@@ -121,28 +121,23 @@ class _Parser:
             interval = self._parse_interval() if operator == "until" else None
             # to the right the same operator: a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
             right = self._parse_operand(_BINDING_POWER[operator] - (_BINDING_POWER[operator] == 1))
-            left = _binary_formula("implies" if operator == "->" else operator, left, right, interval)
+            left = _formula("implies" if operator == "->" else operator, left, right, interval=interval)
         self._depth -= 1
         return left
 
     def _parse_prefix(self) -> Formula:
         token = self._take_token()
         if token == "(":
-            found = self._parse_operand(0)
-            self._take_token(")")
-            return found
+            return self._parse_rest_of_parentheses()
         if token == "-":
-            return _formula_of_numbers(
-                "-", Formula("number", column_or_number=0.0), self._parse_operand(_BINDING_POWER["*"] - 1)
-            )
+            zero = Formula("number", column_or_number=0.0)
+            return _formula("-", zero, self._parse_operand(_BINDING_POWER["*"] - 1))
         if token == "abs":
             self._take_token("(")
-            found = _formula_of_numbers("abs", self._parse_operand(0))
-            self._take_token(")")
-            return found
+            return _formula("abs", self._parse_rest_of_parentheses())
         if token == "not" or token in _TEMPORAL_OPERATORS:
             interval = self._parse_interval() if token in _TEMPORAL_OPERATORS else None
-            return _formula_of_truths(token, self._parse_operand(_MAX_BINDING_POWER), interval=interval)
+            return _formula(token, self._parse_operand(_MAX_BINDING_POWER), interval=interval)
         if re.fullmatch(r"[\d.].*", token):
             if not isfinite(float(token)):
                 raise FormulaError(f"{token[:40]!r} is too large for a number")
@@ -150,6 +145,11 @@ class _Parser:
         if not token or token in _RESERVED_WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
             raise FormulaError(f"{token or 'the end'!r} where a column, a number or ( is due")
         return Formula("column", column_or_number=token)
+
+    def _parse_rest_of_parentheses(self) -> Formula:
+        found = self._parse_operand(0)
+        self._take_token(")")
+        return found
 
     def _parse_interval(self) -> tuple[float, float] | None:
         if self._next_token != "[":
@@ -173,28 +173,15 @@ class _Parser:
         return float(token)
 
 
-def _binary_formula(
-    operator: str, left: Formula, right: Formula, interval: tuple[float, float] | None
-) -> Formula:
-    of = _formula_of_numbers if _BINDING_POWER[operator] >= _BINDING_POWER["<="] else _formula_of_truths
-    return of(operator, left, right, interval=interval)
-
-
-def _formula_of_numbers(
-    operator: str, *parts: Formula, interval: tuple[float, float] | None = None
-) -> Formula:
-    if any(part.operator not in _NUMERIC_OPERATORS for part in parts):
-        raise FormulaError(
-            f"{operator!r} is of numbers, and is given what is true or false, allowed: columns and numbers"
-        )
-    return Formula(operator, parts)
-
-
-def _formula_of_truths(
-    operator: str, *parts: Formula, interval: tuple[float, float] | None = None
-) -> Formula:
-    if any(part.operator in _NUMERIC_OPERATORS for part in parts):
-        raise FormulaError(f"{operator!r} is of what is true or false, allowed: a comparison, in parentheses")
+def _formula(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
+    """An operator of these parts, which are what it is of: numbers, or what is true or false."""
+    of_numbers = operator in ("-", "abs") or _BINDING_POWER.get(operator, 0) >= _BINDING_POWER["<="]
+    if any((part.operator in _NUMERIC_OPERATORS) != of_numbers for part in parts):
+        if of_numbers:
+            says = "of numbers, and is given what is true or false, allowed: columns and numbers"
+        else:
+            says = "of what is true or false, allowed: a comparison, in parentheses"
+        raise FormulaError(f"{operator!r} is {says}")
     return Formula(operator, parts, interval)
 
 

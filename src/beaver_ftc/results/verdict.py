@@ -6,17 +6,16 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 import io
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
+from beaver_ftc.results.expectations import expectations_in_words, value_text
 from beaver_ftc.results.model import (
     AxisAuthority,
     CertificateCounts,
     ChangeInFlight,
     DeclaredFault,
     Detection,
-    Expectation,
     Fault,
-    Isolation,
     Metrics,
     Named,
     ProtectionLimit,
@@ -24,6 +23,8 @@ from beaver_ftc.results.model import (
     Withdrawn,
 )
 from beaver_ftc.scenario.declared import in_words, wider
+from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
+from beaver_ftc.scenario.sensors import QUANTITIES
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -84,24 +85,21 @@ def _further_fault_texts(metrics: Metrics) -> list[str]:
     """The further faults of several at once: named, or the remaining candidates."""
     isolation = metrics.isolation
     rest = isolation.faults[1:] if isolation.isolated else []
-    return [
-        _named_fault_text(fault, metrics) if fault.fault else _candidates_text(fault.candidates)
-        for fault in rest
-    ]
+    return [_found_text(fault, metrics, _candidates_text(fault.candidates)) for fault in rest]
 
 
 def _window_text(window: Window, metrics: Metrics) -> str:
     """What was found in one window, and when of it."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
-    found = [
-        _named_fault_text(one, metrics)
-        if one.fault
-        else _candidates_text(one.candidates)
-        if one.candidates
-        else "not isolated"
-        for one in window.isolation
-    ]
+    found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
     return f"{_seconds_text(window.from_s)} to {_seconds_text(window.to_s)}: {'; '.join([alarm, *found])}"
+
+
+def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
+    """A fault that is named, or its candidates."""
+    if found.fault:
+        return _named_fault_text(found, metrics)
+    return _candidates_text(found.candidates) if found.candidates else otherwise
 
 
 MAX_LISTED_CANDIDATES = 4  # places, or types: more are counted
@@ -168,85 +166,7 @@ def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
     """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
     of = metrics.tracking
     tracked = ("before", of.pre_fault_rms_deg_s), ("after", of.post_fault_rms_deg_s)
-    return [
-        (when, _value_text(rms.p), _value_text(rms.q), _value_text(rms.r)) for when, rms in tracked if rms
-    ]
-
-
-class ExpectationInWords(NamedTuple):
-    """An expectation compared with the flight.
-
-    limit: what is expected. actual: what the flight gave, empty if it adds nothing. share_of_limit: actual
-    over limit, None if the expectation is no limit.
-    """
-
-    name: str
-    limit: str
-    actual: str
-    passed: bool
-    share_of_limit: float | None
-
-    @property
-    def sentence(self) -> str:
-        """Expected and actual in one line."""
-        return f"{self.limit}, got {self.actual}" if self.actual else self.limit
-
-
-def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
-    """Each expectation in words."""
-    return [_expectation_in_words(found) for found in metrics.expectations]
-
-
-_QUANTITY_AND_UNIT_OF_LIMIT = {  # quantity and unit of the expectations that are limits
-    "detected_within_s": ("detection delay", "s"), "isolated_within_s": ("isolation delay", "s"),
-    "altitude_within_m": ("altitude deviation", "m"),
-    "airspeed_within_mps": ("airspeed deviation (10 s mean)", "m/s"),
-    "airspeed_within_limits_mps": ("deviation from the limited airspeed (10 s mean)", "m/s"),
-    "heading_within_deg": ("heading deviation", "deg"),
-    "arrives.altitude_m": ("altitude deviation at the end", "m"),
-    "arrives.airspeed_mps": ("airspeed deviation at the end", "m/s"),
-    "arrives.heading_deg": ("heading deviation at the end", "deg"),
-    **{
-        f"{key}_rms_deg_s.{axis}": (f"{name} rate RMS {when} the fault", "deg/s")
-        for key, when in (("pre_fault", "before"), ("post_fault", "after"))
-        for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
-    },
-}  # fmt: skip
-_TRUE_AND_FALSE_TEXT_OF_FLAG = {  # what is said of true, and of false
-    "no_false_alarm": ("no false alarm", "a false alarm"),
-    "no_departure": ("no departure", "a departure"),
-    "stays_in_envelope": ("stays in the envelope", "leaves the envelope"),
-    "arrives.in_envelope": ("inside the envelope at the end", "outside the envelope at the end"),
-}  # fmt: skip
-_TITLE_OF_NAME_EXPECTATION = {
-    "isolated_as": "isolated fault", "isolated_type": "fault type",
-    "candidate_type": "possible fault types include",
-}  # fmt: skip
-
-
-def _expectation_in_words(found: Expectation) -> ExpectationInWords:
-    actual, share = _value_text(found.actual), None
-    if found.name in _TRUE_AND_FALSE_TEXT_OF_FLAG:
-        limit = _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.expected]
-        actual = (
-            ""
-            if found.passed or found.actual is None
-            else _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.actual]
-        )
-    elif found.name in _QUANTITY_AND_UNIT_OF_LIMIT:
-        quantity, unit = _QUANTITY_AND_UNIT_OF_LIMIT[found.name]
-        limit = f"{quantity} ≤ {_value_text(found.expected)} {unit}"
-        if found.actual is not None:
-            share = abs(float(found.actual)) / found.expected if found.expected else None
-            actual += f" {unit}{'' if share is None else f' ({_three_digits(100 * share)} % of the limit)'}"
-    else:
-        what = _TITLE_OF_NAME_EXPECTATION.get(found.name, _without_underscores(found.name))
-        limit = f"{what} {_value_text(found.expected)}"
-        actual = "" if found.passed and found.actual == found.expected else actual
-    reason = found.reason if actual or not found.passed else ""
-    return ExpectationInWords(
-        found.name, limit, "; ".join(filter(None, (actual, reason))), found.passed, share
-    )
+    return [(when, value_text(rms.p), value_text(rms.q), value_text(rms.r)) for when, rms in tracked if rms]
 
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
@@ -328,22 +248,21 @@ def _outside_class_text(metrics: Metrics) -> str:
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:
-    """A fault, and from when on another one of `faults` masks it."""
+    """A fault, and from when on another one of `faults` masks it. Older documents say less of it."""
     if fault is None:
         return "none"
-    end_s = fault.end_s if isinstance(fault, DeclaredFault) else None
-    masked = _masked_text(fault, faults) if isinstance(fault, DeclaredFault) else ""
-    until = f" to {_seconds_text(end_s)}" if end_s else ""
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
-    what = f"{place} {fault.type.replace('_', ' ')}".strip()
+    what = f"{place} {_without_underscores(fault.type)}".strip()
+    at = f"at {_seconds_text(fault.at_s)}"
+    if not isinstance(fault, DeclaredFault):
+        return f"{what} {at}"
     size = ", ".join(_fault_size_texts(fault))
-    return f"{what}{' (' + size + ')' if size else ''} at {_seconds_text(fault.at_s)}{until}{masked}"
+    until = f" to {_seconds_text(fault.end_s)}" if fault.end_s else ""
+    return f"{what}{' (' + size + ')' if size else ''} {at}{until}{_masked_text(fault, faults)}"
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     """While which other faults a fault does not act."""
-    from beaver_ftc.scenario.faults import masking
-
     later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
     spells = [
         f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
@@ -351,6 +270,20 @@ def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
         for one in later
     ]
     return f", without effect {' and '.join(spells)}" if spells else ""
+
+
+def _fault_size_texts(fault: DeclaredFault) -> list[str]:
+    """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
+    if fault.sensor:
+        unit, words = (
+            QUANTITIES[fault.sensor].unit,
+            {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"},
+        )
+        return [
+            words[fault.type].format(size, unit) for key, size in fault.size.items() if key == "magnitude"
+        ]
+    words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
+    return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
 
 
 _DEVIATION_FORMAT_OF_CHANNEL = {
@@ -362,15 +295,12 @@ _DEVIATION_FORMAT_OF_CHANNEL = {
 
 def _profile_text(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
-    profile = metrics.profile
-    worst = {name: getattr(profile, name, None) for name in _DEVIATION_FORMAT_OF_CHANNEL}
-    at_once = _value_text(profile.airspeed_at_one_instant_mps) if profile else ""
-    off = ", ".join(
-        _DEVIATION_FORMAT_OF_CHANNEL[name].format(_value_text(by), at_once)
-        for name, by in worst.items()
-        if by is not None
-    )
-    return f"largest deviation: {off}" if off else ""
+    off = [
+        form.format(value_text(by), value_text(metrics.at("profile.airspeed_at_one_instant_mps")))
+        for name, form in _DEVIATION_FORMAT_OF_CHANNEL.items()
+        if (by := metrics.at(f"profile.{name}")) is not None
+    ]
+    return f"largest deviation: {', '.join(off)}" if off else ""
 
 
 _LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
@@ -383,34 +313,9 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
     return f"{what} from {_seconds_text(limit.time_s)}{until}: {limit.because}"
 
 
-def _fault_size_texts(fault: Fault) -> list[str]:
-    """The size of an injected fault, in words."""
-    if not isinstance(fault, DeclaredFault):
-        return []
-    if fault.sensor:
-        return _sensor_fault_size_texts(fault, fault.sensor)
-    from beaver_ftc.scenario.faults import TYPES
-
-    row = TYPES.get(fault.type)
-    in_words = row.in_words if row else {}
-    return [in_words[key](value) for key, value in fault.size.items() if key in in_words]
-
-
-def _sensor_fault_size_texts(fault: DeclaredFault, sensor: str) -> list[str]:
-    """The same of an instrument's fault, in the unit of the instrument."""
-    from beaver_ftc.scenario.sensors import QUANTITIES
-
-    size = fault.size.get("magnitude")
-    unit = QUANTITIES[sensor].unit
-    words = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
-    return [] if size is None else [words[fault.type].format(size, unit)]
-
-
-def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     """The true size at the instant of the estimate, where the fault named is one that was injected. The
     instant too, unless the size is the same at every one."""
-    from beaver_ftc.scenario.faults import TYPES, acting_at, size_at
-
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
         return ""
@@ -425,7 +330,7 @@ def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
         return f"{when} (the fault is over then)" if is_over else when
     if isolation.estimate_deg is None:
         return f"{when} (true {TYPES[str(isolation.type)].size_in_words(size)})"
-    return f"{when} (true {_value_text(math.degrees(size))} deg)"
+    return f"{when} (true {value_text(math.degrees(size))} deg)"
 
 
 def _detection_text(metrics: Metrics) -> str:
@@ -462,20 +367,12 @@ def _statistical_text(metrics: Metrics) -> str:
 
 def _isolation_text(metrics: Metrics) -> str:
     isolation = metrics.isolation
-    return "; ".join(
-        [
-            _isolated_or_candidates_text(isolation, metrics),
-            *_withdrawn_texts("named before", isolation.withdrawn),
-            *_withdrawn_texts("type named before", isolation.types_withdrawn or ()),
-        ]
-    )
-
-
-def _isolated_or_candidates_text(isolation: Isolation, metrics: Metrics) -> str:
-    if isolation.isolated:
-        return _named_fault_text(isolation, metrics)
-    left = isolation.candidates
-    return _candidates_text(left) if metrics.detection.detected and left else "none"
+    left = isolation.candidates if metrics.detection.detected else ()
+    found = _named_fault_text(isolation, metrics) if isolation.isolated else "none"
+    if left and not isolation.isolated:
+        found = _candidates_text(left)
+    gone = _withdrawn_texts("named before", isolation.withdrawn)
+    return "; ".join([found, *gone, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())])
 
 
 def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
@@ -494,7 +391,7 @@ def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
     return [f"{heading}: {'; '.join(said)}"] if said else []
 
 
-def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
     """One named fault. The only remaining candidate may still be excluded by later data."""
     left = " (only remaining candidate)" if isolation.so_far else ""
     when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
@@ -506,31 +403,27 @@ def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:
 
 
 def _probing_text(metrics: Metrics) -> str:
-    instants = metrics.isolation.probing_s
-    return (
-        f"flap and elevator moved from {_seconds_text(instants[0])} to {_seconds_text(instants[1])}"
-        if instants
-        else ""
-    )
+    began_s, ended_s = metrics.isolation.probing_s or (None, None)
+    if began_s is None:
+        return ""
+    return f"flap and elevator moved from {_seconds_text(began_s)} to {_seconds_text(ended_s)}"
 
 
-def _type_text(isolation: Isolation | Named) -> str:
+def _type_text(isolation: Named) -> str:
     """The type, or those still possible; nothing where the class knows no other."""
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
         return f", {_open_types_text(isolation.candidates) if isolation.candidates else 'of no known type'}"
-    return "" if isolation.type == "unanticipated" else f", {isolation.type.replace('_', ' ')}"
+    return "" if isolation.type == "unanticipated" else f", {_without_underscores(isolation.type)}"
 
 
-def _estimate_text(isolation: Isolation | Named) -> str:
+def _estimate_text(isolation: Named) -> str:
     if isolation.estimate is None:
         return ""
     if isolation.estimate_deg is None:
-        from beaver_ftc.scenario.faults import TYPES
-
         return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
-    return f", estimated {_value_text(isolation.estimate_deg)} deg"
+    return f", estimated {value_text(isolation.estimate_deg)} deg"
 
 
 def _supervisor_text(metrics: Metrics) -> str:
@@ -635,19 +528,3 @@ def _seconds_text(seconds: float | None) -> str:
     if seconds is None:
         return "none"
     return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"
-
-
-def _value_text(value: Any) -> str:
-    """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
-    if value is None or value == ():
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, tuple):
-        return ", ".join(_value_text(entry) for entry in value)
-    return value if isinstance(value, str) else _three_digits(value)
-
-
-def _three_digits(value: float) -> str:
-    """A number of three significant digits, without an exponent below a million: 1230, not 1.23e+03."""
-    return f"{float(f'{value:.3g}'):g}"

@@ -10,9 +10,9 @@ read a row group at a time, so that a ten-hour flight fits; a short flight is sh
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -181,23 +181,19 @@ def _source_columns_of(column: str) -> tuple[str, ...]:
     return tuple(f"{stem}_{what}_rad_s" for what in ("residual", *bounds))
 
 
-def _curve_panel(
-    label: str, *traces: tuple[str, str, str], shade_column: str = "", shade_label: str = ""
-) -> Panel:
-    """A panel of curves, each (column, label, role)."""
-    return Panel(
-        label, tuple(Trace(*trace) for trace in traces), shade_column=shade_column, shade_label=shade_label
-    )
+def _panel(label: str, *traces: tuple[Any, ...], **how: Any) -> Panel:
+    """A panel of traces, each (column, label, role) and what else a `Trace` has."""
+    return Panel(label, tuple(Trace(*trace) for trace in traces), **how)
 
 
 def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
     """A panel of what stays below 1 as long as all is well."""
-    return Panel(label, tuple(Trace(*trace) for trace in traces), log_scale=True, line_at=1.0)
+    return _panel(label, *traces, log_scale=True, line_at=1.0)
 
 
 def _tracking_view() -> View:
     panels = tuple(
-        _curve_panel(
+        _panel(
             AXIS_NAMES[axis],
             (f"{axis}_reference_rad_s", "reference", "command"),
             (f"{axis}_model_rad_s", "reference model", "target"),
@@ -209,36 +205,34 @@ def _tracking_view() -> View:
 
 
 def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
-    held = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
         ("heading ψ", "heading_command_rad", "psi_rad"),
         ("bank φ", "bank_command_rad", "phi_rad"),
     )
+    mean = _mean_airspeed_traces(within_mps)
+    more = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")] if limited else []}
     panels = [
-        _curve_panel(
-            label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual")
+        _panel(
+            label, (command, "commanded", "target"), *more.get(label, ()), (actual, "flown", "actual"),
+            *(mean if label == "airspeed" else ()),
         )
         for label, command, actual in flown
-    ]
-    panels[1] = replace(panels[1], traces=(*panels[1].traces, *_mean_airspeed_traces(within_mps)))
+    ]  # fmt: skip
     words = power.removesuffix("_inhg").replace("_", " ")
-    engine = [_curve_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
+    engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
     return View("profile", "Profile: commanded and flown", (*panels, *engine))
 
 
-def _mean_airspeed_traces(within_mps: float | None) -> Iterator[Trace]:
+def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
     """The mean of the airspeed that is judged, and what the scenario expects of it."""
-    yield Trace(MEAN_AIRSPEED_COLUMN, "10 s mean", "residual")
-    if within_mps is not None:
-        yield Trace(
-            COMMANDED_AIRSPEED_COLUMN,
-            f"± {within_mps:g} m/s, expected of the mean",
-            "bound",
-            offset=within_mps,
-        )
-        yield Trace(COMMANDED_AIRSPEED_COLUMN, "", "bound", offset=-within_mps)
+    mean = [(MEAN_AIRSPEED_COLUMN, "10 s mean", "residual")]
+    if within_mps is None:
+        return [*mean]
+    bound = f"± {within_mps:g} m/s, expected of the mean"
+    upper = COMMANDED_AIRSPEED_COLUMN, bound, "bound", 1.0, within_mps
+    return [*mean, upper, (COMMANDED_AIRSPEED_COLUMN, "", "bound", 1.0, -within_mps)]
 
 
 def surfaces_by_kind(names: Sequence[str]) -> dict[str, list[str]]:
@@ -253,7 +247,7 @@ def surfaces_by_kind(names: Sequence[str]) -> dict[str, list[str]]:
 
 def _labels_and_roles_by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
     """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
-    if len(names) <= len(SURFACE_ROLES):
+    if names and len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
     said: dict[str, list[tuple[str, str, str]]] = {}
     for kind, alike in surfaces_by_kind(names).items():
@@ -266,21 +260,17 @@ def _labels_and_roles_by_kind(names: Sequence[str]) -> dict[str, list[tuple[str,
 def _surfaces_view(names: Sequence[str]) -> View:
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
-            _curve_panel(
-                f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike)
-            )
+            _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
             for kind, alike in _labels_and_roles_by_kind(names).items()
             for of, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
         )
         return View("surfaces", "Control surfaces by kind", panels, n_panel_columns=2)
     panels = tuple(
-        Panel(
+        _panel(
             surface,
-            (
-                Trace(f"{surface}_cmd_rad", "command", "demand"),
-                Trace(f"{surface}_effective_rad", "effective", f"effective {place}"),
-                Trace(f"{surface}{UNLIKE_ENDING}", "position, where it differs from effective", "unlike"),
-            ),
+            (f"{surface}_cmd_rad", "command", "demand"),
+            (f"{surface}_effective_rad", "effective", f"effective {place}"),
+            (f"{surface}{UNLIKE_ENDING}", "position, where it differs from effective", "unlike"),
             shade_column=f"{surface}_saturated",
             shade_label="saturated",
             clips_spikes=True,
@@ -292,17 +282,17 @@ def _surfaces_view(names: Sequence[str]) -> View:
 
 def detection_panel(axis: str, label: str, role: str = "residual") -> Panel:
     """The residual of the detection estimator on an axis, within its threshold."""
-    threshold, residual = f"{axis}_threshold_rad_s", f"{axis}_residual_rad_s"
-    bounds = Trace(threshold, "± threshold", "bound"), Trace(threshold, "", "bound", -1.0)
-    return Panel(label, (*bounds, Trace(residual, "residual", role)))
+    threshold = f"{axis}_threshold_rad_s"
+    bounds = (threshold, "± threshold", "bound"), (threshold, "", "bound", -1.0)
+    return _panel(label, *bounds, (f"{axis}_residual_rad_s", "residual", role))
 
 
 def isolation_panel(name: str, axis: str, label: str, threshold: str = "± threshold") -> Panel:
     """The residual of an isolation estimator on an axis, within its thresholds."""
-    stem = f"fie_{name}_{axis}"
-    bounds = Trace(f"{stem}_lower_rad_s", threshold, "bound"), Trace(f"{stem}_upper_rad_s", "", "bound")
-    residual = Trace(f"{stem}_residual_rad_s", "residual", "actual")
-    return Panel(label, (*bounds, residual), shade_column=f"fie_{name}_excluded", shade_label="excluded")
+    stem, shade = f"fie_{name}_{axis}", f"fie_{name}_excluded"
+    bounds = (f"{stem}_lower_rad_s", threshold, "bound"), (f"{stem}_upper_rad_s", "", "bound")
+    residual = f"{stem}_residual_rad_s", "residual", "actual"
+    return _panel(label, *bounds, residual, shade_column=shade, shade_label="excluded")
 
 
 def _detection_view() -> View:
@@ -324,7 +314,7 @@ def _likelihood_view(columns: Sequence[str]) -> View:
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = {
         kind: [(f"{name}{ending}", f"{called} loss", role) for name, called, role in alike]
-        for kind, alike in (_labels_and_roles_by_kind(names).items() if names else ())
+        for kind, alike in _labels_and_roles_by_kind(names).items()
     }
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
@@ -342,13 +332,13 @@ def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
     """One strip: which surfaces may be at fault, from the alarm on, until the last of their estimators is
     excluded."""
     roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
-    traces = tuple(
-        Trace(f"fie_{name}_excluded", _without_underscores(surface), roles[surface])
+    traces = [
+        (f"fie_{name}_excluded", _without_underscores(surface), roles[surface])
         for surface in moved
         for name in names
         if surface == max((of for of in moved if f"{name}_".startswith(f"{of}_")), key=len, default="")
-    )
-    panel = Panel("surfaces that may be at fault", traces, bars=True, bars_during_column="detected")
+    ]
+    panel = _panel("surfaces that may be at fault", *traces, bars=True, bars_during_column="detected")
     panels = (panel,) if traces else ()
     title = "Candidates: a bar from the alarm until the surface is excluded"
     return View("candidates", title, panels, text_without_data="no alarm: no candidates", closeup=True)
@@ -394,12 +384,12 @@ def _without_underscores(name: str) -> str:
 
 def _effectiveness_view(names: Sequence[str]) -> View:
     panels = tuple(
-        Panel(
+        _panel(
             f"{kind}: {label}" if kind else label,
-            tuple(Trace(f"{name}_effectiveness_{which}", called, role) for name, called, role in alike),
+            *((f"{name}_effectiveness_{which}", called, role) for name, called, role in alike),
             limits=(-0.05, 1.1),
         )
-        for kind, alike in (_labels_and_roles_by_kind(names).items() if names else ())
+        for kind, alike in _labels_and_roles_by_kind(names).items()
         for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
     )
     title = "Effectiveness of each surface: estimated by the diagnosis, and used by the law (rate-limited)"
@@ -408,11 +398,9 @@ def _effectiveness_view(names: Sequence[str]) -> View:
 
 def _supervisor_view() -> View:
     panels = (
-        Panel("mode", (Trace("mode", "mode", "actual"),), value_names=MODES),
-        Panel("alarm", (Trace("detected", "alarm", "actual"),), value_names=("quiet", "alarm")),
-        Panel(
-            "envelope", (Trace("envelope_valid", "envelope", "actual"),), value_names=("outside", "inside")
-        ),
+        _panel("mode", ("mode", "mode", "actual"), value_names=MODES),
+        _panel("alarm", ("detected", "alarm", "actual"), value_names=("quiet", "alarm")),
+        _panel("envelope", ("envelope_valid", "envelope", "actual"), value_names=("outside", "inside")),
     )
     return View("supervisor", "Supervisor: mode, alarm, envelope", panels)
 
@@ -437,21 +425,14 @@ def _states_view() -> View:
 
 def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
     """A panel for each column, under its name."""
-    return tuple(_curve_panel(label, (column, label, "actual")) for column, label in named)
-
-
-def read_series(
-    path: Path,
-    columns: Sequence[str],
-    window_s: tuple[float, float] = WHOLE_FLIGHT_S,
-    max_points: int = MAX_CURVE_POINTS,
-) -> ValuesOfColumns:
-    """What `series_of` makes of the log in a parquet file."""
-    return series_of(log.StoredLog(path), columns, window_s, max_points)
+    return tuple(_panel(label, (column, label, "actual")) for column, label in named)
 
 
 def series_of(
-    source: log.Log, columns: Sequence[str], window_s: tuple[float, float], max_points: int = MAX_CURVE_POINTS
+    source: log.Log,
+    columns: Sequence[str],
+    window_s: tuple[float, float] = WHOLE_FLIGHT_S,
+    max_points: int = MAX_CURVE_POINTS,
 ) -> ValuesOfColumns:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
@@ -459,11 +440,10 @@ def series_of(
     lowest value and the highest in the order in which they occur, so that no peak is lost.
     """
     wanted = tuple(dict.fromkeys(("t_s", *columns)))
-    frame_s = _frame_s(source)
-    rows = min(source.row_count(), (window_s[1] - window_s[0]) / frame_s)
+    rows = min(source.row_count(), (window_s[1] - window_s[0]) / source.frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
     whole = _unwrap_heading(source.read_chunks(source_columns(wanted)))
-    whole = _add_mean_airspeed(whole, frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
+    whole = _add_mean_airspeed(whole, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
     chunks = (_with_derived_columns(_rows_in_window(chunk, window_s), wanted) for chunk in whole)
     parts = [
         chunk if stretch == 1 else _extremes_by_stretch(chunk, stretch)
@@ -512,12 +492,6 @@ def _residual_over_threshold(chunk: ValuesOfColumns, names: Sequence[str]) -> np
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(residual / bound)
     return np.where(np.isfinite(ratio), ratio, np.nan)
-
-
-def _frame_s(source: log.Log) -> float:
-    """Time from one row to the next, s; infinite in a log of a single row."""
-    first = next(source.read_chunks(["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
-    return float(first[1] - first[0]) if first.size == 2 else math.inf
 
 
 def _rows_in_window(chunk: ValuesOfColumns, window_s: tuple[float, float]) -> ValuesOfColumns:

@@ -14,7 +14,7 @@ from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc_logs.readers import read_flight
-from results.synthetic import Flight
+from results.synthetic import landed
 
 RATE_HZ, FRAMES = 24.0, 60  # of whose microseconds a third is cut or rounded
 TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
@@ -60,7 +60,7 @@ _PLACED = ("longitude", "latitude", "altitude", "roll", "pitch", "yaw")
 
 
 def test_every_property_of_the_tacview_recording(path, columns, tmp_path):
-    write_acmi(path, measure(Flight()), tmp_path / "flight.acmi")
+    write_acmi(path, measure(landed()), tmp_path / "flight.acmi")
     found = {}
     for line in (tmp_path / "flight.acmi").read_text().splitlines():
         if line.startswith("b1,T="):

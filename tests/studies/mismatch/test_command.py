@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import commands
-from beaver_ftc.results.log import read
+from beaver_ftc.results.log import StoredLog
 from beaver_ftc.studies.mismatch import study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.study import VARIANTS, variant_of
@@ -51,7 +51,7 @@ def test_the_document_has_every_source_of_every_axis(flown_folder):
 
 def test_the_document_agrees_with_the_frames_file(flown_folder):
     folder, found = flown_folder
-    frames = read(folder / "out" / "short" / "mismatch.parquet")
+    frames = StoredLog(folder / "out" / "short" / "mismatch.parquet").read()
     for axis in "pqr":
         total = frames[f"{axis}_total_rad_s2"]
         parts = sum(frames[f"{axis}_{name}_rad_s2"] for name in (*SOURCES, "unexplained"))

@@ -173,10 +173,10 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
 def _draw(axes: Any, folder: Path, label: str) -> None:
     import numpy as np
 
-    from beaver_ftc.results.log import read
+    from beaver_ftc.results.log import StoredLog
 
     names = ["t_s", *(f"{a}_{what}_rad_s" for a in AXES for what in ("model", "measured"))]
-    log = read(folder / "log.parquet", names)
+    log = StoredLog(folder / "log.parquet").read(names)
     every = max(1, len(log["t_s"]) // 20_000)
     for axis, letter in zip(axes, AXES, strict=True):
         error = np.degrees(log[f"{letter}_model_rad_s"] - log[f"{letter}_measured_rad_s"])

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
-from beaver_ftc.results.views import read_series
+from beaver_ftc.results.views import series_of
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES
@@ -64,7 +65,7 @@ def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "
     """The largest sources and what they add up to without the fault, over the bound, per axis."""
     chosen = {axis: largest_sources(found, axis) for axis in AXES}
     names = {axis: [TOTAL, FAULT, ETA_BAR, *chosen[axis]] for axis in AXES}
-    series = read_series(frames, [column(axis, name) for axis in AXES for name in names[axis]])
+    series = series_of(StoredLog(frames), [column(axis, name) for axis in AXES for name in names[axis]])
     title = f"Truth less design: what it is made of, faults aside\n{found['scenario']}"
     figure, grid = panels(3, 1, 11.0, 8.0, title, sharex=True)
     for axis, axes in zip(AXES, grid.flat, strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
+from beaver_ftc.results.log import ParquetLog, StoredLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
@@ -225,7 +225,8 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 def tally_of_log(scenario: Scenario, log: Path, frames: Path) -> Tally:
     """Split a log, a row group at a time; every frame goes to `frames`."""
-    chunks = read_chunks(log, [name for name in column_names(log) if name in LOGGED])
+    stored = StoredLog(log)
+    chunks = stored.read_chunks([name for name in stored.columns if name in LOGGED])
     return Tally.of(scenario, _written(split(scenario, chunks), frames))
 
 

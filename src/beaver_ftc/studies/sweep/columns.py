@@ -125,14 +125,4 @@ def getter_of(name: str) -> Getter:
     """What a column says of a flight; None where a section on the way to it is."""
     if name in _ELSEWHERE:
         return _ELSEWHERE[name][1]
-    path = name.split(".")
-
-    def get(found: Metrics, flight: "Landing") -> Any:
-        here: Any = found
-        for part in path:
-            if here is None:
-                break
-            here = here.get(part) if isinstance(here, dict) else getattr(here, part)
-        return here
-
-    return get
+    return lambda found, flight: found.at(name)

@@ -1,0 +1,208 @@
+"""What a scenario expects of its flight (`expect:`), held against the metrics and said in words: a row a key.
+
+Where the quantity does not exist (nothing was detected, say) the expectation fails. A name that was given
+before its fault began meets none. If an expectation of the diagnosis is not met because of that, because the
+name was withdrawn, or because there were frames in which nothing could be concluded, the reason is given.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from beaver_ftc.results.model import Expectation, Metrics
+from beaver_ftc.scenario.declared import OF_DIAGNOSIS, in_words
+
+
+class Rule(NamedTuple):
+    """Where the metrics have what an expectation is of, and how both are said."""
+
+    path: str
+    words: tuple[str, ...]
+
+    def actual(self, expected: Any, metrics: Metrics) -> Any:
+        """What was found; of several names, which a list expects, those given in flight."""
+        found = metrics.at("isolation.names" if isinstance(expected, list) else self.path)
+        return list(found) if isinstance(found, tuple) else found
+
+    def is_met(self, actual: Any, expected: Any) -> bool:
+        """Whether that will do."""
+        return bool(actual == expected)
+
+    def texts(self, said: Expectation) -> tuple[str, str]:
+        """What is expected, and what came out, if that adds anything."""
+        is_as_expected = said.passed and said.actual == said.expected
+        return f"{self.words[0]} {value_text(said.expected)}", "" if is_as_expected else value_text(
+            said.actual
+        )
+
+
+class Among(Rule):
+    """A type, among candidates."""
+
+    def is_met(self, actual: Any, expected: Any) -> bool:
+        """Whether one of them is of the type."""
+        return any(expected == candidate.rpartition(":")[2] for candidate in actual)
+
+
+class Limit(Rule):
+    """A size that is not to be exceeded, on either side. words: quantity and unit."""
+
+    def is_met(self, actual: Any, expected: Any) -> bool:
+        """Whether it is known, and within the limit."""
+        return actual is not None and abs(actual) <= expected
+
+    def texts(self, said: Expectation) -> tuple[str, str]:
+        """The limit, and the size with its share of it."""
+        quantity, unit = self.words
+        share = _share_of_limit(said)
+        of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
+        actual = value_text(said.actual) + ("" if said.actual is None else f" {unit}{of_limit}")
+        return f"{quantity} ≤ {value_text(said.expected)} {unit}", actual
+
+
+class Flag(Rule):
+    """Whether something is so. words: of true, and of false."""
+
+    def texts(self, said: Expectation) -> tuple[str, str]:
+        """What is expected, and what came out if that is the opposite."""
+        is_as_expected = said.passed or said.actual is None
+        return self.words[not said.expected], "" if is_as_expected else self.words[not said.actual]
+
+
+class Absence(Flag):
+    """Whether something is not there."""
+
+    def actual(self, expected: Any, metrics: Metrics) -> bool:
+        """Whether there is none."""
+        return not metrics.at(self.path)
+
+
+RULES: dict[str, Rule] = {
+    "detected_within_s": Limit("detection.delay_s", ("detection delay", "s")),
+    "isolated_within_s": Limit("isolation.delay_s", ("isolation delay", "s")),
+    "isolated_as": Rule("isolation.fault", ("isolated fault",)),
+    "isolated_type": Rule("isolation.type", ("fault type",)),
+    "candidate_type": Among("isolation.candidates", ("possible fault types include",)),
+    "no_false_alarm": Absence("false_alarm", ("no false alarm", "a false alarm")),
+    "no_departure": Absence("departure", ("no departure", "a departure")),
+    "stays_in_envelope": Absence("envelope.exits", ("stays in the envelope", "leaves the envelope")),
+    "altitude_within_m": Limit("profile.altitude_m", ("altitude deviation", "m")),
+    "airspeed_within_mps": Limit("profile.airspeed_mps", ("airspeed deviation (10 s mean)", "m/s")),
+    "airspeed_within_limits_mps": Limit(
+        "profile.airspeed_limited_mps", ("deviation from the limited airspeed (10 s mean)", "m/s")
+    ),
+    "heading_within_deg": Limit("profile.heading_deg", ("heading deviation", "deg")),
+    "arrives.altitude_m": Limit("arrival.altitude_m", ("altitude deviation at the end", "m")),
+    "arrives.airspeed_mps": Limit("arrival.airspeed_mps", ("airspeed deviation at the end", "m/s")),
+    "arrives.heading_deg": Limit("arrival.heading_deg", ("heading deviation at the end", "deg")),
+    "arrives.in_envelope": Flag(
+        "arrival.in_envelope", ("inside the envelope at the end", "outside the envelope at the end")
+    ),
+    **{
+        f"{key}.{axis}": Limit(f"tracking.{key}.{axis}", (f"{name} rate RMS {when} the fault", "deg/s"))
+        for key, when in (("pre_fault_rms_deg_s", "before"), ("post_fault_rms_deg_s", "after"))
+        for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
+    },
+}
+
+
+def evaluate(expect: Any, metrics: Metrics) -> list[Expectation]:
+    """One record for each expectation set in `expect`, in its fields' order; with `reason`, where one is
+    known."""
+    return [_judged(name, expected, metrics) for name, expected in _expected(expect)]
+
+
+def expectation_names(expect: Any) -> list[str]:
+    """The names of what a scenario expects, as in `evaluate`."""
+    return [name for name, _ in _expected(expect)]
+
+
+def _expected(expect: Any) -> Iterator[tuple[str, Any]]:
+    for name, expected in expect.model_dump(exclude_none=True).items() if expect else ():
+        if isinstance(expected, dict):
+            yield from ((f"{name}.{part}", limit) for part, limit in expected.items())
+        else:
+            yield name, list(expected) if isinstance(expected, tuple) else expected
+
+
+def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
+    rule = RULES[name]
+    actual = rule.actual(expected, metrics)
+    of_one_name = rule.path.startswith("isolation.") and not isinstance(expected, list)
+    early = of_one_name and bool(metrics.at("isolation.premature"))  # a list holds none that is premature
+    passed = rule.is_met(actual, expected) and not early
+    why = "" if passed or name not in OF_DIAGNOSIS else _reason_not_met(expected, early, metrics)
+    return Expectation(name, passed, expected, actual, reason=why or None)
+
+
+def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
+    """Why what was expected of the diagnosis is not met, if it is known."""
+    detection, isolation = metrics.detection, metrics.isolation
+    if early:
+        return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
+    gone = [one for one in (isolation.withdrawn if isolation else ()) if one.fault == expected]
+    if gone:
+        last = gone[-1]
+        return f"{expected} was named at {last.from_s:g} s, and the name withdrawn at {last.to_s:g} s"
+    inconclusive = detection and detection.inconclusive
+    return in_words(inconclusive.document()) if inconclusive else ""
+
+
+def margin(found: Expectation) -> float | None:
+    """How far inside its limit an expectation is, in the limit's unit and below 0 where it is not met; None
+    where the expectation has no size, or the quantity does not exist."""
+    expected, actual = found.expected, found.actual
+    if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
+        return None
+    return float(expected - abs(actual))
+
+
+class ExpectationInWords(NamedTuple):
+    """An expectation compared with the flight.
+
+    limit: what is expected. actual: what the flight gave, empty if it adds nothing. share_of_limit: actual
+    over limit, None if the expectation is no limit.
+    """
+
+    name: str
+    limit: str
+    actual: str
+    passed: bool
+    share_of_limit: float | None
+
+    @property
+    def sentence(self) -> str:
+        """Expected and actual in one line."""
+        return f"{self.limit}, got {self.actual}" if self.actual else self.limit
+
+
+def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
+    """Each expectation in words."""
+    return [_in_words(found) for found in metrics.expectations]
+
+
+def _in_words(said: Expectation) -> ExpectationInWords:
+    rule = RULES.get(said.name) or Rule("", (said.name.replace("_", " "),))
+    limit, actual = rule.texts(said)
+    reason = said.reason if actual or not said.passed else ""
+    share = _share_of_limit(said) if isinstance(rule, Limit) else None
+    return ExpectationInWords(said.name, limit, "; ".join(filter(None, (actual, reason))), said.passed, share)
+
+
+def _share_of_limit(said: Expectation) -> float | None:
+    return abs(float(said.actual)) / said.expected if said.expected and said.actual is not None else None
+
+
+def value_text(value: Any) -> str:
+    """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
+    if value is None or value == ():
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return ", ".join(value_text(entry) for entry in value)
+    return value if isinstance(value, str) else three_digits(value)
+
+
+def three_digits(value: float) -> str:
+    """A number of three significant digits, without an exponent below a million: 1230, not 1.23e+03."""
+    return f"{float(f'{value:.3g}'):g}"

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc_assurance.certificates import chance, check_certificate, courses
+from beaver_ftc_assurance.certificates import check_certificate, courses
+from beaver_ftc_assurance.certificates.chance import LikelihoodRatio
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form
 from telling import numbers
 
@@ -117,27 +118,24 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     """Of two axes with everything: sums, and the room of a bounded drift, by its pace or as it swings."""
     n, count, dt, first = 2, 6, 0.02, 3
     nu = numbers(first + count, 3, seed=1)
-    lists = {
+    inputs = {
         "signature": numbers(count, n, seed=2), "jitter": abs(numbers(count, n, seed=3)) * 1e-4,
-        "drift": [np.diag(row) for row in abs(numbers(count, n, seed=4)) * 1e-3],
+        "drift": np.array([np.diag(row) for row in abs(numbers(count, n, seed=4)) * 1e-3]),
         "bounded": abs(numbers(count, n, seed=5)), "foreseen": numbers(count, n, seed=6),
         "known": numbers(count, 1, n, seed=7), "air": numbers(count, n, seed=8) * 0.1,
+        "pace": np.full(count, pace), "keep": np.full(count, keep),
     }  # fmt: skip
-    frames = [
-        {name: np.asarray(of[k]).tolist() for name, of in lists.items()} | {"pace": pace, "keep": keep}
-        for k in range(count)
-    ]
     half = numbers(4, 4, seed=9)
-    said = {
-        "axes": [0, 2], "first": first, "tolerance": [0.3], "frames": frames, "R": [0.5, 0.7],
-        "P": (half @ half.T).tolist(), "Y": numbers(4, 3, seed=10).tolist(),
-    }  # fmt: skip
-    history = SimpleNamespace(dt=dt, innovation=lambda rows: nu[rows])
-    ours = chance._run_filter(said, chance._filter_inputs(said, history), *chance._variances(said))
-    sums, room = check_certificate.whitened_sums(said, SimpleNamespace(dt=dt, innovation_rad_s2=nu))
-    np.testing.assert_allclose(sums, [*ours.totals, ours.calm_prediction], rtol=1e-7)
-    assert room == pytest.approx(min(ours.room_by_swings, ours.room_by_change_rate), rel=1e-6)
-    assert (ours.room_by_change_rate < ours.room_by_swings) == (pace < 1.0)
+    ours = LikelihoodRatio(
+        level=5.0, axes=[0, 2], sense="either", tolerance=np.array([0.3]), R=np.array([0.5, 0.7]),
+        P=half @ half.T, Y=numbers(4, 3, seed=10), first=first, frames=inputs, dt=dt,
+        innovation=nu[first:, [0, 2]],
+    )  # fmt: skip
+    totals, calm, ours_room = ours.sums()
+    frames = SimpleNamespace(dt=dt, innovation_rad_s2=nu)
+    sums, room = check_certificate.whitened_sums(ours.fields, frames)
+    np.testing.assert_allclose(sums, [*totals, calm], rtol=1e-7)
+    assert room == pytest.approx(ours_room, rel=1e-6)
 
 
 def test_the_page_lists_the_fields_that_the_checker_accepts():

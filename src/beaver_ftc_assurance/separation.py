@@ -32,13 +32,9 @@ from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc.studies import DOUBLET_COLUMNS
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged_columns
-from beaver_ftc_assurance.certificates.inequality import (
-    History,
-    Hypothesis,
-    declared_errors_of,
-    theta_bounds_by_frame,
-)
-from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, is_unexplained_by_health
+from beaver_ftc_assurance.certificates.history import History, declared_errors_of
+from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
@@ -254,7 +250,7 @@ def _radians(ends: Sequence[float]) -> tuple[float, float]:
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     """Every fault that is left and stays as it is, with what is known of its parameter."""
     frames = np.arange(_alarm(tape), tape.end)
-    shown = frames[is_unexplained_by_health(history, frames)]
+    shown = frames[history.is_unexplained(frames)]
     if tape.last.diagnosis.isolated_estimator == UNANTICIPATED or not len(shown):
         return
     for s, kind in _left(tape):

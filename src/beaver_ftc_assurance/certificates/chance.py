@@ -4,7 +4,7 @@ docs/explanation/statistical.md derives it. Columns that the log does not have a
 frame: signature, regressors of declared constants, variances.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan, sqrt
 
@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.detection import (
     whiten_frame,
 )
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
-from beaver_ftc_assurance.certificates.inequality import Document, History
+from beaver_ftc_assurance.certificates.history import Document, History
 from beaver_ftc_assurance.certificates.tape import Tape
 
 LOGGED_SCORE_TOLERANCE = 1e-5  # relative; more than all that a certificate leaves out changes the score by
@@ -41,8 +41,13 @@ EXCLUSION_NOT_STATED = (
 ALARM_NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 
 
-def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: int) -> Document | None:
-    """The statement that chance raised the alarm at row k; None where it is not one onset's, or too old."""
+def alarm_evidence(
+    tape: Tape, history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
+) -> Document | None:
+    """The evidence by which chance raised the alarm at row k; None where it is not one onset's, or too old.
+
+    The share of the level that the log has, `rows`, is as large, or larger where another view has more.
+    """
     diagnosis = tape.alarm.diagnosis
     b, h = _largest_score(diagnosis.statistical_filters)
     block = diagnosis.statistical_filters[b]
@@ -57,7 +62,9 @@ def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: in
     value, limit = ratio.sides
     if not (value > limit and abs(value / limit - score) <= LOGGED_SCORE_TOLERANCE * score):
         return None
-    return {"likelihood": _share_column(hypothesis, surfaces), **ratio.fields, "sides": [[value], [limit]]}
+    column = _share_column(hypothesis, surfaces)
+    logged = float(rows[column][k]) * (1.0 + LOGGED_SCORE_TOLERANCE)
+    return {"likelihood": column, **ratio.fields, "sides": [[value, logged], [limit, value / limit]]}
 
 
 def alarm_excludes(tape: Tape, e: int, alarm: Document) -> bool:
@@ -67,12 +74,6 @@ def alarm_excludes(tape: Tape, e: int, alarm: Document) -> bool:
     here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
     moved = [values[here, e][:, alarm["axes"]].any() for values in (tape.slope, tape.offset, tape.spread)]
     return not any(moved)
-
-
-def with_logged_share(said: Document, logged: float) -> Document:
-    """The statement with the share that the log has: as large, or larger where another view has more."""
-    (value,), (limit,) = said["sides"]
-    return said | {"sides": [[value, logged * (1.0 + LOGGED_SCORE_TOLERANCE)], [limit, value / limit]]}
 
 
 def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:
@@ -261,7 +262,7 @@ def _likelihood_ratio(
     Y = np.array([state, np.zeros(2 * n), *before[0]]).T
     xx, xd, dd = (of[name][0][np.ix_(felt, felt)] for name in ("P_xx", "P_xd", "P_dd"))
     P = np.block([[xx, xd], [xd.T, dd]])
-    innovation = history.innovation(slice(rows[0], rows[-1] + 1))[:, axes]
+    innovation = history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes]
     return LikelihoodRatio(
         level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",
         tolerance=block.regressor_coefficient_error_bound[known], R=of["R_y"][0, felt],

@@ -16,13 +16,9 @@ import numpy as np
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis import Actuator, FaultTypesConfig
 from beaver_ftc.scenario import Scenario
-from beaver_ftc_assurance.certificates.inequality import (
-    Document,
-    History,
-    Hypothesis,
-    theta_bounds_by_frame,
-)
-from beaver_ftc_assurance.certificates.kinds import is_unexplained_by_health
+from beaver_ftc_assurance.certificates.history import Document, History
+from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.kinds import hypothesis_held_anywhere
 from beaver_ftc_assurance.certificates.tape import Tape
 
 MIN_POSITION_DIFFERENCE_RAD = 1e-9  # two positions that differ by less are not compared
@@ -217,19 +213,11 @@ RULES: dict[str, Callable[[SurfaceBounds, Actuator, FaultTypesConfig], Iterator[
 }  # fmt: skip
 
 
-def statement_by_course(
-    scenario: Scenario,
-    tape: Tape,
-    history: History,
-    held: Hypothesis,
-    surface: int,
-    fault_type: int,
-    alarm_frame: int,
+def evidence(
+    scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
 ) -> Document | None:
-    """The statement that excludes a fault type on a surface by its course; None where single frames do not.
-
-    held: the hypothesis that the surface is held at a position theta, rad, by which frames bound it.
-    """
+    """What excludes a fault type on a surface by its course; None where single frames do not."""
+    held = hypothesis_held_anywhere(tape, surface)
     diagnosis = tape.last.diagnosis
     direction, actuator = (
         TYPES[fault_type].stop_direction,
@@ -240,7 +228,7 @@ def statement_by_course(
     for sign in (direction,) if direction else (1, -1):
         bounds = _surface_bounds(tape, history, held, surface, alarm_frame, sign, slowest_rad_s)
         for found in rule(bounds, actuator, diagnosis.types_config):
-            return _statement(found, bounds, held)
+            return history.statement_fields | _statement(found, bounds, held)
     return None
 
 
@@ -256,7 +244,7 @@ def _surface_bounds(
     """The bounds of the frames from the alarm on that the diagnosis has tested types with."""
     frames = np.arange(alarm_frame, tape.end - 1)
     here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
-    single_instant = history.instant_share == 1.0
+    single_instant = history.has_single_instants
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)
     if sign < 0:
         lower, upper = -upper, -lower
@@ -272,7 +260,7 @@ def _surface_bounds(
     max_order = np.maximum(
         orders[next_frames, surface, 2], orders[next_frames, surface, 2 if single_instant else 1]
     )
-    is_unexplained = is_unexplained_by_health(history, frames)
+    is_unexplained = history.is_unexplained(frames)
     return SurfaceBounds(
         alarm_frame, sign, lower, upper, command, axis_commands, command_range, is_unexplained, max_order,
         stops, slowest_rad_s,

@@ -12,7 +12,7 @@ from beaver_ftc.results import Columns, Log, MemoryLog, Proof
 from beaver_ftc.scenario import Scenario, to_yaml
 from beaver_ftc_assurance.certificates import certificate, chance
 from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
-from beaver_ftc_assurance.certificates.inequality import Document
+from beaver_ftc_assurance.certificates.history import Document
 from beaver_ftc_assurance.certificates.tape import Recorder
 
 

@@ -149,12 +149,12 @@ def test_the_page_lists_the_fields_that_the_checker_accepts():
 def test_an_oscillation_is_excluded_once_one_side_lasts_longer_than_half_of_its_period():
     """Half a period of 0.3 s is 3 frames: beyond the command by 0.05 rad and more from the third frame on."""
     lower = np.where(np.arange(10) >= 3, 0.12 + 0.01 * np.arange(10), 0.0)
-    bounds = SimpleNamespace(
-        lower=np.column_stack([lower, np.zeros(10)]), command=np.full(10, 0.1),
-        slowest_oscillation_rad_s=pi / 0.3, is_unexplained=np.ones(10, bool),
+    bounds = courses.SurfaceBounds(
+        first_frame=0, sign=1, lower=np.column_stack([lower, np.zeros(10)]), upper=lower,
+        command=np.full(10, 0.1), axis_commands=lower, command_range=lower,
+        is_unexplained=np.ones(10, bool), max_order=lower, stops=lower,
     )  # fmt: skip
-    config = SimpleNamespace(half_blocks=3, dt_s=0.1)
-    (found,) = courses.RULES["swing"](bounds, None, config)
+    found = courses.RULES["swing"](bounds, None, SimpleNamespace(half_blocks=3, dt_s=0.1), pi / 0.3)
     assert list(found.lower_frames) == [3, 4, 5, 6, 7]
     beyond = [0.05, 0.06, 0.07, 0.08, 0.09]
     assert np.array(found.pairs) == pytest.approx(np.array([(4, 3.0), (0.05, 0.0), (sum(beyond), 0.0)]))

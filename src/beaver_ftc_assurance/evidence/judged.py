@@ -86,8 +86,7 @@ def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Ro
 
 
 def _counts(verdicts: Iterable[str]) -> dict[str, int]:
-    found = Counter(verdicts)
-    return {said: found[said] for said in (MET, NOT_MET, NOT_SHOWN)}
+    return dict.fromkeys((MET, NOT_MET, NOT_SHOWN), 0) | Counter(verdicts)
 
 
 def _asked(requirement: Requirement) -> Document:
@@ -159,12 +158,14 @@ def _worst(flights: Flights, name: str) -> int:
         "departure_rate": lambda: flights.departed,
         "failure_rate": lambda: ~flights.measured,
         "pass_rate": lambda: ~flights["passed"],
-        "detection_delay_s": lambda: np.where(flights.faulted, flights.detection_delay_s, -np.inf),
-        "isolation_delay_s": lambda: np.where(flights.faulted, flights.isolation_delay_s, -np.inf),
         "post_fault_rms_deg_s": lambda: flights.post_fault_rms_deg_s(axis),
         "tracking_ratio": lambda: flights.tracking_ratio(axis),
     }
-    bad = np.nan_to_num(against[quantity]().astype(float), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+    if quantity.endswith("_delay_s"):
+        bad = np.where(flights.faulted, getattr(flights, quantity), -np.inf)
+    else:
+        bad = against[quantity]().astype(float)
+    bad = np.nan_to_num(bad, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
     return int(flights["run"][np.argmax(bad)])
 
 

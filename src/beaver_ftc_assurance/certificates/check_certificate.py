@@ -796,6 +796,17 @@ def instrument_sides(said, log):
 # --- 10. All statements ----------------------------------------------------------------------------------
 
 
+def pairs_of(said, frames, declared):
+    """Pairs (what must be more, than what) of a statement's evidence."""
+    if "terms" in said:
+        return [sides_of_terms(said, frames, declared)]
+    if "bounds" in said:
+        return course_pairs(said, frames, declared)
+    if "likelihood" in said:
+        return likelihood_pairs(said, frames, declared)
+    return [instrument_sides(said, frames.log)]
+
+
 def check_statement(said, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
     check_statement_form(said)
@@ -804,14 +815,7 @@ def check_statement(said, document, log, declared):
     if kind == "as":
         check_exclusion_by_alarm(said, document, frames)
         return
-    if kind == "terms":
-        pairs = [sides_of_terms(said, frames, declared)]
-    elif kind == "bounds":
-        pairs = course_pairs(said, frames, declared)
-    elif kind == "likelihood":
-        pairs = likelihood_pairs(said, frames, declared)
-    else:
-        pairs = [instrument_sides(said, log)]
+    pairs = pairs_of(said, frames, declared)
     stated = said["sides"] if kind in ("bounds", "likelihood") else [[side] for side in said["sides"]]
     sides = np.array(pairs, float).T
     require(np.isfinite(sides).all() and sides.shape == np.shape(stated), "the sides are no numbers")

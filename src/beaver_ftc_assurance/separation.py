@@ -62,11 +62,8 @@ class Candidate:
 
     def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
-        relation = RELATIONS[self.kind]
-        by_share, by_angle = float(relation.theta_is_share), float(not relation.theta_is_share)
-        ends = [
-            (relation.command_gain + by_share * end) * u + by_angle * end for end in (self.low, self.high)
-        ]
+        gain, is_share, _ = RELATIONS[self.kind]
+        ends = [(gain + end) * u if is_share else gain * u + end for end in (self.low, self.high)]
         return np.minimum(*ends), np.maximum(*ends)
 
     def off(self, u: np.ndarray) -> np.ndarray:
@@ -231,20 +228,15 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
     bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
-    coupled = declared.inertia_coupling * rate**2
+    coupled, (least_deg, most_deg) = declared.inertia_coupling * rate**2, aircraft.envelope.alpha_deg
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
         bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
-        alpha=frame.alpha_rad, alpha_range=_radians(aircraft.envelope.alpha_deg),
+        alpha=frame.alpha_rad, alpha_range=(radians(least_deg), radians(most_deg)),
     )  # fmt: skip
-
-
-def _radians(ends: Sequence[float]) -> tuple[float, float]:
-    low, high = ends
-    return radians(low), radians(high)
 
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
@@ -303,8 +295,7 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
     targets: dict[int, float] = {}
     needs: Document = {}
     if one.surface == other.surface and at.in_blocks:
-        because = "with noisy gyros types are told by blocks of frames, not by one"
-        return {"separates": False, "because": because, "needs": needs}
+        return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
     if one.surface == other.surface:
         asked = [(one.surface, *_types_apart(one, other, at))]
     else:
@@ -312,12 +303,12 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
     for s, target, numbers in asked:
         needs[names[s]] = numbers
         if target is None:
-            return {"separates": False, "because": numbers["because"], "needs": needs}
+            return _none(numbers["because"], needs)
         targets[s] = target
     found = doublet(targets, at)
     if found is None:
         says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
-        return {"separates": False, "because": f"{says} and the angle of attack in its range", "needs": needs}
+        return _none(f"{says} and the angle of attack in its range", needs)
     commands, tells = found
     return {
         "separates": True,
@@ -327,6 +318,10 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
         "needs": needs,
         "commands_rad": {names[s]: commands[:, s].tolist() for s in targets},
     }
+
+
+def _none(because: str, needs: Document) -> Document:
+    return {"separates": False, "because": because, "needs": needs}
 
 
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
@@ -420,8 +415,8 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
-    n, there = len(surfaces), np.arange(tells - 1, tells + at.held - 1)
-    every, equal, above = np.arange(frames), _Rows(frames), _Rows(frames)
+    n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
+    equal, above = _Rows(2 * n + 4, frames), _Rows(2 * n + 4, frames)
     turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
     stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
     for j, s in enumerate(surfaces):
@@ -440,8 +435,7 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
             row |= {k: -at.dt * g * v for k, v in moved.items() if g}
     for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
         equal.add(every, row)
-    angles = np.subtract(at.alpha_range, at.alpha)
-    ends = [*stops, *[(-inf, inf)] * n, *rates, angles]
+    ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
     bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
     found = _solved(equal, above, bounds)
@@ -455,10 +449,10 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
 class _Rows:
     """Rows of a linear programme over blocks of unknowns, of so many frames each, and an amplitude after."""
 
-    def __init__(self, frames: int) -> None:
-        self.frames, self.height = frames, 0
-        self.parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self.limits: list[np.ndarray] = []
+    def __init__(self, blocks: int, frames: int) -> None:
+        self._blocks, self._frames = blocks, frames
+        self._parts: list[Any] = []
+        self._limits: list[np.ndarray] = []
 
     def add(
         self,
@@ -469,35 +463,29 @@ class _Rows:
     ) -> None:
         """A row for each of these frames: of (block, lag) the weight of the unknown so many frames from it,
         0 before the first; and of the amplitude."""
-        rows = self.height + np.arange(len(at))
+        from scipy.sparse import csr_array, eye_array, hstack
+
+        parts = [csr_array((len(at), self._frames))] * self._blocks
         for (block, lag), weight in weights.items():
-            there = at + lag >= 0
-            columns = block * self.frames + (at + lag)[there]
-            self.parts.append((rows[there], columns, np.full(len(columns), weight)))
-        if amplitude:
-            self.parts.append((rows, np.full(len(at), -1), np.full(len(at), amplitude)))
-        self.height += len(at)
-        self.limits.append(np.full(len(at), limit))
+            parts[block] = parts[block] + weight * eye_array(self._frames, k=lag, format="csr")[at]
+        self._parts.append(hstack([*parts, csr_array(np.full((len(at), 1), amplitude))]))
+        self._limits.append(np.full(len(at), limit))
 
-    def matrix(self, width: int) -> Any:
-        """All of them, sparse."""
-        from scipy.sparse import csc_array
+    @property
+    def system(self) -> tuple[Any, np.ndarray]:
+        """Matrix, sparse, and limits of all of them."""
+        from scipy.sparse import vstack
 
-        rows, columns, values = (np.concatenate(part) for part in zip(*self.parts, strict=True))
-        return csc_array((values, (rows, columns % width)), shape=(self.height, width))
+        return vstack(self._parts, format="csc"), np.concatenate(self._limits)
 
 
 def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
     """The unknowns with the least amplitude; None where there are none within the limits."""
     from scipy.optimize import linprog
 
-    width = len(bounds)
-    weight = np.r_[np.zeros(width - 1), 1.0]
+    weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
     for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
-        result = linprog(
-            weight, above.matrix(width), np.concatenate(above.limits),
-            equal.matrix(width), np.concatenate(equal.limits), bounds, method=method,
-        )  # fmt: skip
+        result = linprog(weight, *above.system, *equal.system, bounds, method=method)
         if result.status in (0, 2):
             break
     return np.asarray(result.x) if result.status == 0 else None

@@ -18,6 +18,7 @@ from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargi
 
 Row = dict[str, Any]
 MET, NOT_MET, NOT_SHOWN = "met", "not met", "not shown"
+WORST_FIRST = NOT_MET, NOT_SHOWN, MET
 BANDS = 3  # of airspeed
 ALTITUDES_M = (1000.0, 2000.0)  # between two bands
 _ALWAYS_WATCHED = ("t_s", "airspeed_mps", "altitude_m", "envelope_valid")

@@ -630,7 +630,9 @@ def course_pairs(said, frames, declared):
     effect, surface = effect_of_fault(said["what"], frames), said["what"].partition(" ")[0]
     comparison, stop = course_of(said["what"], frames.log) or (None, 0)
     require(comparison is not None, "this is no type with a course")
-    low, high, signs = {}, {}, set()
+    low: dict = {}
+    high: dict = {}
+    signs = set()
     for bound in said["bounds"]:
         for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
             theta, command, sign = position_bound(bound, place, k, frames, effect)

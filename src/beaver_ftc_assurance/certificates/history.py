@@ -158,7 +158,7 @@ class History:
             return _by_axis(gyro | {name: [] for name in "cbg"})
         added = of.inertia_coupling * self.products()[rows - 1] * (1.0 / self.instants)
         decides = (added > ROUNDING_SHARE * self.eta_bar[rows]).any(axis=0)
-        gain = of.earth_gain if of.earth_rad_s else []
+        gain = of.earth_gain if of.earth_rad_s else np.empty(0)
         return _by_axis(gyro | {"c": of.inertia_coupling * decides, "b": of.constant_rad_s2, "g": gain})
 
 

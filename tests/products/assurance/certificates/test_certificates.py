@@ -22,7 +22,7 @@ from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
 from beaver_ftc_assurance.certificates import check_certificate
 from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
-from beaver_ftc_assurance.certificates.check_certificate import failures
+from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form, failures
 from flying import SINES
 from samples import samples
 
@@ -283,6 +283,33 @@ REFUSED = [
     ("an altimeter", None, {"looks.0.2": -2.0}, "looks: a bound is below zero"),
     ("an altimeter", None, {"test": "V"}, "the log has another test in this row"),
     ("chance", None, {"level": -50.0}, "statement: level is not allowed"),
+    ("gyros", "rudder", {"theta": "course"}, "statement: theta is not allowed"),
+    ("gyros", "rudder", {"looks": [[1.0, 2.0, 3.0]]}, "the statement has no evidence, or more than one kind"),
+    ("gyros", "rudder", {"note": "true"}, "statement: the field note is not known"),
+    ("gyros", "document", {"note": "true"}, "certificate: the field note is not known"),
+    ("gyros", "rudder", {"terms.0.note": "true"}, "term: the field note is not known"),
+    ("gyros", "rudder", {"terms.0.d": [0.0, 0.0, 0.0]}, "the direction is zero"),
+    ("gyros", "rudder", {"terms.0.first": 54}, "the frames are not in order"),
+    ("gyros", "rudder", {"terms.0.r": [-0.1] * 16}, "term: r is not allowed"),
+    ("gyros", "rudder", {"terms.0.fault": -0.1}, "term: fault is not allowed"),
+    ("any type", "aileron bias", {"bounds.0.Z.0": 0.0}, "the surface does not act along this direction"),
+    ("any type", "aileron bias", {"bounds": []}, "the evidence is empty"),
+    ("any type", "aileron hardover up", {"pace_rad_s": 0.0}, "statement: pace_rad_s is not allowed"),
+    ("any type", "aileron rate_limit", {"step": -1e-9}, "statement: step is not allowed"),
+    ("chance", None, {"axes": [2, 2]}, "axes: one or two different ones are allowed"),
+    ("chance", None, {"axes": [0, 3]}, "statement: axes is not allowed"),
+    ("chance", None, {"sense": "more"}, "statement: sense is not allowed"),
+    ("chance", None, {"R.0": -1.0}, "statement: R is not allowed"),
+    ("chance", None, {"P.3.0": 0.31}, "P is no covariance"),
+    ("chance", None, {"P.2.2": -1e-9}, "P is no covariance"),
+    ("chance", None, {"first": 0}, "frames are missing"),
+    ("chance", None, {"tolerance": [0.0]}, "statement: tolerance is not allowed"),
+    ("chance", None, {"frames.0.jitter.0": -0.1}, "frame: jitter is not allowed"),
+    ("chance", None, {"frames.1.drift": [[2.0, 0.3], [0.2, 1.0]]}, "drift is no covariance"),
+    ("chance", None, {"frames.0.drift": [[0.1, 0.3], [0.3, 0.1]]}, "drift is no covariance"),
+    ("chance", None, {"frames.0.keep": 1.1}, "frame: keep is not allowed"),
+    ("chance", None, {"frames.1.keep": 0.9}, "the frames have different fields"),
+    ("chance", None, {"frames.0.pace": -0.1}, "frame: pace is not allowed"),
     ("no vane", None, {"frame": 4.5}, "statement: the field frame is missing, or no row"),
     ("no vane", None, {"frame": True}, "statement: the field frame is missing, or no row"),
     ("no vane", None, {"missing": [4]}, "the log says that another reading is missing, or none"),
@@ -291,19 +318,52 @@ REFUSED = [
 ]  # fmt: skip
 
 
+def holder_of(document, place):
+    """What holds a place, its keys with dots between them; and the last key."""
+    *within, last = [int(key) if key.isdigit() else key for key in place.split(".")]
+    return reduce(getitem, within, document), last
+
+
 @pytest.mark.parametrize(("name", "what", "changes", "says"), REFUSED)
 def test_what_is_another_is_refused_in_words(name, what, changes, says):
     certificate, log = flown(name)
     other = copy.deepcopy(certificate)
     found = [other] if what == "document" else [one for one in other["statements"] if one["what"] == what]
     for place, value in changes.items():
-        *within, last = [int(key) if key.isdigit() else key for key in place.split(".")]
-        node = reduce(getitem, within, found[0])
-        node[last] = value(node[last], log) if callable(value) else value
+        node, key = holder_of(found[0], place)
+        node[key] = value(node[key], log) if callable(value) else value
     refused = refusals(name, with_digest(other))
-    assert [why.rpartition(" excluded: ")[2].removeprefix("alarm: ")[: len(says)] for why in refused] == (
-        [says] * bool(says)
-    )
+    whys = [why.rpartition(" excluded: ")[2].removeprefix("alarm: ")[: len(says)] for why in refused]
+    assert whys[:1] == [says] * bool(says)
+
+
+def parts(value, *above):
+    """Each number, text and list of a statement, by its keys."""
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    if above:
+        yield ".".join(map(str, above)), value
+    for key in keys:
+        yield from parts(value[key], *above, key)
+
+
+ANY_LENGTH = {"frames", "looks", "bounds", "stops", "ordered", "sides", "sides.0", "sides.1"}
+
+
+@pytest.mark.parametrize(
+    ("name", "n"), [("substeps", 1), ("any type", 10), ("an altimeter", 0), ("chance", 0)]
+)
+def test_what_has_another_form_anywhere_is_refused(name, n):
+    said = flown(name)[0]["statements"][n] | {"what": "flap"}
+    check_statement_form(said)
+    for place, value in parts(said):
+        others = (3, {}) if isinstance(value, str) else ("text", float("nan"), float("inf"), {})
+        shorter = [value[:-1]] if isinstance(value, list) and place not in ANY_LENGTH else []
+        for other in (*others, *shorter):
+            wrong = copy.deepcopy(said)
+            node, key = holder_of(wrong, place)
+            node[key] = other
+            with pytest.raises((Refused, ValueError)):  # a matrix of uneven rows is none
+                check_statement_form(wrong), (place, other)
 
 
 NOT_TOGETHER = "certificate, log and scenario do not fit together: "

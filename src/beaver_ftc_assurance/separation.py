@@ -31,7 +31,12 @@ from beaver_ftc.results import Document, MemoryLog, result_folder
 from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc.studies import DOUBLET_COLUMNS
 from beaver_ftc_assurance.certificates import proved
-from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged_columns
+from beaver_ftc_assurance.certificates.certificate import (
+    Certified,
+    check_scheme,
+    history_of,
+    logged_columns,
+)
 from beaver_ftc_assurance.certificates.history import History, declared_errors_of
 from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
 from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type
@@ -182,8 +187,8 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
         yield frames + k
 
 
-def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
-    """Log and certificate of the flight with its doublet."""
+def certified(scenario: Scenario, pair: Document) -> Certified:
+    """The certificate of the flight with its doublet."""
     flight = _longer(scenario, pair)
     try:
         return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
@@ -208,7 +213,7 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
         for place, pair in enumerate(document["pairs"]):
             if "left" in pair:
                 (folder / FLOWN / str(place)).mkdir(parents=True)
-                proved.write(scenario, *certified(scenario, pair), folder / FLOWN / str(place))
+                certified(scenario, pair).write(folder / FLOWN / str(place))
         (folder / FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return out / name
 

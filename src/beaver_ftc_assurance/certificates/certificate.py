@@ -49,7 +49,7 @@ from beaver_ftc_assurance.certificates.tape import (
 
 EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE_NAME, FORMAT_VERSION = "certificate.json", 5
+FILE_NAME, LOG_NAME, FORMAT_VERSION = "certificate.json", "log.parquet", 5
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
@@ -60,8 +60,8 @@ ADDING_POLE_PER_S = 0.1  # slow enough for the filter to add up a block
 
 def certificate(
     scenario: Scenario, log: Log, recorder: Recorder | None = None, text: str | None = None
-) -> tuple[Document, EvidenceColumns]:
-    """The certificate of a flight, and the columns that its log needs to prove it.
+) -> "Certified":
+    """The certificate of a flight.
 
     recorder: has kept what the log does not hold; without one the flight is flown again. text: of the file
     scenario.yaml beside the log, if it is not the scenario's own.
@@ -77,7 +77,7 @@ def certificate(
         "rows": n, "statements": [], "without": [],
     }  # fmt: skip
     if not (events := event_rows(rows)):
-        return with_digest(document), {}
+        return Certified(with_digest(document), log, {}, declares)
     known = [events["detected"], *events.values()]
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
@@ -88,7 +88,8 @@ def certificate(
             document["without"].append({name: said[name] for name in ("what", "column", "because")})
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
-    return with_digest(document), flight.evidence_columns(document["statements"])
+    columns = flight.evidence_columns(document["statements"])
+    return Certified(with_digest(document), log, columns, declares)
 
 
 def logged_columns(log: Log) -> Columns:
@@ -147,15 +148,38 @@ class OfRun:
     def write(self, folder: Path) -> None:
         """Write it into the flight's result folder, which has log and scenario; the log gets the columns that
         prove it."""
-        path, text = folder / "log.parquet", (folder / "scenario.yaml").read_text(encoding="utf-8")
-        log = StoredLog(path)
-        document, columns = certificate(self._scenario, log, self._recorder, text)
-        if columns:
-            extended = folder / ".log.parquet"
-            with ParquetLog(extended) as further:
-                copy_with_columns(log, columns, further)
-            extended.replace(path)
-        (folder / FILE_NAME).write_text(as_text(document), encoding="utf-8")
+        text = (folder / "scenario.yaml").read_text(encoding="utf-8")
+        certificate(self._scenario, StoredLog(folder / LOG_NAME), self._recorder, text).write(folder)
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A certificate with all that proves it: the log, the columns that it lacks, the text of its scenario."""
+
+    document: Document
+    log: Log
+    columns: EvidenceColumns
+    scenario: str
+
+    def copy_log(self, to: LogSink) -> None:
+        """Copy the log and the columns that it lacks."""
+        to.open([*self.log.columns, *self.columns])
+        first = 0
+        for chunk in self.log.read_chunks():
+            n = len(chunk["t_s"])
+            further = (one.rows(first, n) for one in self.columns.values())
+            to.write(np.column_stack([*chunk.values(), *further]))
+            first += n
+
+    def write(self, folder: Path) -> None:
+        """Write certificate, log and scenario into a folder."""
+        if self.columns or not (folder / LOG_NAME).exists():
+            extended = folder / f".{LOG_NAME}"
+            with ParquetLog(extended) as log:
+                self.copy_log(log)
+            extended.replace(folder / LOG_NAME)
+        (folder / "scenario.yaml").write_text(self.scenario, encoding="utf-8")
+        (folder / FILE_NAME).write_text(as_text(self.document), encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -174,16 +198,6 @@ class PartialColumn:
         inside = (places >= 0) & (places < len(self.values))
         found[inside] = self.values[places[inside]]
         return found
-
-
-def copy_with_columns(log: Log, columns: EvidenceColumns, to: LogSink) -> None:
-    """Copy a log and these columns."""
-    to.open([*log.columns, *columns])
-    first = 0
-    for chunk in log.read_chunks():
-        n = len(chunk["t_s"])
-        to.write(np.column_stack([*chunk.values(), *(one.rows(first, n) for one in columns.values())]))
-        first += n
 
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:

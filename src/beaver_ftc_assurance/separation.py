@@ -36,10 +36,11 @@ from beaver_ftc_assurance.certificates.certificate import (
     check_scheme,
     history_of,
     logged_columns,
+    row_set_to_end,
 )
 from beaver_ftc_assurance.certificates.history import History, declared_errors_of
 from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
-from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type
+from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_rad
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
@@ -159,7 +160,8 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
             if k == round(scenario.duration_s * scenario.rate_hz) - 1:
                 before = flight.readout.envelope_exits
         at_end, both = flight.readout, zip(candidates, pair["candidates"], strict=True)
-        left = [words for one, words in both if not _is_excluded(one, at_end.diagnosis)]
+        still = {*_left(at_end.diagnosis)}
+        left = [words for one, words in both if (one.surface, one.kind) in still]
         return {"left": left, "envelope_exits": at_end.envelope_exits - before}
     finally:
         flight.release()
@@ -196,15 +198,6 @@ def certified(scenario: Scenario, pair: Document) -> Certified:
         flight.release()
 
 
-def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
-    """Whether a candidate is excluded."""
-    estimators, layout = diagnosis.estimators, diagnosis.layout
-    if not diagnosis.diagnoses_all_types:
-        return estimators[layout.loss_estimator_index_by_surface[one.surface]].is_excluded
-    surface = estimators[layout.position_estimator_index_by_surface[one.surface]].is_excluded
-    return surface or bool(diagnosis.surface_fault_types[one.surface].is_type_excluded[one.kind])
-
-
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
     """Write separation.json into its result folder, and of each doublet that was flown log and certificate,
     flown/PLACE/; returns that."""
@@ -220,13 +213,13 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
 
 def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
     """What the flight has shown since the alarm."""
-    detected = log.rows[:, log.columns.index("detected")] > 0.0
-    clear = np.flatnonzero(~detected)
-    alarm = int(clear[-1]) + 1 if len(clear) else 0
+    rows = logged_columns(log)
+    detected = rows["detected"]
+    alarm = row_set_to_end(detected)
     if alarm >= len(detected) - 1:
         raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
     tape = recorder.tape([alarm, len(detected) - 1], len(detected))
-    return tape, history_of(scenario, logged_columns(log), tape)
+    return tape, history_of(scenario, rows, tape)
 
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
@@ -246,27 +239,23 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     """Every fault that is left and stays as it is, with what is known of its parameter."""
-    frames = np.arange(_alarm(tape), tape.end)
+    last = tape.last.diagnosis
+    frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
     shown = frames[history.is_unexplained(frames)]
-    if tape.last.diagnosis.isolated_estimator == UNANTICIPATED or not len(shown):
+    if last.isolated_estimator == UNANTICIPATED or not len(shown):
         return
-    for s, kind in _left(tape):
-        actuator = tape.last.diagnosis.surface_fault_types[s].actuator
-        low, high = RELATIONS[kind].theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
+    for s, kind in _left(last):
+        if kind not in RELATIONS:
+            continue
+        low, high = RELATIONS[kind].theta_span(*travel_rad(tape, s))
         if low < high:
             low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
         if low <= high:
             yield Candidate(s, kind, low, high)
 
 
-def _alarm(tape: Tape) -> int:
-    """The frame of the alarm."""
-    return round(tape.last.diagnosis.detected_at_s / tape.last.dt_s)
-
-
-def _left(tape: Tape) -> Iterator[tuple[int, int]]:
-    """Surface and type of what is not excluded and stays as it is."""
-    diagnosis = tape.last.diagnosis
+def _left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
+    """Surface and type of what is not excluded."""
     estimators, layout = diagnosis.estimators, diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.diagnoses_all_types:
@@ -274,19 +263,13 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
             if e >= 0 and not estimators[e].is_excluded:
                 yield s, LOSS
         elif not estimators[layout.position_estimator_index_by_surface[s]].is_excluded:
-            yield from ((s, kind) for kind in RELATIONS if not surface.is_type_excluded[kind])
+            yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     """What is left whose course over many frames tells, not a frame."""
-    diagnosis, found = tape.last.diagnosis, []
-    if not diagnosis.diagnoses_all_types:
-        return []
-    for s, surface in enumerate(diagnosis.surface_fault_types):
-        if not diagnosis.estimators[diagnosis.layout.position_estimator_index_by_surface[s]].is_excluded:
-            kinds = np.flatnonzero(~surface.is_type_excluded)
-            found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in RELATIONS]
-    return sorted(set(found))
+    left = _left(tape.last.diagnosis)
+    return sorted(f"{names[s]} {NAMES[kind]}" for s, kind in left if kind not in RELATIONS)
 
 
 def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
@@ -337,7 +320,7 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
-    return _nearest(u, gap > room, s, at, room, "apart, and off their command,", float(gap.max()))
+    return _nearest(u, gap, s, at, room, "apart, and off their command,")
 
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
@@ -347,8 +330,7 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    off = one.off(u)
-    return _nearest(u, off > room, a, at, float(room), "off its command", float(off.max()))
+    return _nearest(u, one.off(u), a, at, float(room), "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -367,14 +349,16 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
 
 
 def _nearest(
-    u: np.ndarray, tells: np.ndarray, s: int, at: Situation, room: float, what: str, most: float
+    u: np.ndarray, off: np.ndarray, s: int, at: Situation, room: float, what: str
 ) -> tuple[float | None, Document]:
-    """Of deflections u that tell, the nearest to the present; and the numbers this rests on."""
+    """Of deflections u that are off by more than room, the nearest to the present; and the numbers this rests
+    on."""
+    most, tells = degrees(off.max()), off > room
     numbers: Document = {"at_least_deg": degrees(room) if np.isfinite(room) else None}
-    numbers |= {"at_most_deg": degrees(most), "now_deg": degrees(at.u[s])}
+    numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
     if not tells.any():
         asked = f"more than {degrees(room):.3g} deg" if np.isfinite(room) else "another direction"
-        says = f"they must be {what} by {asked}, and are by {degrees(most):.3g} deg at most within the travel"
+        says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
         return None, numbers | {"because": says}
     target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}

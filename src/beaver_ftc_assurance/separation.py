@@ -31,14 +31,16 @@ from beaver_ftc.results import Document, MemoryLog, result_folder
 from beaver_ftc.scenario import Declared, Scenario
 from beaver_ftc.studies import DOUBLET_COLUMNS
 from beaver_ftc_assurance.certificates import proved
-from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged_columns
-from beaver_ftc_assurance.certificates.inequality import (
-    History,
-    Hypothesis,
-    declared_errors_of,
-    theta_bounds_by_frame,
+from beaver_ftc_assurance.certificates.certificate import (
+    Certified,
+    check_scheme,
+    history_of,
+    logged_columns,
+    row_set_to_end,
 )
-from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, is_unexplained_by_health
+from beaver_ftc_assurance.certificates.history import History, declared_errors_of
+from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_rad
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
@@ -66,11 +68,8 @@ class Candidate:
 
     def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
-        relation = RELATIONS[self.kind]
-        by_share, by_angle = float(relation.theta_is_share), float(not relation.theta_is_share)
-        ends = [
-            (relation.command_gain + by_share * end) * u + by_angle * end for end in (self.low, self.high)
-        ]
+        gain, is_share, _ = RELATIONS[self.kind]
+        ends = [(gain + end) * u if is_share else gain * u + end for end in (self.low, self.high)]
         return np.minimum(*ends), np.maximum(*ends)
 
     def off(self, u: np.ndarray) -> np.ndarray:
@@ -161,7 +160,8 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
             if k == round(scenario.duration_s * scenario.rate_hz) - 1:
                 before = flight.readout.envelope_exits
         at_end, both = flight.readout, zip(candidates, pair["candidates"], strict=True)
-        left = [words for one, words in both if not _is_excluded(one, at_end.diagnosis)]
+        still = {*_left(at_end.diagnosis)}
+        left = [words for one, words in both if (one.surface, one.kind) in still]
         return {"left": left, "envelope_exits": at_end.envelope_exits - before}
     finally:
         flight.release()
@@ -189,22 +189,13 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
         yield frames + k
 
 
-def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
-    """Log and certificate of the flight with its doublet."""
+def certified(scenario: Scenario, pair: Document) -> Certified:
+    """The certificate of the flight with its doublet."""
     flight = _longer(scenario, pair)
     try:
         return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
     finally:
         flight.release()
-
-
-def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
-    """Whether a candidate is excluded."""
-    estimators, layout = diagnosis.estimators, diagnosis.layout
-    if not diagnosis.diagnoses_all_types:
-        return estimators[layout.loss_estimator_index_by_surface[one.surface]].is_excluded
-    surface = estimators[layout.position_estimator_index_by_surface[one.surface]].is_excluded
-    return surface or bool(diagnosis.surface_fault_types[one.surface].is_type_excluded[one.kind])
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
@@ -215,65 +206,56 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
         for place, pair in enumerate(document["pairs"]):
             if "left" in pair:
                 (folder / FLOWN / str(place)).mkdir(parents=True)
-                proved.write(scenario, *certified(scenario, pair), folder / FLOWN / str(place))
+                certified(scenario, pair).write(folder / FLOWN / str(place))
         (folder / FILE).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return out / name
 
 
 def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
     """What the flight has shown since the alarm."""
-    detected = log.rows[:, log.columns.index("detected")] > 0.0
-    clear = np.flatnonzero(~detected)
-    alarm = int(clear[-1]) + 1 if len(clear) else 0
+    rows = logged_columns(log)
+    detected = rows["detected"]
+    alarm = row_set_to_end(detected)
     if alarm >= len(detected) - 1:
         raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
     tape = recorder.tape([alarm, len(detected) - 1], len(detected))
-    return tape, history_of(scenario, logged_columns(log), tape)
+    return tape, history_of(scenario, rows, tape)
 
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
     bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
-    coupled = declared.inertia_coupling * rate**2
+    coupled, (least_deg, most_deg) = declared.inertia_coupling * rate**2, aircraft.envelope.alpha_deg
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
         bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
-        alpha=frame.alpha_rad, alpha_range=_radians(aircraft.envelope.alpha_deg),
+        alpha=frame.alpha_rad, alpha_range=(radians(least_deg), radians(most_deg)),
     )  # fmt: skip
-
-
-def _radians(ends: Sequence[float]) -> tuple[float, float]:
-    low, high = ends
-    return radians(low), radians(high)
 
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     """Every fault that is left and stays as it is, with what is known of its parameter."""
-    frames = np.arange(_alarm(tape), tape.end)
-    shown = frames[is_unexplained_by_health(history, frames)]
-    if tape.last.diagnosis.isolated_estimator == UNANTICIPATED or not len(shown):
+    last = tape.last.diagnosis
+    frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
+    shown = frames[history.is_unexplained(frames)]
+    if last.isolated_estimator == UNANTICIPATED or not len(shown):
         return
-    for s, kind in _left(tape):
-        actuator = tape.last.diagnosis.surface_fault_types[s].actuator
-        low, high = RELATIONS[kind].theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
+    for s, kind in _left(last):
+        if kind not in RELATIONS:
+            continue
+        low, high = RELATIONS[kind].theta_span(*travel_rad(tape, s))
         if low < high:
             low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
         if low <= high:
             yield Candidate(s, kind, low, high)
 
 
-def _alarm(tape: Tape) -> int:
-    """The frame of the alarm."""
-    return round(tape.last.diagnosis.detected_at_s / tape.last.dt_s)
-
-
-def _left(tape: Tape) -> Iterator[tuple[int, int]]:
-    """Surface and type of what is not excluded and stays as it is."""
-    diagnosis = tape.last.diagnosis
+def _left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
+    """Surface and type of what is not excluded."""
     estimators, layout = diagnosis.estimators, diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.diagnoses_all_types:
@@ -281,19 +263,13 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
             if e >= 0 and not estimators[e].is_excluded:
                 yield s, LOSS
         elif not estimators[layout.position_estimator_index_by_surface[s]].is_excluded:
-            yield from ((s, kind) for kind in RELATIONS if not surface.is_type_excluded[kind])
+            yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     """What is left whose course over many frames tells, not a frame."""
-    diagnosis, found = tape.last.diagnosis, []
-    if not diagnosis.diagnoses_all_types:
-        return []
-    for s, surface in enumerate(diagnosis.surface_fault_types):
-        if not diagnosis.estimators[diagnosis.layout.position_estimator_index_by_surface[s]].is_excluded:
-            kinds = np.flatnonzero(~surface.is_type_excluded)
-            found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in RELATIONS]
-    return sorted(set(found))
+    left = _left(tape.last.diagnosis)
+    return sorted(f"{names[s]} {NAMES[kind]}" for s, kind in left if kind not in RELATIONS)
 
 
 def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
@@ -307,8 +283,7 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
     targets: dict[int, float] = {}
     needs: Document = {}
     if one.surface == other.surface and at.in_blocks:
-        because = "with noisy gyros types are told by blocks of frames, not by one"
-        return {"separates": False, "because": because, "needs": needs}
+        return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
     if one.surface == other.surface:
         asked = [(one.surface, *_types_apart(one, other, at))]
     else:
@@ -316,12 +291,12 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
     for s, target, numbers in asked:
         needs[names[s]] = numbers
         if target is None:
-            return {"separates": False, "because": numbers["because"], "needs": needs}
+            return _none(numbers["because"], needs)
         targets[s] = target
     found = doublet(targets, at)
     if found is None:
         says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
-        return {"separates": False, "because": f"{says} and the angle of attack in its range", "needs": needs}
+        return _none(f"{says} and the angle of attack in its range", needs)
     commands, tells = found
     return {
         "separates": True,
@@ -333,6 +308,10 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
     }
 
 
+def _none(because: str, needs: Document) -> Document:
+    return {"separates": False, "because": because, "needs": needs}
+
+
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present at which a surface's two types differ, and from health."""
     s = one.surface
@@ -341,7 +320,7 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
-    return _nearest(u, gap > room, s, at, room, "apart, and off their command,", float(gap.max()))
+    return _nearest(u, gap, s, at, room, "apart, and off their command,")
 
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
@@ -351,8 +330,7 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    off = one.off(u)
-    return _nearest(u, off > room, a, at, float(room), "off its command", float(off.max()))
+    return _nearest(u, one.off(u), a, at, float(room), "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -371,14 +349,16 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
 
 
 def _nearest(
-    u: np.ndarray, tells: np.ndarray, s: int, at: Situation, room: float, what: str, most: float
+    u: np.ndarray, off: np.ndarray, s: int, at: Situation, room: float, what: str
 ) -> tuple[float | None, Document]:
-    """Of deflections u that tell, the nearest to the present; and the numbers this rests on."""
+    """Of deflections u that are off by more than room, the nearest to the present; and the numbers this rests
+    on."""
+    most, tells = degrees(off.max()), off > room
     numbers: Document = {"at_least_deg": degrees(room) if np.isfinite(room) else None}
-    numbers |= {"at_most_deg": degrees(most), "now_deg": degrees(at.u[s])}
+    numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
     if not tells.any():
         asked = f"more than {degrees(room):.3g} deg" if np.isfinite(room) else "another direction"
-        says = f"they must be {what} by {asked}, and are by {degrees(most):.3g} deg at most within the travel"
+        says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
         return None, numbers | {"because": says}
     target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}
@@ -424,8 +404,8 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
-    n, there = len(surfaces), np.arange(tells - 1, tells + at.held - 1)
-    every, equal, above = np.arange(frames), _Rows(frames), _Rows(frames)
+    n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
+    equal, above = _Rows(2 * n + 4, frames), _Rows(2 * n + 4, frames)
     turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
     stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
     for j, s in enumerate(surfaces):
@@ -444,8 +424,7 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
             row |= {k: -at.dt * g * v for k, v in moved.items() if g}
     for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
         equal.add(every, row)
-    angles = np.subtract(at.alpha_range, at.alpha)
-    ends = [*stops, *[(-inf, inf)] * n, *rates, angles]
+    ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
     bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
     found = _solved(equal, above, bounds)
@@ -459,10 +438,10 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
 class _Rows:
     """Rows of a linear programme over blocks of unknowns, of so many frames each, and an amplitude after."""
 
-    def __init__(self, frames: int) -> None:
-        self.frames, self.height = frames, 0
-        self.parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self.limits: list[np.ndarray] = []
+    def __init__(self, blocks: int, frames: int) -> None:
+        self._blocks, self._frames = blocks, frames
+        self._parts: list[Any] = []
+        self._limits: list[np.ndarray] = []
 
     def add(
         self,
@@ -473,35 +452,29 @@ class _Rows:
     ) -> None:
         """A row for each of these frames: of (block, lag) the weight of the unknown so many frames from it,
         0 before the first; and of the amplitude."""
-        rows = self.height + np.arange(len(at))
+        from scipy.sparse import csr_array, eye_array, hstack
+
+        parts = [csr_array((len(at), self._frames))] * self._blocks
         for (block, lag), weight in weights.items():
-            there = at + lag >= 0
-            columns = block * self.frames + (at + lag)[there]
-            self.parts.append((rows[there], columns, np.full(len(columns), weight)))
-        if amplitude:
-            self.parts.append((rows, np.full(len(at), -1), np.full(len(at), amplitude)))
-        self.height += len(at)
-        self.limits.append(np.full(len(at), limit))
+            parts[block] = parts[block] + weight * eye_array(self._frames, k=lag, format="csr")[at]
+        self._parts.append(hstack([*parts, csr_array(np.full((len(at), 1), amplitude))]))
+        self._limits.append(np.full(len(at), limit))
 
-    def matrix(self, width: int) -> Any:
-        """All of them, sparse."""
-        from scipy.sparse import csc_array
+    @property
+    def system(self) -> tuple[Any, np.ndarray]:
+        """Matrix, sparse, and limits of all of them."""
+        from scipy.sparse import vstack
 
-        rows, columns, values = (np.concatenate(part) for part in zip(*self.parts, strict=True))
-        return csc_array((values, (rows, columns % width)), shape=(self.height, width))
+        return vstack(self._parts, format="csc"), np.concatenate(self._limits)
 
 
 def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
     """The unknowns with the least amplitude; None where there are none within the limits."""
     from scipy.optimize import linprog
 
-    width = len(bounds)
-    weight = np.r_[np.zeros(width - 1), 1.0]
+    weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
     for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
-        result = linprog(
-            weight, above.matrix(width), np.concatenate(above.limits),
-            equal.matrix(width), np.concatenate(equal.limits), bounds, method=method,
-        )  # fmt: skip
+        result = linprog(weight, *above.system, *equal.system, bounds, method=method)
         if result.status in (0, 2):
             break
     return np.asarray(result.x) if result.status == 0 else None

@@ -6,6 +6,7 @@ sample on.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,6 @@ def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) ->
     diagnosis.reset()
     memory, scenario = diagnosis.inside()
     scenario = scenario.model_copy(update={"name": inputs.samples.name})
-    log, document = by_frames.proved(scenario, memory, step())
-    document = certificate.with_digest(document | {"begins_s": float(inputs.samples.t_s[begin])})
-    by_frames.write(scenario, log, document, folder)
+    found = by_frames.proved(scenario, memory, step())
+    document = certificate.with_digest(found.document | {"begins_s": float(inputs.samples.t_s[begin])})
+    replace(found, document=document).write(folder)

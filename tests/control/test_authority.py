@@ -45,16 +45,6 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
     assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
 
 
-def test_what_a_lagging_surface_still_gives_is_no_shortfall():
-    control, rng = control_record(), np.random.default_rng(3)
-    G, u, lag = rng.normal(size=(3, 4)), rng.uniform(-0.1, 0.1, 4), rng.uniform(-0.1, 0.1, 4)
-    control["axes"]["demand"] = rng.normal(size=3)
-    control["axes"]["G"], control["allocation"]["output"]["command"] = G, u
-    command, by_engines = control["allocation"]["output"]["command"], np.zeros((2, 3))
-    allocation.note_shortfall(control["axes"], command, control["layout"], lag, by_engines)
-    assert control["axes"]["shortfall"] == pytest.approx(control["axes"]["demand"] - G @ (u + lag), abs=1e-12)
-
-
 class TestProbing:
     def probed(self, wanted):
         record = control_record()["probe"]

@@ -96,17 +96,6 @@ def asked_for(frame):
     return accommodation.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
-def test_the_answer_of_the_observer_is_its_own_error_dynamics():
-    """e' = a - dd; e is corrected by L_rate, dd by L_disturbance of the innovation."""
-    memory, rng = record(OBSERVER_ERROR), np.random.default_rng(1)
-    e = dd = 0.0
-    for a in rng.normal(size=10):
-        missed = e + DT * (a - dd)
-        assert observer_response(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
-        e, dd = 0.7 * missed, dd + 2.0 * missed
-    assert memory["rate"].tolist()[::2] == [0.0, 0.0]
-
-
 def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
     """What is learnt of a rudder with this loss: its moment, and what the observer misses of it."""
     control, rng = new_control(), np.random.default_rng(2)

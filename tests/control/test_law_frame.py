@@ -1,10 +1,8 @@
-"""One frame of the law and of the diagnosis' decision: what is called, in which order, and for whom."""
+"""What the law takes a surface for, by the measure that the diagnosis asks for."""
 
 import numpy as np
 import pytest
 
-from beaver_ftc.control.accommodation import MODE_ADAPTIVE
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.diagnosis.types.registry import N_TYPES
 from beaver_ftc.loop import frame as whole
@@ -29,13 +27,6 @@ def new_frame(law_name="adaptive", **fdi):
         0.01,
     )
     return frame
-
-
-def commanded(frame, mode=MODE_ADAPTIVE):
-    frame["supervisor"]["mode"], frame["t"] = mode, 1.0
-    whole.assess_faults(frame)
-    whole.command(frame)
-    return frame["control"]
 
 
 def accommodated(frame, **faults):
@@ -73,26 +64,3 @@ def test_what_is_done_about_each_kind_of_fault(measure):
     assert surfaces["lag"][RUDDER] == pytest.approx(0.27 if measure == WAIT_FOR_SURFACE else 0.0)
     assert surfaces["authority_lost"] == (measure == WAIT_FOR_SURFACE)
     assert (surfaces["effectiveness"][RUDDER] == 0.0) == (measure == GIVE_UP)  # a jam bypasses the rate limit
-
-
-@pytest.mark.parametrize(
-    ("diagnoses_all_types", "detected", "isolated", "evidence", "name", "doubt"),
-    [
-        (1, 1, NOT_ISOLATED, 99, "adaptive", True), (0, 1, NOT_ISOLATED, 99, "adaptive", False),
-        (1, 0, NOT_ISOLATED, 99, "adaptive", False), (1, 1, 2, 99, "adaptive", False),
-        (1, 1, NOT_ISOLATED, 3, "adaptive", False), (1, 1, NOT_ISOLATED, 99, "nominal", False),
-        (1, 1, NOT_ISOLATED, 99, "oracle-published", False), (1, 1, NOT_ISOLATED, 4, "adaptive", True),
-    ],
-)  # fmt: skip
-def test_when_it_has_long_been_open_whether_elevator_or_flap(
-    diagnoses_all_types, detected, isolated, evidence, name, doubt
-):
-    frame = new_frame(name)
-    fdi = frame["fdi"]
-    types, fdi["config"]["diagnoses_all_types"] = fdi["types"], diagnoses_all_types
-    types["config"]["half_frames"], types["surface"]["evidence"]["n_anomalous"] = 4, 0
-    types["surface"]["evidence"]["n_anomalous"][ELEVATOR] = evidence
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"] = detected, isolated
-    frame["control"]["probe"]["config"]["frames"], frame["control"]["probe"]["memory"]["from_s"] = 8, -1.0
-    commanded(frame)
-    assert (frame["control"]["probe"]["memory"]["from_s"] == 1.0) == doubt

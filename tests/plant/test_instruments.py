@@ -12,7 +12,6 @@ from beaver_ftc.plant.instruments import (
     SIGNALS,
     read_all,
     read_forces,
-    wrapped,
 )
 from beaver_ftc.scenario.schema import Scenario
 
@@ -146,8 +145,3 @@ def test_a_heading_lags_the_short_way_past_north(psi):
     past_north = -apart_deg(headings(turn_deg - 60.0, **psi), turn_deg - 60.0)
     assert past_north == pytest.approx(anywhere, abs=1e-9)
     assert anywhere[-1] > 1.0
-
-
-@pytest.mark.parametrize("angle", [-7.0, -3.2, -3.1, 0.0, 0.4, 3.1, 3.2, 6.5])
-def test_an_angle_is_brought_within_half_a_turn(angle):
-    assert wrapped(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))

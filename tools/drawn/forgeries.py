@@ -18,6 +18,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.scenario.builtin import to_yaml
@@ -47,7 +48,7 @@ def main() -> None:
             count["true ones refused"] += 1
             print(f"refused: {refused[0][:200]}", flush=True)
         due = -(-args.forged * count["true certificates"] // (2 * args.flights)) - count["forged"]
-        for forged, names in forgeries(rng, written, log, due):
+        for forged, names in forgeries(rng, written, log, scenario, due):
             count["forged"] += 1
             roads.update(names)
             why = [*checker.failures(forged, log, scenario)]
@@ -80,7 +81,7 @@ def flights(seed: int, n: int) -> Iterator[tuple[Document, Log, str]]:
 
 
 def forgeries(
-    rng: np.random.Generator, written: Document, log: Log, n: int
+    rng: np.random.Generator, written: Document, log: Log, scenario: str, n: int
 ) -> Iterator[tuple[Document, tuple[str, ...]]]:
     """So many documents with a statement that is false, and the roads by which each was made to hold."""
     while n > 0:
@@ -89,7 +90,7 @@ def forgeries(
         for name in chosen:
             with suppress(TypeError):  # a road after one that left a field of another type
                 ROADS[name](rng, forged, said, log)
-        restate(forged, said, log)
+        restate(forged, said, log, scenario)
         yield with_digest(json.loads(json.dumps(forged))), chosen
         n -= 1
 
@@ -156,51 +157,18 @@ def _move(said: Document, by: int, rows: int, log: Log) -> None:
         said["first"] = max(said["first"] + by, 1)
 
 
-def restate(forged: Document, said: Document, log: Log) -> None:
-    """Write rest and sides as the numbers now have it: the checker's own sums, whatever they are."""
-    try:
-        declared = _Any(forged, log)
+def restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
+    """Write rest and sides as the numbers now have it: the checker's own sums, whatever they are. Where the
+    checker refuses before it has sums, no sides would hold."""
+    with suppress(Exception):
+        declared = checker.declared_at_row(yaml.safe_load(scenario), said["frame"])
         frames = checker.Frames(forged, log, declared, said.get("block"))
         for term in said.get("terms", ()):
             rows = slice(term["first"], term["frame"] + 1)
             term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
-        pairs = [(1.0, 0.0)]
-        if "terms" in said:
-            pairs = [_sum(said, frames)]
-        elif "looks" in said:
-            pairs = [(sum(z - o for z, o, _ in said["looks"]), sum(most for *_, most in said["looks"]))]
-        elif "likelihood" in said:
-            pairs = checker.likelihood_pairs(said, frames, declared)
+        pairs = checker.pairs_of(said, frames, declared)
         sides = np.array(pairs, float).T
-        said["sides"] = sides.tolist() if "likelihood" in said else sides[:, 0].tolist()
-    except Exception:  # numbers that no sum can be made of are left as they are
-        return
-
-
-class _Any:
-    """A scenario that declares whatever the forged certificate says."""
-
-    def __init__(self, forged: Document, log: Log) -> None:
-        self.dt, self.instants, self.start_row = forged.get("dt_s", 0.01), forged.get("instants", 1), 0
-        self.scenario = {"fdi": {"statistical": {"false_alarms_per_h": 1e3}}}
-
-
-def _sum(said: Document, frames: Any) -> tuple[float, float]:
-    """Both sides with the effects that the certificate states."""
-    value = limit = 0.0
-    for term in said["terms"]:
-        k, first, dt, d = term["frame"], term["first"], frames.dt, np.array(term["d"])
-        a = np.exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
-        since = term.get("since", k - 1)
-        past = np.arange(since + 1, k + 1)
-        left, noise = a ** (k - past.astype(float)), frames.gyro_change_rad_s @ abs(d)
-        value += term["weight"] * (left @ (dt * frames.innovation_rad_s2[past] @ d))
-        limit += term["weight"] * (
-            left @ (dt * frames.eta_bar_rad_s2[past] @ abs(d) + (1 - a) * noise[past - 1])
-            + a * left[0] * noise[since]
-            + noise[k] + a ** (k + 1.0 - first) * term.get("fault", 0.0)
-        )  # fmt: skip
-    return float(value), float(limit)
+        said["sides"] = sides.tolist() if {"likelihood", "bounds"} & set(said) else sides[:, 0].tolist()
 
 
 # --- the roads: each alters one thing that could make a statement hold -----------------------------------

@@ -5,12 +5,11 @@ number it takes. `check_certificate.py` recomputes it from the log, with the col
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,18 +22,21 @@ from beaver_ftc.loop import LogSink
 from beaver_ftc.results import Log, ParquetLog, StoredLog
 from beaver_ftc.scenario import Declared, Scenario, to_yaml
 from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds
-from beaver_ftc_assurance.certificates.blocks import Blocks, by_blocks, in_blocks, log_rows_of
-from beaver_ftc_assurance.certificates.inequality import (
+from beaver_ftc_assurance.certificates.history import (
     Document,
     History,
+    declared_errors_of,
+    in_blocks,
+    log_rows_of,
+)
+from beaver_ftc_assurance.certificates.inequality import (
     Hypothesis,
+    Inequality,
     Term,
     axis_directions,
     constant_theta_tests,
-    declared_errors_of,
-    declared_fields,
-    inequality_fields,
-    is_violated,
+    filters,
+    first_violated,
     no_fault,
     single_frame_tests,
 )
@@ -45,21 +47,21 @@ from beaver_ftc_assurance.certificates.tape import (
     tape_of_flight_again,
 )
 
-Found = tuple[list[Term], Hypothesis] | None
 EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE_NAME, FORMAT_VERSION = "certificate.json", 5
+FILE_NAME, LOG_NAME, FORMAT_VERSION = "certificate.json", "log.parquet", 5
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
 _SHARE_SUFFIX = "_likelihood_share"  # of columns: share of the alarm level
 TOO_LATE = f"more than {MAX_FRAMES_AFTER_ALARM} frames after the alarm, or with another diagnosis restarted"
+ADDING_POLE_PER_S = 0.1  # slow enough for the filter to add up a block
 
 
 def certificate(
     scenario: Scenario, log: Log, recorder: Recorder | None = None, text: str | None = None
-) -> tuple[Document, EvidenceColumns]:
-    """The certificate of a flight, and the columns that its log needs to prove it.
+) -> "Certified":
+    """The certificate of a flight.
 
     recorder: has kept what the log does not hold; without one the flight is flown again. text: of the file
     scenario.yaml beside the log, if it is not the scenario's own.
@@ -68,104 +70,50 @@ def certificate(
     """
     check_scheme(scenario)
     rows = logged_columns(log)
+    n, declares = len(rows["detected"]), to_yaml(scenario) if text is None else text
+    document: Document = {
+        "format": FORMAT_VERSION, "scenario": scenario.name,
+        "scenario_sha256": hashlib.sha256(declares.encode()).hexdigest(),
+        "rows": n, "statements": [], "without": [],
+    }  # fmt: skip
     if not (events := event_rows(rows)):
-        return certificate_document(scenario, rows, events, None, text), {}
-    known, n = [events["detected"], *events.values()], len(rows["detected"])
+        return Certified(with_digest(document), log, {}, declares)
+    known = [events["detected"], *events.values()]
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
-    document = certificate_document(scenario, rows, events, tape, text)
-    return document, evidence_columns(scenario, tape, document["statements"])
+    flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
+    for said in flight.statements(events):
+        if "sides" in said or "as" in said:
+            document["statements"].append(said)
+        else:  # no number stands there, since nothing could prove it
+            document["without"].append({name: said[name] for name in ("what", "column", "because")})
+    if document["statements"]:
+        document |= flight.declared_fields(document["statements"])
+    columns = flight.evidence_columns(document["statements"])
+    return Certified(with_digest(document), log, columns, declares)
 
 
 def logged_columns(log: Log) -> Columns:
     """The columns of a log that certificates take, (rows,)."""
-    taken = _LOGGED_COLUMNS.union(
-        name for name in log.columns if _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
-    )
-    columns = [name for name in log.columns if name in taken]
+    columns = [
+        name for name in log.columns
+        if name in _LOGGED_COLUMNS or _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
+    ]  # fmt: skip
     chunks = list(log.read_chunks(columns))
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
 
 
 def event_rows(rows: Columns) -> dict[str, int]:
     """Of the alarm and of each exclusion that stands at the end: column of the log, and row."""
-    events = filter(_EVENT_COLUMN.fullmatch, rows)
-    return {name: k for name in events if (k := _row_set_to_end(rows[name])) is not None}
-
-
-def certificate_document(
-    scenario: Scenario, rows: Columns, events: dict[str, int], tape: Tape | None, text: str | None = None
-) -> Document:
-    """The certificate of a flight with these events; rows: of `logged_columns`, tape: what was kept of it."""
-    declares = hashlib.sha256((to_yaml(scenario) if text is None else text).encode()).hexdigest()
-    document: Document = {
-        "format": FORMAT_VERSION, "scenario": scenario.name, "scenario_sha256": declares,
-        "rows": len(rows["detected"]), "statements": [], "without": [],
+    return {
+        name: row_set_to_end(flags) for name, flags in rows.items()
+        if _EVENT_COLUMN.fullmatch(name) and flags[-1] > 0.0
     }  # fmt: skip
-    if tape is not None:
-        history = history_of(scenario, rows, tape)
-        for found in statements(scenario, tape, history, events):
-            said = _with_logged_numbers(found, rows)
-            certain = "sides" in said or "as" in said
-            document["statements" if certain else "without"].append(
-                said if certain else _uncertified_fields(said)
-            )
-        if document["statements"]:
-            document |= _declared_fields(scenario, history, document["statements"])
-    return with_digest(document)
 
 
-def _with_logged_numbers(said: Document, rows: Columns) -> Document:
-    """The statement; one of chance, or of a missing reading, with what the log has of it."""
-    if "missing" in said:
-        return instruments_say.with_missing_column(said, rows)
-    if "likelihood" not in said:
-        return said
-    return chance.with_logged_share(said, float(rows[said["likelihood"]][said["frame"]]))
-
-
-def _uncertified_fields(said: Document) -> Document:
-    """What is not certified; no number stands there, since nothing could prove it."""
-    return {name: said[name] for name in ("what", "column", "because")}
-
-
-def _declared_fields(scenario: Scenario, history: History, said: list[Document]) -> Document:
-    """What all these statements go by."""
-    of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
-    frames, asked = [log_rows_of(one, span) for one, span in of], np.zeros(3, bool)
-    for _, span in of:
-        asked |= np.array(span["d"]) != 0.0
-    if not _is_unexplained(history.with_constant_gyro_errors_on(asked), of):
-        asked[:] = True
-    about: Document = {"declared": declared_fields(history, frames, asked)}
-    if not all("looks" in one or "missing" in one for one in said):
-        about["dt_s"] = history.dt
-    if frames:
-        about |= {"instants": scenario.substeps, "omega_E": history.declared.earth_rad_s}
-    return about
-
-
-def _is_unexplained(history: History, of: list[tuple[Document, Document]]) -> bool:
-    """Whether health explains none of the frames of statements, and their terms, that say so."""
-    for one, span in of:
-        if "shows" in one["theta"] or "bounds" in one:
-            seen = by_blocks(history, *one["block"][:2]) if "block" in one else history
-            if not kinds.is_unexplained_by_health(seen, np.arange(span["first"], span["frame"] + 1)).all():
-                return False
-    return True
-
-
-class OfRun:
-    """The certificate of a flight that is about to be flown: `watch` keeps what it needs."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        """Raises BadInput for a flight whose alarm is not our scheme's."""
-        check_scheme(scenario)
-        self._scenario, self._recorder = scenario, Recorder(scenario)
-        self.watch = self._recorder.watch
-
-    def write(self, folder: Path) -> None:
-        """Write it into the flight's result folder, which has log and scenario."""
-        write(self._scenario, self._recorder, folder)
+def row_set_to_end(flags: np.ndarray) -> int:
+    """The row at which a flag that is set at the end was set."""
+    clear = np.flatnonzero(~(flags > 0.0))
+    return int(clear[-1]) + 1 if len(clear) else 0
 
 
 def check_scheme(scenario: Scenario) -> None:
@@ -178,71 +126,60 @@ def check_scheme(scenario: Scenario) -> None:
 
 
 def with_digest(document: Document) -> Document:
-    """The same with the digest of all that is in it."""
-    return document | {"digest": digest(document)}
-
-
-def digest(document: Document) -> str:
-    """SHA-256 of the document in JSON, keys in order, without spaces, its `digest` empty."""
+    """The same with the SHA-256 of itself in JSON, keys in order, without spaces, its `digest` empty."""
     text = json.dumps(document | {"digest": ""}, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return document | {"digest": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def write(scenario: Scenario, recorder: Recorder, folder: Path) -> None:
-    """Write the certificate of a flight into its result folder, which has log and scenario; the log gets the
-    columns that prove it."""
-    path, text = folder / "log.parquet", (folder / "scenario.yaml").read_text(encoding="utf-8")
-    log = StoredLog(path)
-    document, columns = certificate(scenario, log, recorder, text)
-    if columns:
-        extended = folder / ".log.parquet"
-        with ParquetLog(extended) as further:
-            copy_with_columns(log, columns, further)
-        extended.replace(path)
-    (folder / FILE_NAME).write_text(as_text(document), encoding="utf-8")
+def as_text(document: Document) -> str:
+    """The file's content."""
+    return json.dumps(document, separators=(",", ":")) + "\n"
 
 
-def copy_with_columns(log: Log, columns: EvidenceColumns, to: LogSink) -> None:
-    """Copy a log and these columns."""
-    to.open([*log.columns, *columns])
-    first = 0
-    for chunk in log.read_chunks():
-        n = len(chunk["t_s"])
-        to.write(np.column_stack([*chunk.values(), *(one.rows(first, n) for one in columns.values())]))
-        first += n
+class OfRun:
+    """The certificate of a flight that is about to be flown: `watch` keeps what it needs."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Raises BadInput for a flight whose alarm is not our scheme's."""
+        check_scheme(scenario)
+        self._scenario, self._recorder = scenario, Recorder(scenario)
+        self.watch = self._recorder.watch
+
+    def write(self, folder: Path) -> None:
+        """Write it into the flight's result folder, which has log and scenario; the log gets the columns that
+        prove it."""
+        text = (folder / "scenario.yaml").read_text(encoding="utf-8")
+        certificate(self._scenario, StoredLog(folder / LOG_NAME), self._recorder, text).write(folder)
 
 
-def evidence_columns(scenario: Scenario, tape: Tape, said: list[Document]) -> EvidenceColumns:
-    """The columns of the log by which these statements are checked: for each estimator that they speak of
-    offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on a
-    surface whether it is excluded, and what the type is where the checker does not define it. The effects are
-    known in the frames of the tape only."""
-    found: EvidenceColumns = {}
-    surfaces, diagnosis = scenario.airframe.surfaces, tape.alarm.diagnosis
-    of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
-    wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}
-    for e, name in enumerate(tape.names):
-        if name not in wanted:
-            continue
-        for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
-            for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
-                found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first, values)
-        estimator = diagnosis.estimators[e]
-        for end, theta in (("low", estimator.theta_min), ("high", estimator.theta_max)):
-            found[f"fie_{name}_theta_{end}"] = PartialColumn.constant(theta)
-    for surface in dict.fromkeys(of_types):
-        actuator = diagnosis.surface_fault_types[surfaces.index(surface)].actuator
-        for end, stop_rad in (("low", actuator.travel_low_rad), ("high", actuator.travel_high_rad)):
-            found[f"{surface}_travel_{end}_rad"] = PartialColumn.constant(stop_rad)
-    for s, kind, _ in kinds.excluded_types(tape):
-        if surfaces[s] in of_types:
-            flags = (tape.types[:, s, kind] > 0).astype(float)
-            found[kinds.exclusion_column(surfaces[s], kind)] = PartialColumn(
-                tape.first, flags, 0.0, flags[-1]
-            )
-            definition = kinds.type_definition_columns(tape, surfaces[s], s, kind)
-            found |= {column: PartialColumn.constant(value) for column, value in definition.items()}
-    return found
+@dataclass(frozen=True)
+class Certified:
+    """A certificate with all that proves it: the log, the columns that it lacks, the text of its scenario."""
+
+    document: Document
+    log: Log
+    columns: EvidenceColumns
+    scenario: str
+
+    def copy_log(self, to: LogSink) -> None:
+        """Copy the log and the columns that it lacks."""
+        to.open([*self.log.columns, *self.columns])
+        first = 0
+        for chunk in self.log.read_chunks():
+            n = len(chunk["t_s"])
+            further = (one.rows(first, n) for one in self.columns.values())
+            to.write(np.column_stack([*chunk.values(), *further]))
+            first += n
+
+    def write(self, folder: Path) -> None:
+        """Write certificate, log and scenario into a folder."""
+        if self.columns or not (folder / LOG_NAME).exists():
+            extended = folder / f".{LOG_NAME}"
+            with ParquetLog(extended) as log:
+                self.copy_log(log)
+            extended.replace(folder / LOG_NAME)
+        (folder / "scenario.yaml").write_text(self.scenario, encoding="utf-8")
+        (folder / FILE_NAME).write_text(as_text(self.document), encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -254,11 +191,6 @@ class PartialColumn:
     before: float = np.nan
     after: float = np.nan
 
-    @classmethod
-    def constant(cls, value: float) -> "PartialColumn":
-        """The same value in every row."""
-        return cls(0, np.empty(0), value, value)
-
     def rows(self, first: int, n: int) -> np.ndarray:
         """The rows from `first` on, (n,)."""
         places = np.arange(first, first + n) - self.first
@@ -268,170 +200,210 @@ class PartialColumn:
         return found
 
 
-def as_text(document: Document) -> str:
-    """The file's content."""
-    return json.dumps(document, separators=(",", ":")) + "\n"
-
-
-def _row_set_to_end(flags: np.ndarray) -> int | None:
-    """The row at which a flag that is set at the end was set, None if it is not."""
-    if not flags[-1] > 0.0:
-        return None
-    clear = np.flatnonzero(~(flags > 0.0))
-    return int(clear[-1]) + 1 if len(clear) else 0
-
-
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     """What the log says of rates, model and bound, and what was declared."""
-    x, model, eta_bar = (
-        np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND
-    )
-    return History(
-        1.0 / scenario.rate_hz, 1.0 / scenario.substeps, x, model, eta_bar, declared_errors_of(tape.alarm)
-    )
+    x, F, eta_bar = (np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND)
+    return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
 
 
-def statements(
-    scenario: Scenario, tape: Tape, history: History, events: dict[str, int]
-) -> Iterator[Document]:
-    """What can be said of each event; one without a `value` says why it cannot be certified."""
-    alarm, diagnosis = events["detected"], tape.alarm.diagnosis
-    about: Document = {"what": None, "column": "detected", "frame": alarm}
-    monitor, ours = diagnosis.sensor_monitor, scheme_number("adaptive-estimators")
-    watch = instruments_say.instrument_alarm_statement(monitor) if monitor.has_raised_alarm else None
-    if not diagnosis.estimators or not diagnosis.enabled or diagnosis.scheme_number != ours:
-        yield about | (watch or {"because": "another scheme was in charge"})
-        return
-    said = _statement(
-        _alarm_inequality(scenario, tape, history, alarm), history, chance.ALARM_NOT_STATED, **about
-    )
-    if "because" in said and watch is not None:
-        said = about | watch
-    elif "because" in said and scenario.fdi.statistical:
-        by_chance = chance.alarm_statement(tape, history, scenario.airframe.surfaces, alarm)
-        said = said if by_chance is None else about | by_chance
-    yield said
-    for e, name in enumerate(tape.names):
-        column = f"fie_{name}_excluded"
-        if column in events:
-            k = events[column]
-            because = chance.EXCLUSION_NOT_STATED if events[column] < tape.end else TOO_LATE
-            known = because != TOO_LATE and k > 0  # the first row has no innovation
-            found = _exclusion_inequality(scenario, tape, history, e, alarm, k) if known else None
-            about = {"what": name, "column": column, "frame": k}
-            if found is None and because != TOO_LATE and chance.alarm_excludes(tape, e, said):
-                yield about | {"as": "alarm"}
+def _said(found: Inequality | None, because: str) -> Document:
+    """The evidence, or why there is none."""
+    return {"because": because} if found is None else found.fields
+
+
+@dataclass(frozen=True)
+class _Flight:
+    """A flight whose log has events: the log's columns, and what was kept of it."""
+
+    scenario: Scenario
+    rows: Columns
+    tape: Tape
+    history: History
+
+    def statements(self, events: dict[str, int]) -> Iterator[Document]:
+        """What can be said of each event; one without sides says why it cannot be certified."""
+        alarm, diagnosis, tape = events["detected"], self.tape.alarm.diagnosis, self.tape
+        about: Document = {"what": None, "column": "detected", "frame": alarm}
+        ours = scheme_number("adaptive-estimators")
+        ours_raised = diagnosis.estimators and diagnosis.enabled and diagnosis.scheme_number == ours
+        of_alarm = about | self._alarm(alarm, bool(ours_raised))
+        yield of_alarm
+        if not ours_raised:
+            return
+        for e, name in enumerate(tape.names):
+            column = f"fie_{name}_excluded"
+            if column not in events:
                 continue
-            yield _statement(found, history, because, **about)
-    if scenario.fdi.fault_class == "all":
-        yield from _type_statements(scenario, tape, history, max(alarm, 1))  # the first row has no innovation
+            k = events[column]
+            said: Document = {"because": TOO_LATE}
+            if k < tape.end:
+                said = _said(self._exclusion(e, alarm, k), chance.EXCLUSION_NOT_STATED)
+                if "because" in said and chance.alarm_excludes(tape, e, of_alarm):
+                    said = {"as": "alarm"}
+            yield {"what": name, "column": column, "frame": k} | said
+        if self.scenario.fdi.fault_class == "all":
+            yield from self._types(max(alarm, 1))  # the first row has no innovation
 
+    def _alarm(self, k: int, is_ours: bool) -> Document:
+        """Evidence of the alarm at row k: a filter beyond its bound, instruments that disagree, or chance."""
+        monitor = self.tape.alarm.diagnosis.sensor_monitor
+        found = self._filter_alarm(k) if is_ours else None
+        if found is not None:
+            return found.fields
+        if monitor.has_raised_alarm:
+            return instruments_say.alarm_evidence(monitor, self.rows, k)
+        if not is_ours:
+            return {"because": "another scheme was in charge"}
+        by_chance = self.scenario.fdi.statistical and chance.alarm_evidence(
+            self.tape, self.history, self.scenario.airframe.surfaces, self.rows, k
+        )
+        return by_chance or {"because": chance.ALARM_NOT_STATED}
 
-def _type_statements(scenario: Scenario, tape: Tape, history: History, alarm: int) -> Iterator[Document]:
-    """Of each type excluded, surface by surface; the log has a column for it only with a certificate."""
-    frames = tape, history
-    if tape.alarm.diagnosis.types_config.frames_per_block > 1:
-        tape, history, alarm = in_blocks(tape, history, alarm)
-    any_block = len(tape.types) > 0
-    for s, kind, k in kinds.excluded_types(tape if any_block else frames[0]):
-        because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
-        surface = scenario.airframe.surfaces[s]
-        about: Document = {
-            "what": kinds.exclusion_name(surface, kind), "column": kinds.exclusion_column(surface, kind),
-            "frame": kinds.exclusion_row(frames[0], s, kind),
-        }  # fmt: skip
-        followed = bool(TYPES[kind].frames_test)
-        if because is None and not followed and TYPES[kind].deflection_relation is None:
-            because = kinds.UNKNOWN_TYPE
-        if because is not None:
-            yield about | {"because": because}
-            continue
-        of = kinds.hypothesis_held_anywhere(tape, s) if followed else kinds.hypothesis_of_type(tape, s, kind)
-        if followed:
-            said = courses.statement_by_course(scenario, tape, history, of, s, kind, alarm)
-            yield about | (
-                history.statement_fields | said if said else {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
-            )
-        elif isinstance(history, Blocks) and not of.theta_is_constant:
-            own = kinds.hypothesis_of_type(frames[0], s, kind)
-            of_tape, of_log = frames
-            sums = history.summed_frame_tests(k, own.axes, of_tape.first)
-            found = _first_violated(sums, own, of_log, of_tape)
-            yield _statement(found, of_log, kinds.EXCLUDED_BY_MANY_FRAMES, **about)
+    def _filter_alarm(self, k: int) -> Inequality | None:
+        """A filter that left its bound at frame k."""
+        tape, every = self.tape, (0, 1, 2)
+        if k <= tape.since:
+            return None
+        filtered = (filters(pole, tape.since, k, every) for pole in self._detection_poles)
+        health = no_fault(tape.first, tape.end - tape.first)
+        return first_violated(
+            chain(filters(inf, k - 1, k, every), *filtered), health, self.history, tape.first
+        )
+
+    @property
+    def _detection_poles(self) -> list[float]:
+        """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
+        return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
+
+    def _exclusion(self, e: int, alarm: int, k: int) -> Inequality | None:
+        """The test that the fault of estimator e failed at frame k."""
+        tape, config, history = self.tape, self.scenario.fdi, self.history
+        estimator = tape.alarm.diagnosis.estimators[e]
+        if k == 0:  # the first row has no innovation
+            return None
+        of = Hypothesis(
+            tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.theta_min,
+            estimator.theta_max, axes=estimator.active_axes,
+        )  # fmt: skip
+        since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, of.axes)] if k > alarm else []
+        memory = self._filter_tests(e, estimator.parity_direction, of.axes, k)
+        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history, tape.first)
+        if found is not None:
+            return found
+        lasting = replace(of, theta_is_constant=True)
+        candidates: list[list[Term]] = []
+        if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
+            candidates = [constant_theta_tests(lasting, history, np.arange(alarm, k + 1))]
+        elif config.thresholds == "published":
+            candidates = since_alarm
+        return first_violated(candidates, lasting, history, tape.first)
+
+    def _filter_tests(
+        self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
+    ) -> Iterator[list[Term]]:
+        """The detection filters, and the memory of what the fault can have done to them."""
+        tape = self.tape
+        ways = [([*axis_directions((i,))], i) for i in axes]
+        ways += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
+        for m, pole in enumerate(self._detection_poles):
+            for both, i in ways:
+                for d, reach in zip(both, (tape.reach_high, -tape.reach_low), strict=True):
+                    yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
+
+    def _types(self, alarm: int) -> Iterator[Document]:
+        """Of each type excluded, surface by surface; the log has a column for it only with a certificate."""
+        tape, history = self.tape, self.history
+        if tape.alarm.diagnosis.types_config.frames_per_block > 1:
+            tape, history, alarm = in_blocks(tape, history, alarm)
+        any_block = len(tape.types) > 0
+        for s, kind, k in kinds.excluded_types(tape if any_block else self.tape):
+            surface = self.scenario.airframe.surfaces[s]
+            row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
+            because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
+            said = {"because": because} if because else self._type(tape, history, s, kind, alarm, k)
+            yield {
+                "what": kinds.exclusion_name(surface, kind),
+                "column": kinds.exclusion_column(surface, kind), "frame": row,
+            } | said  # fmt: skip
+
+    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document:
+        """Evidence against a type on surface s at frame k; tape and history: perhaps by blocks."""
+        if TYPES[kind].frames_test:
+            said = courses.evidence(self.scenario, tape, history, s, kind, alarm)
+            return said or {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
+        of = kinds.hypothesis_of_type(tape, s, kind)
+        if history.length == 1 or of.theta_is_constant:
+            candidates = kinds.candidate_inequalities(of, history, alarm, k)
+            found = first_violated(candidates, of, history, tape.first)
         else:
-            found = _first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history, tape)
-            yield _statement(found, history, kinds.EXCLUDED_BY_MANY_FRAMES, **about)
+            found = self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
+        return _said(found, kinds.EXCLUDED_BY_MANY_FRAMES)
 
+    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Inequality | None:
+        """Block k, or the one before, by frames, in which theta may differ. A block is left out if it begins
+        before the effects of a fault are kept."""
+        L, first = blocks.length, self.tape.first
+        ends = [blocks.begin + block * L - 1 for block in (k, k + 1)]
+        candidates = [
+            [*filters(ADDING_POLE_PER_S, end - L, end, of.axes)] for end in ends if end - L >= first
+        ]
+        return first_violated(chain(*candidates), of, self.history, first)
 
-def _statement(found: Found, history: History, because: str, **about: Any) -> Document:
-    """A statement, or why there is none."""
-    if found is None:
-        return about | {"because": because}
-    return about | history.statement_fields | inequality_fields(*found, history)
+    def declared_fields(self, said: list[Document]) -> Document:
+        """What all these statements go by."""
+        of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
+        asked = np.any([np.array(span["d"]) != 0.0 for _, span in of], axis=0) if of else np.zeros(3, bool)
+        constant = self.history.with_constant_gyro_errors_on(asked)
+        if not all(_is_unexplained(constant, one, span) for one, span in of):
+            asked = np.ones(3, bool)
+        rows = np.concatenate([log_rows_of(one, span) for one, span in of]) if of else None
+        about: Document = {"declared": self.history.declared_fields(rows, asked)}
+        if not all("looks" in one or "missing" in one for one in said):
+            about["dt_s"] = self.history.dt
+        if of:
+            about |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.earth_rad_s}
+        return about
 
-
-def _detection_poles(scenario: Scenario) -> list[float]:
-    """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
-    return list(filter_poles(scenario.fdi, Declared.of(scenario)))
-
-
-def _alarm_inequality(scenario: Scenario, tape: Tape, history: History, k: int) -> Found:
-    """A filter that left its bound at frame k."""
-    if k <= tape.since:
-        return None
-    health = no_fault(tape.first, tape.end - tape.first)
-    of_frame = ([Term(d, inf, k - 1, k)] for d in axis_directions((0, 1, 2)))
-    filters = ((pole, d) for pole in _detection_poles(scenario) for d in axis_directions((0, 1, 2)))
-    filtered = ([Term(d, pole, tape.since, k)] for pole, d in filters)
-    return _first_violated(chain(of_frame, filtered), health, history, tape)
-
-
-def _first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History, tape: Tape) -> Found:
-    """The first inequality that the data violate."""
-    for terms in filter(None, candidates):
-        known = [replace(term, first_kept_frame=tape.first) for term in terms]
-        if is_violated(known, of, history):
-            return known, of
-    return None
-
-
-def _exclusion_inequality(
-    scenario: Scenario, tape: Tape, history: History, e: int, alarm: int, k: int
-) -> Found:
-    """The test that the fault of estimator e failed at frame k."""
-    estimator, config = tape.alarm.diagnosis.estimators[e], scenario.fdi
-    asked = estimator.active_axes
-    of = Hypothesis(
-        tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.theta_min,
-        estimator.theta_max,
-        axes=asked,
-    )  # fmt: skip
-    since_alarm = (
-        [Term(d, config.isolation_pole_per_s, alarm, k)] for d in axis_directions(asked) if k > alarm
-    )
-    filtered = _filter_tests(scenario, tape, e, estimator.parity_direction, asked, k)
-    found = _first_violated(chain(single_frame_tests(k, of), filtered, since_alarm), of, history, tape)
-    if found is not None:
+    def evidence_columns(self, said: list[Document]) -> EvidenceColumns:
+        """The columns of the log by which these statements are checked: for each estimator that they speak of
+        offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on
+        a surface whether it is excluded, and what the type is where the checker does not define it. The
+        effects are known in the frames of the tape only."""
+        tape, surfaces = self.tape, self.scenario.airframe.surfaces
+        found: EvidenceColumns = {}
+        of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
+        wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}
+        for e, name in enumerate(tape.names):
+            if name not in wanted:
+                continue
+            for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
+                for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
+                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first, values)
+            estimator = tape.alarm.diagnosis.estimators[e]
+            found |= _constants({
+                f"fie_{name}_theta_low": estimator.theta_min, f"fie_{name}_theta_high": estimator.theta_max,
+            })  # fmt: skip
+        for surface in dict.fromkeys(of_types):
+            low, high = kinds.travel_rad(tape, surfaces.index(surface))
+            found |= _constants({f"{surface}_travel_low_rad": low, f"{surface}_travel_high_rad": high})
+        for s, kind, _ in kinds.excluded_types(tape):
+            if surfaces[s] in of_types:
+                flags = (tape.types[:, s, kind] > 0).astype(float)
+                column = PartialColumn(tape.first, flags, 0.0, flags[-1])
+                found[kinds.exclusion_column(surfaces[s], kind)] = column
+                found |= _constants(kinds.type_definition_columns(tape, surfaces[s], s, kind))
         return found
-    lasting = replace(of, theta_is_constant=True)
-    candidates: list[list[Term]] = []
-    if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
-        candidates.append(constant_theta_tests(lasting, history, np.arange(alarm, k + 1)))
-    elif config.thresholds == "published" and k > alarm:
-        candidates += [[Term(d, config.isolation_pole_per_s, alarm, k)] for d in axis_directions(asked)]
-    return _first_violated(candidates, lasting, history, tape)
 
 
-def _filter_tests(
-    scenario: Scenario, tape: Tape, e: int, across: np.ndarray, asked: tuple[int, ...], k: int
-) -> Iterator[list[Term]]:
-    """The detection filters, and the memory of what the fault can have done to them."""
-    for m, pole in enumerate(_detection_poles(scenario)):
-        for i in asked:
-            for sign, reach in ((1.0, tape.reach_high), (-1.0, -tape.reach_low)):
-                d = np.zeros(3)
-                d[i] = sign
-                yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
-        if across.any() and len(asked) == 3:
-            for sign, reach in ((1.0, tape.reach_high), (-1.0, -tape.reach_low)):
-                yield [Term(sign * across, pole, tape.since, k, effect_before=float(reach[e, m, 3]))]
+def _is_unexplained(history: History, one: Document, span: Document) -> bool:
+    """Whether health explains none of the frames of a statement's term, or bound, if it says so."""
+    if "shows" not in one["theta"] and "bounds" not in one:
+        return True
+    length, begin, _ = one.get("block", (1, 0, 0))
+    seen = replace(history, length=length, begin=begin)
+    return bool(seen.is_unexplained(np.arange(span["first"], span["frame"] + 1)).all())
+
+
+def _constants(values: dict[str, float]) -> EvidenceColumns:
+    """Columns with the same value in every row."""
+    return {name: PartialColumn(0, np.empty(0), value, value) for name, value in values.items()}

@@ -49,6 +49,7 @@ COURSES = {
     "bias": ("offset", 0), "bias that grows": ("growing_offset", 0), "hardover up": ("runaway", 1),
     "hardover down": ("runaway", -1), "oscillatory": ("swing", 0), "rate_limit": ("approach", 0),
 }  # fmt: skip
+UNREADABLE = ArithmeticError, AttributeError, LookupError, TypeError, ValueError
 RELATION_COLUMNS = "gain", "theta_is_share", "theta_is_constant", "theta_low", "theta_high"
 
 
@@ -137,110 +138,59 @@ def is_below_one(value):
     return is_non_negative(value) and value < 1
 
 
-is_vector_list, is_matrix = is_list_of(is_list_of(is_number, 3)), is_list_of(is_list_of(is_number))
-CERTIFICATE_FIELDS = {
-    "format": is_row,
-    "scenario": is_text,
-    "scenario_sha256": is_text,
-    "rows": is_row,
-    "statements": is_list_of(is_mapping),
-    "without": is_list_of(is_mapping),
-    "digest": is_text,
-}
-OPTIONAL_CERTIFICATE_FIELDS = {
-    "declared": is_mapping,
-    "dt_s": is_positive,
-    "instants": is_row,
-    "omega_E": is_non_negative,
-    "begins_s": is_number,
-}
-DECLARED_FIELDS = {name: is_by_axis(is_non_negative) for name in "cbgoB"} | {"m": is_by_axis(is_below_one)}
-EVENT_FIELDS = {"what": is_null_or(is_text), "column": is_text, "frame": is_row}
-is_theta_assumption = is_one_of("any", "constant", "constant while it shows")
-SUM_FIELDS = {
-    "theta": is_theta_assumption,
-    "terms": is_list_of(is_mapping),
-    "sides": is_list_of(is_number, 2),
-}
-OPTIONAL_SUM_FIELDS = {"block": is_list_of(is_row, 3), "least": is_number, "most": is_number}
-TERM_FIELDS = {
-    "weight": is_positive,
-    "d": is_list_of(is_number, 3),
-    "first": is_row,
-    "frame": is_row,
-    "x": is_vector_list,
-    "F": is_vector_list,
-    "eta_bar": is_vector_list,
-}
-OPTIONAL_TERM_FIELDS = {
-    "pole_per_s": is_positive,
-    "since": is_row,
-    "fault": is_non_negative,
-    "rest": is_vector_list,
-    "h": is_list_of(is_null_or(is_number)),
-    "Z": is_list_of(is_null_or(is_number)),
-    "r": is_list_of(is_non_negative),
-}
-COURSE_FIELDS = {
-    "theta": is_one_of("course"),
-    "bounds": is_list_of(is_mapping),
-    "sides": is_list_of(is_list_of(is_number), 2),
-}
-OPTIONAL_COURSE_FIELDS = {
-    "block": is_list_of(is_row, 3),
-    "stops": is_list_of(is_number),
-    "pace_rad_s": is_positive,
-    "slowest_rad_s": is_positive,
-    "ordered": is_list_of(is_number),
-    "step": is_non_negative,
-    "near": is_number,
-}
-BOUND_FIELDS = {
-    "d": is_list_of(is_number, 3),
-    "first": is_row,
-    "frame": is_row,
-    "h": is_list_of(is_number),
-    "Z": is_list_of(is_number),
-    "r": is_list_of(is_non_negative),
-}
-LIKELIHOOD_FIELDS = {
-    "likelihood": is_text,
-    "level": is_positive,
-    "axes": is_list_of(is_one_of(0, 1, 2)),
-    "sense": is_one_of("less", "either"),
-    "tolerance": is_list_of(is_positive),
-    "R": is_list_of(is_null_or(is_non_negative)),
-    "Y": is_list_of(is_list_of(is_null_or(is_number))),
-    "P": is_list_of(is_list_of(is_null_or(is_number))),
-    "first": is_row,
-    "frames": is_list_of(is_mapping),
-    "sides": is_list_of(is_list_of(is_number, 2), 2),
-}
-FRAME_FIELDS = {"signature": is_list_of(is_number), "jitter": is_list_of(is_non_negative), "drift": is_matrix}
-OPTIONAL_FRAME_FIELDS = {
-    "bounded": is_list_of(is_non_negative),
-    "pace": is_non_negative,
-    "keep": is_share,
-    "known": is_matrix,
-    "air": is_list_of(is_number),
-    "foreseen": is_list_of(is_number),
-}
-INSTRUMENT_TEST_FIELDS = {
-    "test": is_one_of(*TESTS),
-    "looks": is_list_of(is_list_of(is_number, 3)),
-    "sides": is_list_of(is_number, 2),
-}
-MISSING_READING_FIELDS = {"missing": is_list_of(is_row, 1), "sides": is_list_of(is_number, 2)}
-BY_ALARM_FIELDS = {"as": is_one_of("alarm")}
-# The field that says which kind of evidence a statement has, and the fields of that kind.
-FIELDS_BY_EVIDENCE = {
-    "terms": (SUM_FIELDS, OPTIONAL_SUM_FIELDS),
-    "bounds": (COURSE_FIELDS, OPTIONAL_COURSE_FIELDS),
-    "likelihood": (LIKELIHOOD_FIELDS, {}),
-    "looks": (INSTRUMENT_TEST_FIELDS, {}),
-    "missing": (MISSING_READING_FIELDS, {}),
-    "as": (BY_ALARM_FIELDS, {}),
-}
+is_vector, is_pair, is_values = is_list_of(is_number, 3), is_list_of(is_number, 2), is_list_of(is_number)
+is_vectors, is_matrix, is_pairs = is_list_of(is_vector), is_list_of(is_values), is_list_of(is_values, 2)
+is_gappy, is_bounds = is_list_of(is_null_or(is_number)), is_list_of(is_non_negative)
+is_block, is_parts = is_list_of(is_row, 3), is_list_of(is_mapping)
+# Of each object the fields that it needs, and those that it may have; an event has those of its evidence too.
+FORMS = {
+    "certificate": (
+        {"format": is_row, "scenario": is_text, "scenario_sha256": is_text, "rows": is_row,
+         "statements": is_parts, "without": is_parts, "digest": is_text},
+        {"declared": is_mapping, "dt_s": is_positive, "instants": is_row, "omega_E": is_non_negative,
+         "begins_s": is_number},
+    ),
+    "declared": ({"m": is_by_axis(is_below_one)} | dict.fromkeys("cbgoB", is_by_axis(is_non_negative)), {}),
+    "event": ({"what": is_null_or(is_text), "column": is_text, "frame": is_row}, {}),
+    "term": (
+        {"weight": is_positive, "d": is_vector, "first": is_row, "frame": is_row, "x": is_vectors,
+         "F": is_vectors, "eta_bar": is_vectors},
+        {"pole_per_s": is_positive, "since": is_row, "fault": is_non_negative, "rest": is_vectors,
+         "h": is_gappy, "Z": is_gappy, "r": is_bounds},
+    ),
+    "bound": (
+        {"d": is_vector, "first": is_row, "frame": is_row, "h": is_values, "Z": is_values, "r": is_bounds},
+        {},
+    ),
+    "frame": (
+        {"signature": is_values, "jitter": is_bounds, "drift": is_matrix},
+        {"bounded": is_bounds, "pace": is_non_negative, "keep": is_share, "known": is_matrix,
+         "air": is_values, "foreseen": is_values},
+    ),
+}  # fmt: skip
+# By the field that says which kind of evidence a statement has.
+EVIDENCE = {
+    "terms": (
+        {"theta": is_one_of("any", "constant", "constant while it shows"), "terms": is_parts,
+         "sides": is_pair},
+        {"block": is_block, "least": is_number, "most": is_number},
+    ),
+    "bounds": (
+        {"theta": is_one_of("course"), "bounds": is_parts, "sides": is_pairs},
+        {"block": is_block, "stops": is_values, "pace_rad_s": is_positive, "slowest_rad_s": is_positive,
+         "ordered": is_values, "step": is_non_negative, "near": is_number},
+    ),
+    "likelihood": (
+        {"likelihood": is_text, "level": is_positive, "axes": is_list_of(is_one_of(0, 1, 2)),
+         "sense": is_one_of("less", "either"), "tolerance": is_list_of(is_positive),
+         "R": is_list_of(is_null_or(is_non_negative)), "Y": is_list_of(is_gappy), "P": is_list_of(is_gappy),
+         "first": is_row, "frames": is_parts, "sides": is_list_of(is_pair, 2)},
+        {},
+    ),
+    "looks": ({"test": is_one_of(*TESTS), "looks": is_vectors, "sides": is_pair}, {}),
+    "missing": ({"missing": is_list_of(is_row, 1), "sides": is_pair}, {}),
+    "as": ({"as": is_one_of("alarm")}, {}),
+}  # fmt: skip
 
 
 def check_form(document, needed, allowed, where):
@@ -257,7 +207,7 @@ def check_form(document, needed, allowed, where):
 
 def evidence_kind(said):
     """Which kind of evidence a statement has."""
-    found = [name for name in FIELDS_BY_EVIDENCE if name in said]
+    found = [name for name in EVIDENCE if name in said]
     require(len(found) == 1, "the statement has no evidence, or more than one kind of it")
     return found[0]
 
@@ -265,15 +215,15 @@ def evidence_kind(said):
 def check_statement_form(said):
     """The fields of a statement; the lists in it have as many entries as frames."""
     kind = evidence_kind(said)
-    needed, allowed = FIELDS_BY_EVIDENCE[kind]
-    check_form(said, EVENT_FIELDS | needed, allowed, "statement")
+    needed, allowed = EVIDENCE[kind]
+    check_form(said, FORMS["event"][0] | needed, allowed, "statement")
     for term in said.get("terms", []):
-        check_form(term, TERM_FIELDS, OPTIONAL_TERM_FIELDS, "term")
+        check_form(term, *FORMS["term"], "term")
         check_lengths(term, ("x", "F", "eta_bar", "rest", "h", "Z", "r"))
         require(("pole_per_s" in term) == ("since" in term), "a pole needs the frame since which it filters")
         require("fault" not in term or "pole_per_s" in term, "a frame by itself has no past")
     for bound in said.get("bounds", []):
-        check_form(bound, BOUND_FIELDS, {}, "bound")
+        check_form(bound, *FORMS["bound"], "bound")
         check_lengths(bound, ("h", "Z", "r"))
         require(all(bound["Z"]), "the surface does not act along this direction")
     if kind in ("terms", "bounds", "looks"):
@@ -302,7 +252,7 @@ def check_likelihood_form(said):
     require(np.array_equal(P, P.T) and (P.diagonal() >= 0).all(), "P is no covariance")
     require(said["first"] >= 1 and said["frames"], "frames are missing")
     for its in said["frames"]:
-        check_form(its, FRAME_FIELDS, OPTIONAL_FRAME_FIELDS, "frame")
+        check_form(its, *FORMS["frame"], "frame")
         for name in ("signature", "jitter", "bounded", "air", "foreseen"):
             require(len(its.get(name, [0] * n)) == n, f"{name}: one value for each axis")
         drift, known = np.array(its["drift"]), its.get("known", [])
@@ -363,7 +313,7 @@ def check_declared(document, declared):
     A bias of a gyro may be left out: then the bound on its noise is larger, which proves less. c, b and g
     only explain the bound that the log has; c must be zero where the scenario's share is.
     """
-    check_form(document.get("declared"), DECLARED_FIELDS, {}, "declared")
+    check_form(document.get("declared"), *FORMS["declared"], "declared")
     for axis, (offset, bias, slope) in declared.gyro_errors.items():
         o, B, m = (document["declared"][name].get(axis, 0.0) for name in "oBm")
         same = is_same(o, offset) and is_same(m, slope)
@@ -581,16 +531,13 @@ def effect_of_relation(relation, offset, slope, spread):
 
 def sides_of_terms(said, frames, declared):
     """Both sides: the sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
-    what, theta = said["what"], said["theta"]
-    effect = effect_of_fault(what, frames)
+    what, effect = said["what"], effect_of_fault(said["what"], frames)
     of_course = what is not None and " " in what and course_of(what, frames.log) is not None
     require(not of_course, "a sum of frames says nothing of this type")
     check_theta(said, effect, declared, frames)
-    sums = [
-        abs(term["weight"]) * evaluate_term(term, said, frames, effect, declared) for term in said["terms"]
-    ]
+    sums = [term["weight"] * evaluate_term(term, said, frames, effect, declared) for term in said["terms"]]
     value, limit, slope = np.sum(sums, axis=0)
-    if theta != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
+    if said["theta"] != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
         limit += max(effect.theta_low * slope, effect.theta_high * slope)
     return value, limit
 
@@ -626,59 +573,36 @@ def evaluate_term(term, said, frames, effect, declared):
     require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
     require("pole_per_s" in term or first == k, "without a pole a term has one frame")
     require(said["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame")
-    summed_frames, abs_direction = np.arange(since + 1, k + 1), np.abs(d)
-    weights = decay ** (k - summed_frames.astype(float))  # of each frame's input, at frame k
-    noise = frames.gyro_change_rad_s @ abs_direction
-    value = weights @ (dt * frames.innovation_rad_s2[summed_frames] @ d)
-    limit = weights @ (
-        dt * frames.eta_bar_rad_s2[summed_frames] @ abs_direction + (1 - decay) * noise[summed_frames - 1]
-    )
+    summed, size = np.arange(since + 1, k + 1), np.abs(d)
+    weights = decay ** (k - summed.astype(float))  # of each frame's input, at frame k
+    noise = frames.gyro_change_rad_s @ size
+    value = weights @ (dt * frames.innovation_rad_s2[summed] @ d)
+    limit = weights @ (dt * frames.eta_bar_rad_s2[summed] @ size + (1 - decay) * noise[summed - 1])
     limit += decay * weights[0] * noise[since] + noise[k]
-    if said["what"] is not None:
-        h, Z, r = effect.along(d, summed_frames)
-        check_stated_effect(
-            term,
-            h[first - summed_frames[0] :],
-            Z[first - summed_frames[0] :],
-            r[first - summed_frames[0] :],
-            effect,
-            said,
-        )
-        before = checked_effect_before(term, h, Z, r, effect, decay, dt, first - summed_frames[0])
-        written = slice(first - summed_frames[0], None)
-        done = (h + r)[written] if said["theta"] != "any" else effect.max_effect(h, Z, r)[written]
-        limit += weights[written] @ (dt * done) + decay ** (k + 1.0 - first) * before
-        slope = dt * weights[written] @ Z[written] if said["theta"] != "any" else 0.0
-    else:
-        require(not {"h", "Z", "r", "fault"} & set(term), "an alarm has no effect of a fault")
-        slope = 0.0
+    stated = {"h", "Z", "r", "fault"} & set(term)
+    require(said["what"] is not None or not stated, "an alarm has no effect of a fault")
+    h, Z, r = effect.along(d, summed)
+    before = first - summed[0]  # frames that are not written
+    check_stated_effect(term, {"h": h[before:], "Z": Z[before:], "r": r[before:]})
+    most = effect.max_effect(h, Z, r)
+    known = np.isfinite(most[:before])
+    least = dt * decay ** (first - 1.0 - summed[:before][known]) @ most[:before][known]
+    stated = term.get("fault", 0.0)
+    require(stated >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT) - 1e-15,
+            "the effect before the written frames is too small")  # fmt: skip
+    done = most if said["theta"] == "any" else h + r
+    limit += weights[before:] @ (dt * done[before:]) + decay ** (k + 1.0 - first) * stated
+    slope = dt * weights[before:] @ Z[before:] if said["theta"] != "any" else 0.0
     check_logged_values(term, frames, slice(first, k + 1))
     return np.array([value, limit, slope])
 
 
-def checked_effect_before(term, h, Z, r, effect, decay, dt, written):
-    """What the fault can have done to the filter before the frames that are written: as stated, and no less
-    than the logged effects of the frames before add up to."""
-    stated = term.get("fault", 0.0)
-    known = np.isfinite(h[:written]) & np.isfinite(Z[:written])
-    places = np.arange(written)[known]
-    most = effect.max_effect(h[:written], Z[:written], r[:written])[known]
-    least = float(dt * decay ** (written - 1.0 - places) @ most) if len(places) else 0.0
-    require(
-        stated >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT) - 1e-15,
-        "the effect before the written frames is too small",
-    )
-    return stated
-
-
-def check_stated_effect(term, h, Z, r, effect, said):
+def check_stated_effect(span, effect):
     """Where h, Z, r are stated they are those of the log; null where the fault adds only rounding."""
-    for name, known in (("h", h), ("Z", Z), ("r", r)):
-        for stated, value in zip(term.get(name, ()), known, strict=False):
-            require(stated is None or is_same_effect(stated, value),
-                    f"{name} is not that of the log")  # fmt: skip
-    require(np.isfinite(h).all() and np.isfinite(Z).all() and np.isfinite(r).all(),
-            "the log has no effect of this fault in these rows")  # fmt: skip
+    for name, known in effect.items():
+        for stated, value in zip(span.get(name, ()), known, strict=False):
+            require(stated is None or is_same_effect(stated, value), f"{name} is not that of the log")
+    require(np.isfinite([*effect.values()]).all(), "the log has no effect of this fault in these rows")
 
 
 def check_logged_values(term, frames, rows):
@@ -715,23 +639,20 @@ def course_pairs(said, frames, declared):
             signs.add(sign)
             (low if bound["Z"][place] > 0 else high)[k] = theta, command
     require(len(signs) == 1, "a surface deflects one way")
-    sign = signs.pop()
+    (sign,) = signs
     require(
         low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
     )
     require(len(high) == (comparison != "swing"), "one frame bounds the deflection from above")
     first, last = min(low), max(low)
-    above = next(iter(high), first)
+    above, (most, most_command) = next(iter(high.items()), (first, (np.nan, np.nan)))
     reached, commanded = np.array([low[k] for k in sorted(low)]).T
-    most, most_command = high.get(above, (np.nan, np.nan))
     ends = sorted((sign * effect.theta_low, sign * effect.theta_high))
     if comparison in ("offset", "growing_offset"):
-        stops = said["stops"]
+        stops, offset = said["stops"], reached[0] - commanded[0]
         require(len(stops) == 2 and stops[0] >= ends[0] - 1e-12 and stops[1] <= ends[1] + 1e-12, "stops")
-        pairs = [(reached[0] - commanded[0], most - most_command), (reached[0], stops[0]), (stops[1], most)]
-        if comparison == "growing_offset":
-            pairs = [(reached[0] - commanded[0], 0.0), *pairs, (above, first)]
-        return pairs
+        pairs = [(offset, most - most_command), (reached[0], stops[0]), (stops[1], most)]
+        return pairs if comparison == "offset" else [(offset, 0.0), *pairs, (above, first)]
     if comparison == "runaway":
         require(sign == stop, "the surface runs the other way")
         require(said["stops"] == [ends[1]], "the stop is not that of the log")
@@ -747,8 +668,7 @@ def course_pairs(said, frames, declared):
     require(comparison == "approach" and above == first, f"{comparison} is no known course")
     require(len(said["ordered"]) == len(reached), "ordered: frames are missing")
     require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
-    ahead = reached - said["ordered"]
-    come = said.get("step", 0.0) * (last - first - 1)
+    ahead, come = reached - said["ordered"], said.get("step", 0.0) * (last - first - 1)
     return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (reached[-1], most - come), (reached[-1], said["near"]),
             (1.0, 0.0)]  # fmt: skip
 
@@ -878,31 +798,33 @@ def instrument_sides(said, log):
 # --- 10. All statements ----------------------------------------------------------------------------------
 
 
+def pairs_of(said, frames, declared):
+    """Pairs (what must be more, than what) of a statement's evidence."""
+    if "terms" in said:
+        return [sides_of_terms(said, frames, declared)]
+    if "bounds" in said:
+        return course_pairs(said, frames, declared)
+    if "likelihood" in said:
+        return likelihood_pairs(said, frames, declared)
+    return [instrument_sides(said, frames.log)]
+
+
 def check_statement(said, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
     check_statement_form(said)
     check_event(said, log)
-    kind = evidence_kind(said)
-    frames = Frames(document, log, declared, said.get("block"))
+    kind, frames = evidence_kind(said), Frames(document, log, declared, said.get("block"))
     if kind == "as":
         check_exclusion_by_alarm(said, document, frames)
         return
-    if kind == "terms":
-        pairs = [sides_of_terms(said, frames, declared)]
-    elif kind == "bounds":
-        pairs = course_pairs(said, frames, declared)
-    elif kind == "likelihood":
-        pairs = likelihood_pairs(said, frames, declared)
-    else:
-        pairs = [instrument_sides(said, log)]
+    pairs = pairs_of(said, frames, declared)
     stated = said["sides"] if kind in ("bounds", "likelihood") else [[side] for side in said["sides"]]
     sides = np.array(pairs, float).T
     require(np.isfinite(sides).all() and sides.shape == np.shape(stated), "the sides are no numbers")
     least = 1e-10 * np.abs(sides).max(axis=0) if kind == "terms" else 0.0
     require((sides[0] > sides[1] + least).all(), f"{sides[0][0]:.6g} is not more than {sides[1][0]:.6g}")
-    require(
-        np.allclose(sides, stated, MAX_RELATIVE_DIFFERENCE, 0), "the stated sides are not the recomputed ones"
-    )
+    same = np.allclose(sides, stated, MAX_RELATIVE_DIFFERENCE, 0)
+    require(same, "the stated sides are not the recomputed ones")
 
 
 def digest(document):
@@ -914,31 +836,11 @@ def digest(document):
 def failures(document, log, scenario=""):
     """A sentence for each reason to refuse; log: column -> values, scenario: the text of scenario.yaml."""
     try:
-        check_form(document, CERTIFICATE_FIELDS, OPTIONAL_CERTIFICATE_FIELDS, "certificate")
-        require(
-            document["format"] == FORMAT_VERSION,
-            f"this checker reads format {FORMAT_VERSION}, not {document['format']}",
-        )
-        require(digest(document) == document["digest"],
-                "SHA-256 does not match: the file was edited, or belongs to another log")  # fmt: skip
-        rows = len(log["t_s"])
-        another = f"the log has {rows} rows, not {document['rows']}: the certificate belongs to another log"
-        require(rows == document["rows"], another)
-        another = "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight"
-        require(sha256(scenario.encode()).hexdigest() == document["scenario_sha256"], another)
-        if not document["statements"]:
-            return
-        events = [said.get("frame") for said in document["statements"]]
-        require(all(map(is_row, events)), "statement: the field frame is missing, or no row")
-        declared = declared_at_row(yaml.safe_load(scenario), min(events))
-        check_declared(document, declared)
-        times = np.asarray(log["t_s"], float)
-        require(np.allclose(times, np.arange(rows) * declared.dt, 0, 1e-6),
-                "dt_s: the log's rows are not that far apart")  # fmt: skip
+        declared = check_document(document, log, scenario)
     except Refused as why:
         yield str(why)
         return
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, yaml.YAMLError) as why:
+    except (*UNREADABLE, yaml.YAMLError) as why:
         yield f"certificate, log and scenario do not fit together: {type(why).__name__}: {why}"
         return
     for said in document["statements"]:
@@ -946,8 +848,31 @@ def failures(document, log, scenario=""):
             check_statement(said, document, log, declared)
         except Refused as why:
             yield f"{statement_name(said)}: {why}"
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as why:
+        except UNREADABLE as why:
             yield f"{statement_name(said)}: the numbers do not fit the log: {type(why).__name__}: {why}"
+
+
+def check_document(document, log, scenario):
+    """Refuse the document that belongs to another log or scenario; returns what the scenario declares."""
+    check_form(document, *FORMS["certificate"], "certificate")
+    known = f"this checker reads format {FORMAT_VERSION}, not {document['format']}"
+    require(document["format"] == FORMAT_VERSION, known)
+    another = "SHA-256 does not match: the file was edited, or belongs to another log"
+    require(digest(document) == document["digest"], another)
+    rows = len(log["t_s"])
+    another = f"the log has {rows} rows, not {document['rows']}: the certificate belongs to another log"
+    require(rows == document["rows"], another)
+    another = "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight"
+    require(sha256(scenario.encode()).hexdigest() == document["scenario_sha256"], another)
+    if not document["statements"]:
+        return None
+    events = [said.get("frame") for said in document["statements"]]
+    require(all(map(is_row, events)), "statement: the field frame is missing, or no row")
+    declared = declared_at_row(yaml.safe_load(scenario), min(events))
+    check_declared(document, declared)
+    together = np.allclose(np.asarray(log["t_s"], float), np.arange(rows) * declared.dt, 0, 1e-6)
+    require(together, "dt_s: the log's rows are not that far apart")
+    return declared
 
 
 def statement_name(said):
@@ -996,13 +921,10 @@ def check(certificate, log=None, scenario=None):
     table = read_table(log)
     columns = {name: table[name].to_numpy() for name in table.column_names}
     why = list(failures(document, columns, scenario.read_text(encoding="utf-8")))
-    said = [] if why else list(sentences(document, columns))
-    said += (
-        [f"not certified: {statement_name(one)}: {one.get('because')}" for one in document["without"]]
-        if not why
-        else []
-    )
-    return said, why
+    if why:
+        return [], why
+    left = [f"not certified: {statement_name(one)}: {one.get('because')}" for one in document["without"]]
+    return [*sentences(document, columns), *left], []
 
 
 def main(arguments):

@@ -9,8 +9,8 @@ import numpy as np
 from beaver_ftc.diagnosis import SensorMonitor
 from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_EQUATIONS, RPM_TEST
 from beaver_ftc.plant import ENGINE_SPEED, SENSORS
+from beaver_ftc.results import Document
 from beaver_ftc.scenario import sensor_words
-from beaver_ftc_assurance.certificates.inequality import Document
 
 TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
@@ -21,10 +21,12 @@ BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the diagnosis uses
 ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding
 
 
-def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
-    """The test that sound instruments would have passed; why there is none where no test was failed.
+def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: int) -> Document:
+    """The test that sound instruments would have passed, or the reading that the log's column `watch_missing`
+    says is missing; why there is none where no test was failed. The sides of a missing reading: number of
+    missing readings, and how many sound instruments leave out.
 
-    monitor: at the alarm.
+    monitor: at the alarm, in row k of the log.
     """
     number, failed = monitor.worst_test_index, monitor.top_ratio > 1.0
     if failed and number >= N_EQUATIONS:
@@ -38,18 +40,12 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
         if value > limit:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
     sensor = monitor.isolated_sensor_index
-    if sensor >= 0 and monitor.is_reading_unused[sensor] and not failed:
-        because = f"there was no reading of {sensor_words(SENSORS[sensor])}, and no column that says so"
-        return {"missing": [sensor], "because": because}
-    return {"because": BECAUSE_BETWEEN_ROWS}
-
-
-def with_missing_column(said: Document, rows: Mapping[str, np.ndarray]) -> Document:
-    """A statement that a reading is missing, without its reason for doubt if the log has that in its column
-    `watch_missing`. Its sides: number of missing readings, and how many sound instruments leave out."""
-    if rows.get("watch_missing", rows["detected"] - 2.0)[said["frame"]] != said["missing"][0]:
-        return said
-    return {name: value for name, value in said.items() if name != "because"} | {"sides": [1.0, 0.0]}
+    if sensor < 0 or not monitor.is_reading_unused[sensor] or failed:
+        return {"because": BECAUSE_BETWEEN_ROWS}
+    if "watch_missing" in rows and rows["watch_missing"][k] == sensor:
+        return {"missing": [sensor], "sides": [1.0, 0.0]}
+    name = sensor_words(SENSORS[sensor])
+    return {"because": f"there was no reading of {name}, and no column that says so"}
 
 
 def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:

@@ -13,9 +13,9 @@ import numpy as np
 from beaver_ftc.diagnosis import DESCRIPTIONS_IN_TYPE_ORDER as WORDS
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis import DeflectionRelation
-from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS
+from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATION_COLUMNS, RELATIONS
+from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.inequality import (
-    History,
     Hypothesis,
     Term,
     constant_theta_tests,
@@ -47,9 +47,9 @@ def reason_not_certified(tape: Tape, kind: int) -> str | None:
     config = tape.alarm.diagnosis.types_config
     if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
-    return (
-        RETURNING_SURFACE if config.returns_lagged and TYPES[kind].on_possible_release is not None else None
-    )
+    if config.returns_lagged and TYPES[kind].on_possible_release is not None:
+        return RETURNING_SURFACE
+    return None if TYPES[kind].frames_test or TYPES[kind].deflection_relation is not None else UNKNOWN_TYPE
 
 
 def exclusion_name(surface: str, kind: int) -> str:
@@ -62,6 +62,12 @@ def exclusion_column(surface: str, kind: int) -> str:
     return f"{exclusion_name(surface, kind).replace(' ', '_')}_excluded"
 
 
+def travel_rad(tape: Tape, s: int) -> tuple[float, float]:
+    """The travel of a surface, low and high."""
+    actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
+    return actuator.travel_low_rad, actuator.travel_high_rad
+
+
 def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict[str, float]:
     """What a type says of the surface, by column of the log: of a type that the checker does not define."""
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
@@ -71,20 +77,12 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
         return {f"{name}_course_{row.frames_test.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
-    actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
-    low, high = row.deflection_relation.theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
-    return {
-        f"{name}_gain": row.deflection_relation.command_gain,
-        f"{name}_theta_is_share": float(row.deflection_relation.theta_is_share),
-        f"{name}_theta_is_constant": float(row.has_constant_parameter),
-        f"{name}_theta_low": low, f"{name}_theta_high": high,
-    }  # fmt: skip
-
-
-def exclusion_row(tape: Tape, s: int, kind: int) -> int:
-    """The row from which on a type that is excluded at the end has been."""
-    clear = np.flatnonzero(~(tape.types[:, s, kind] > 0))
-    return tape.first + (int(clear[-1]) + 1 if len(clear) else 0)
+    low, high = row.deflection_relation.theta_span(*travel_rad(tape, s))
+    values = (
+        row.deflection_relation.command_gain, float(row.deflection_relation.theta_is_share),
+        float(row.has_constant_parameter), low, high,
+    )  # fmt: skip
+    return {f"{name}_{column}": value for column, value in zip(RELATION_COLUMNS, values, strict=True)}
 
 
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
@@ -109,8 +107,7 @@ def _effect_of_relation(
     axes = diagnosis.estimators[e].active_axes
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
-    actuator = diagnosis.surface_fault_types[surface].actuator
-    low, high = relation.theta_span(actuator.travel_low_rad, actuator.travel_high_rad)
+    low, high = relation.theta_span(*travel_rad(tape, surface))
     offset, slope = (relation.command_gain - 1.0) * Gu, Gu if relation.theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
@@ -131,20 +128,8 @@ def candidate_inequalities(
     frames = np.arange(max(alarm_frame, hypothesis.first_frame), last_frame + 1)
     if not len(frames):
         return
-    frames = frames[is_unexplained_by_health(history, frames)]
+    frames = frames[history.is_unexplained(frames)]
     if hypothesis.slope.any():
         yield constant_theta_tests(hypothesis, history, frames)
     for frame in frames[-3:].tolist():
         yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
-
-
-def is_unexplained_by_health(history: History, frames: np.ndarray) -> np.ndarray:
-    """Whether health does not explain each of consecutive frames, (frames,). In frames of several instants,
-    health must not explain the frames before and after either: a fault may begin within a frame."""
-    rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(history.rates_rad_s)))
-    innovation, bound = history.innovation(rows), history.innovation_bound(rows)
-    exceeds = (np.abs(innovation) > bound).any(axis=1)
-    padded = np.r_[exceeds, np.zeros(len(frames) + 2 - len(exceeds), bool)]
-    if history.instant_share == 1.0:
-        return np.asarray(padded[1:-1])
-    return np.asarray(padded[:-2] & padded[1:-1] & padded[2:])

@@ -1,7 +1,6 @@
 """The certificate of frames that somebody else goes through: a log of others, a flight with a doublet."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -9,42 +8,35 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.diagnosis import estimator_names
 from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Columns, Log, MemoryLog, Proof
-from beaver_ftc.scenario import Scenario, to_yaml
-from beaver_ftc_assurance.certificates import certificate, chance
-from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
-from beaver_ftc_assurance.certificates.inequality import Document
+from beaver_ftc.scenario import Scenario
+from beaver_ftc_assurance.certificates import chance
+from beaver_ftc_assurance.certificates.certificate import (
+    MEASURED_MODEL_BOUND,
+    Certified,
+    certificate,
+    check_scheme,
+)
 from beaver_ftc_assurance.certificates.tape import Recorder
 
 
-def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> tuple[MemoryLog, Document]:
-    """Log and certificate. frames: the record (1,), of `frame_dtype`; flown: goes on by a frame whenever it
-    is asked. Raises BadInput where another scheme than ours diagnosed."""
-    certificate.check_scheme(scenario)
+def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> Certified:
+    """The certificate. frames: the record (1,), of `frame_dtype`; flown: goes on by a frame whenever it is
+    asked. Raises BadInput where another scheme than ours diagnosed."""
+    check_scheme(scenario)
     recorder = Recorder(scenario)
     recorder.begin(frames)
     log = _log(frames, flown, scenario, recorder)
     recorder.land()
-    document, columns = certificate.certificate(scenario, log, recorder)
-    whole = MemoryLog()
-    certificate.copy_with_columns(log, columns, whole)
-    return whole, document
+    return certificate(scenario, log, recorder)
 
 
 def proof(scenario: Scenario, log: Log) -> Proof:
     """The certificate of a flight that kept its log, flown once more. Raises BadInput where another scheme
     than ours diagnosed."""
-    document, columns = certificate.certificate(scenario, log)
-    whole = Columns()
-    certificate.copy_with_columns(log, columns, whole)
+    found, whole = certificate(scenario, log), Columns()
+    found.copy_log(whole)
     whole.close()
-    return Proof(document, dict(whole), to_yaml(scenario))
-
-
-def write(scenario: Scenario, log: MemoryLog, document: Document, folder: Path) -> None:
-    """Write certificate, log and the scenario that declares the bounds into a folder."""
-    log.copy_to(folder / "log.parquet")
-    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
-    (folder / certificate.FILE_NAME).write_text(certificate.as_text(document), encoding="utf-8")
+    return Proof(found.document, dict(whole), found.scenario)
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
@@ -64,10 +56,7 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
             shares = chance.likelihood_shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
-            shares |= {
-                "watch_share": monitor.top_ratio,
-                "watch_test": monitor.worst_test_index,
-            }
+            shares |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
         values = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]  # as in a log of ours
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])

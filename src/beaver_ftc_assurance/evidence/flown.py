@@ -2,13 +2,13 @@
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput, BeaverFtcError
-from beaver_ftc.results import Formula, Metrics, faults_of, measure
+from beaver_ftc.results import Columns, Formula, Metrics, faults_of, measure
 from beaver_ftc.results import evaluate_expectations as evaluate
 from beaver_ftc.results import margin_of_expectation as margin
 from beaver_ftc.scenario import Scenario, to_yaml
@@ -18,51 +18,36 @@ from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargi
 
 Row = dict[str, Any]
 MET, NOT_MET, NOT_SHOWN = "met", "not met", "not shown"
+WORST_FIRST = NOT_MET, NOT_SHOWN, MET
 BANDS = 3  # of airspeed
 ALTITUDES_M = (1000.0, 2000.0)  # between two bands
 _ALWAYS_WATCHED = ("t_s", "airspeed_mps", "altitude_m", "envelope_valid")
 
 
-class Watched:
-    """A log sink that keeps a few columns and the last row, and a digest of all."""
+class Watched(Columns):
+    """A log sink that keeps a few columns, the last row, and a digest of all of them."""
 
-    def __init__(self, columns: Sequence[str]) -> None:
-        self._wanted, self._digest = (*_ALWAYS_WATCHED, *columns), hashlib.sha256()
-        self._places: list[int] = []
-        self._kept: list[np.ndarray] = []
-        self._names: tuple[str, ...] = ()
-        self._last = np.empty(0)
+    def __init__(self, columns: Iterable[str]) -> None:
+        super().__init__()
+        self._asked = {*_ALWAYS_WATCHED, *columns}
+        self._digest = hashlib.sha256()
 
     def open(self, columns: Sequence[str]) -> None:
         """Start; `columns` name the log's columns in order."""
-        self._names, self._kept = tuple(columns), []
-        self._places = [self._names.index(name) for name in self._wanted if name in self._names]
+        self._wanted, self._all = tuple(name for name in columns if name in self._asked), tuple(columns)
         self._digest.update(" ".join(columns).encode())
+        super().open(columns)
 
     def write(self, rows: np.ndarray) -> None:
         """Take rows (n, columns)."""
         self._digest.update(np.ascontiguousarray(rows).tobytes())
-        self._kept.append(rows[:, self._places])
-        self._last = rows[-1].copy()
-
-    def close(self) -> None:
-        """Nothing is left to be done."""
+        self.end = dict(zip(self._all, rows[-1].tolist(), strict=True))
+        super().write(rows)
 
     @property
     def sha256(self) -> str:
         """Of the columns' names and every number."""
         return self._digest.hexdigest()
-
-    @property
-    def columns(self) -> dict[str, np.ndarray]:
-        """What was kept, (frames,) each."""
-        kept = np.concatenate(self._kept)
-        return {self._names[place]: kept[:, k] for k, place in enumerate(self._places)}
-
-    @property
-    def end(self) -> dict[str, float]:
-        """The last row, by column."""
-        return dict(zip(self._names, self._last.tolist(), strict=True))
 
 
 def fly_flight(plan: EvidencePlan, case: tuple[str, int]) -> Row:
@@ -71,57 +56,45 @@ def fly_flight(plan: EvidencePlan, case: tuple[str, int]) -> Row:
         return _flown(plan, *case)
     except BadInput as error:
         return failed(plan, case, str(error), BAD_INPUT)
-    except BeaverFtcError as error:
-        return failed(plan, case, str(error), FAILED)
     except Exception as error:  # a plug-in may raise anything: one flight's end, not the plan's
-        return failed(plan, case, f"{type(error).__name__}: {error}", FAILED)
+        ours = isinstance(error, BeaverFtcError)
+        return failed(plan, case, str(error) if ours else f"{type(error).__name__}: {error}", FAILED)
 
 
 def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CRASHED) -> Row:
     """The row of a flight that shows nothing."""
     name, run = case
-    source = plan.sources[name]
-    found = {each.id: [part("flight", None, None, NOT_SHOWN, says=why)] for each in plan.of(name)}
+    source, none = plan.sources[name], part("flight", None, None, NOT_SHOWN, says=why)
     assigned = source.assignment(run)
     of_sweep = assigned and row_of_failure(source.what, assigned, status, why)  # type: ignore[arg-type]
-    row = _row(plan, case, status, why, found, of_sweep)
-    return {**row, "scenario": None, "log": None, "aircraft": None, "faults": [], "cells": []}
+    return {
+        "flight": source.flight(run), "source": name, "run": run, "status": status, "why": why,
+        "found": {each.id: [none] for each in plan.of(name)}, "row": of_sweep,
+        "scenario": None, "log": None, "aircraft": None, "faults": [], "cells": [],
+    }  # fmt: skip
 
 
 def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
     from beaver_ftc.loop import fly
 
     source = plan.sources[name]
-    scenario = source.scenario(run)
-    log = Watched(sorted({c for each in plan.of(name) for c in _columns(plan, each)}))
+    scenario, formulas = source.scenario(run), [plan.formulas.get(each.id) for each in plan.of(name)]
+    log = Watched(column for formula in formulas if formula for column in formula.columns)
     flight = fly(scenario, log)
     amounts = measure(flight)
-    found = {each.id: _judged(plan, each, scenario, amounts, log) for each in plan.of(name)}
     assigned, lost = source.assignment(run), amounts.departure
-    why = f"lost: {lost.signal} at {lost.time_s:g} s" if lost else ""
-    of_sweep = assigned and row_of(assigned, amounts, flight)
     return {
-        **_row(plan, (name, run), DEPARTED if lost else FLOWN, why, found, of_sweep),
+        "flight": source.flight(run), "source": name, "run": run,
+        "status": DEPARTED if lost else FLOWN,
+        "why": f"lost: {lost.signal} at {lost.time_s:g} s" if lost else "",
+        "found": {each.id: _judged(plan, each, scenario, amounts, log) for each in plan.of(name)},
+        "row": assigned and row_of(assigned, amounts, flight),
         "scenario": hashlib.sha256(to_yaml(scenario).encode()).hexdigest(),
         "log": log.sha256,
         "aircraft": scenario.airframe.name,
         "faults": [[each.get("actuator"), each["type"]] for each in faults_of(scenario)],
-        "cells": cells(log.columns, scenario),
-    }
-
-
-def _row(
-    plan: EvidencePlan, case: tuple[str, int], status: str, why: str, found: Row, of_sweep: Row | None
-) -> Row:
-    name, run = case
-    flight = plan.sources[name].flight(run)
-    return {"flight": flight, "source": name, "run": run, "status": status, "why": why, "found": found,
-            "row": of_sweep}  # fmt: skip
-
-
-def _columns(plan: EvidencePlan, requirement: Requirement) -> frozenset[str]:
-    formula = plan.formulas.get(requirement.id)
-    return formula.columns if formula else frozenset()
+        "cells": cells(log, scenario),
+    }  # fmt: skip
 
 
 def part(
@@ -155,7 +128,7 @@ def _judged(
 
 
 def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log: Watched) -> Row:
-    r = formula.robustness(log.columns, rate_hz)
+    r = formula.robustness(log, rate_hz)
     lost = found.departure
     if not math.isfinite(r):
         nan, far = "a column is not a number where it asks", "it looks beyond the log, or at what is infinite"
@@ -175,14 +148,14 @@ def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watch
     qualities = where_ended(scenario, log.end) if scenario.faults else where_trimmed(scenario)
     parts = []
     for limit, each in zip(LIMITS, qualities, strict=True):
-        least, most = (None if math.isinf(end) else end for end in limit.levels[bar.level - 1])
-        asked = {"at_least": least, "at_most": most, "level": bar.level}
-        inside = limit.margin(each.value, bar.level)
-        parts.append(part(
-            f"{limit.mode} {limit.quantity}", {key: v for key, v in asked.items() if v is not None},
-            finite(each.value), MET if each.level <= bar.level else NOT_MET,
-            finite(inside), f"level {each.level}" if each.level <= 3 else "no level",
-        ))  # fmt: skip
+        ends = zip(("at_least", "at_most"), limit.levels[bar.level - 1], strict=True)
+        asked = {side: end for side, end in ends if not math.isinf(end)} | {"level": bar.level}
+        verdict, inside = (
+            MET if each.level <= bar.level else NOT_MET,
+            finite(limit.margin(each.value, bar.level)),
+        )
+        says = f"level {each.level}" if each.level <= 3 else "no level"
+        parts.append(part(f"{limit.mode} {limit.quantity}", asked, finite(each.value), verdict, inside, says))
     return parts
 
 
@@ -194,18 +167,18 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
     found = list(at(scenario))
     if not found:
         return [part("margins", None, None, NOT_SHOWN, says="no surface has a loop to speak of")]
-    asked = (
-        ("gain margin, dB", bar.gain_db, min((min(each.up_db, each.down_db), each.fault) for each in found)),
-        ("phase margin, deg", bar.phase_deg, min((each.phase_deg, each.fault) for each in found)),
-    )
-    return [
-        part(name, {"at_least": bound}, finite(least), MET if least >= bound else NOT_MET,
-             finite(least - bound), f"fault: {fault}")
-        for name, bound, (least, fault) in asked
-    ]  # fmt: skip
+    parts = []
+    for name, bound, margins in (
+        ("gain margin, dB", bar.gain_db, [(min(each.up_db, each.down_db), each.fault) for each in found]),
+        ("phase margin, deg", bar.phase_deg, [(each.phase_deg, each.fault) for each in found]),
+    ):
+        least, fault = min(margins)
+        verdict, inside = MET if least >= bound else NOT_MET, finite(least - bound)
+        parts.append(part(name, {"at_least": bound}, finite(least), verdict, inside, f"fault: {fault}"))
+    return parts
 
 
-def cells(columns: dict[str, np.ndarray], scenario: Scenario) -> list[int]:
+def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
     """The cells of the envelope that a flight was in, once its first fault had struck: airspeed band after
     airspeed band, in each by altitude."""
     slowest, fastest = scenario.airframe.envelope.airspeed_mps

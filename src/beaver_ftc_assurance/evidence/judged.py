@@ -20,7 +20,16 @@ from beaver_ftc.scenario.faults import DAMAGE, TYPES, UNANTICIPATED
 from beaver_ftc.studies.engine import fingerprint, plug_ins
 from beaver_ftc.studies.sweep import RESULTS, Flights
 from beaver_ftc.studies.sweep import evaluate_summary as evaluate
-from beaver_ftc_assurance.evidence.flown import ALTITUDES_M, BANDS, MET, NOT_MET, NOT_SHOWN, Row, part
+from beaver_ftc_assurance.evidence.flown import (
+    ALTITUDES_M,
+    BANDS,
+    MET,
+    NOT_MET,
+    NOT_SHOWN,
+    WORST_FIRST,
+    Row,
+    part,
+)
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
 
 MOST_NAMED = 50  # flights that do not meet a requirement
@@ -57,62 +66,45 @@ def command(plan: EvidencePlan, flight: str) -> str:
 
 
 def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
+    over, of_sweep = plan.over[requirement.id], isinstance(requirement.bar, OfSweep)
     if isinstance(requirement.bar, OfSweep):
-        judged = [
-            one for name in plan.over[requirement.id] for one in _of_sweep(plan, requirement.bar, name, rows)
-        ]
+        judged = [one for name in over for one in _of_sweep(plan, requirement.bar, name, rows)]
     else:
         judged = [(row["flight"], one) for row in rows for one in row["found"].get(requirement.id, ())]
-    flights = [row["flight"] for row in rows if row["source"] in plan.over[requirement.id]]
-    worst = {flight: _verdict(own) for flight, own in _by_flight(judged).items()}
+    verdicts: dict[str, str] = {}
+    for flight, one in judged:
+        verdicts[flight] = _worst_of([verdicts.get(flight, MET), one["verdict"]])
     flight, least = min(judged, key=lambda one: _rank(one[1]), default=("", part("", None, None, NOT_SHOWN)))
     return {
         "id": requirement.id,
         "text": requirement.text,
         "clause": requirement.clause,
-        "asked": _asked(requirement),
-        "verdict": _verdict([one for _, one in judged]),
+        "asked": requirement.model_dump(mode="json", include={"expect", "formula", "bar"}, exclude_none=True),
+        "verdict": _worst_of(verdicts.values()),
         "margin": least["margin"],
         "margin_of": least["name"],
         "worst": {"flight": flight, "command": command(plan, flight) if flight else None, **least},
-        "over": [plan.sources[name].given for name in plan.over[requirement.id]],
-        "flights": len(flights),
-        "counts": {} if isinstance(requirement.bar, OfSweep) else _counts(worst.values()),
+        "over": [plan.sources[name].given for name in over],
+        "flights": sum(row["source"] in over for row in rows),
+        "counts": {} if of_sweep else _counts(verdicts.values()),
         "failing": [
             {"flight": name, "verdict": verdict, "command": command(plan, name)}
-            for name, verdict in worst.items() if verdict != MET
+            for name, verdict in verdicts.items() if verdict != MET
         ][:MOST_NAMED],
     }  # fmt: skip
 
 
 def _counts(verdicts: Iterable[str]) -> dict[str, int]:
-    found = Counter(verdicts)
-    return {said: found[said] for said in (MET, NOT_MET, NOT_SHOWN)}
+    return dict.fromkeys((MET, NOT_MET, NOT_SHOWN), 0) | Counter(verdicts)
 
 
-def _asked(requirement: Requirement) -> Document:
-    """What is asked, as the plan says it."""
-    said = requirement.model_dump(mode="json", include={"expect", "formula", "bar"}, exclude_none=True)
-    return {key: value for key, value in said.items() if value is not None}
-
-
-def _by_flight(judged: Sequence[Judged]) -> dict[str, list[Row]]:
-    found: dict[str, list[Row]] = {}
-    for flight, one in judged:
-        found.setdefault(flight, []).append(one)
-    return found
-
-
-def _verdict(parts: Sequence[Row]) -> str:
-    said = {one["verdict"] for one in parts}
-    if NOT_MET in said:
-        return NOT_MET
-    return NOT_SHOWN if NOT_SHOWN in said or not said else MET
+def _worst_of(verdicts: Iterable[str]) -> str:
+    return min(verdicts, key=WORST_FIRST.index, default=NOT_SHOWN)
 
 
 def _rank(one: Row) -> tuple[int, float]:
     """The worst first: by verdict, then by margin over the limit's size."""
-    order = (NOT_MET, NOT_SHOWN, MET).index(one["verdict"])
+    order = WORST_FIRST.index(one["verdict"])
     if one["margin"] is None:
         return order, -inf if one["verdict"] == NOT_MET else inf
     return order, one["margin"] / _size(one["expected"])
@@ -159,12 +151,14 @@ def _worst(flights: Flights, name: str) -> int:
         "departure_rate": lambda: flights.departed,
         "failure_rate": lambda: ~flights.measured,
         "pass_rate": lambda: ~flights["passed"],
-        "detection_delay_s": lambda: np.where(flights.faulted, flights.detection_delay_s, -np.inf),
-        "isolation_delay_s": lambda: np.where(flights.faulted, flights.isolation_delay_s, -np.inf),
         "post_fault_rms_deg_s": lambda: flights.post_fault_rms_deg_s(axis),
         "tracking_ratio": lambda: flights.tracking_ratio(axis),
     }
-    bad = np.nan_to_num(against[quantity]().astype(float), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+    if quantity.endswith("_delay_s"):
+        bad = np.where(flights.faulted, getattr(flights, quantity), -np.inf)
+    else:
+        bad = against[quantity]().astype(float)
+    bad = np.nan_to_num(bad, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
     return int(flights["run"][np.argmax(bad)])
 
 

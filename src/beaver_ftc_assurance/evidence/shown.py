@@ -11,7 +11,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Expectation, as_json
 from beaver_ftc.studies.engine import Progress, Study, run_study
 from beaver_ftc.studies.present import Heading, Makers, Part, Table, aligned, as_html, number, versions_line
-from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, failed, fly_flight
+from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, WORST_FIRST, failed, fly_flight
 from beaver_ftc_assurance.evidence.judged import Document, document_of
 from beaver_ftc_assurance.evidence.plan import EvidencePlan
 
@@ -105,9 +105,7 @@ def _summary(requirements: list[Document]) -> Table:
     """Of more than a page holds, those that are not met come first, and the last line counts the others."""
     shown = requirements
     if len(shown) > ON_THE_SUMMARY:
-        shown = sorted(shown, key=lambda each: (NOT_MET, NOT_SHOWN, MET).index(each["verdict"]))[
-            :ON_THE_SUMMARY
-        ]
+        shown = sorted(shown, key=lambda each: WORST_FIRST.index(each["verdict"]))[:ON_THE_SUMMARY]
     rows = [
         (each["id"], _short(each["text"]), each["verdict"], margin_of(each), each["worst"]["flight"])
         for each in shown
@@ -158,11 +156,10 @@ def _requirement(each: Document) -> Iterator[Part]:
         ("margin", "" if each["margin"] is None else signed(each["margin"])),
         ("flies it again", worst["command"] or ""),
     ]
-    failing = each["failing"]
+    failing = [one["flight"] for one in each["failing"]]
     if len(failing) > 1:
-        names = ", ".join(one["flight"] for one in failing[:MOST_SHOWN])
         more = f" and {len(failing) - MOST_SHOWN} more" if len(failing) > MOST_SHOWN else ""
-        rows.append(("do not meet it", names + more))
+        rows.append(("do not meet it", ", ".join(failing[:MOST_SHOWN]) + more))
     yield Table((each["id"], each["text"]), [row for row in rows if row[1]], VERDICTS)
 
 
@@ -194,15 +191,11 @@ def _coverage(each: Document) -> Iterator[Part]:
         for one in each["flown"]
     ]
     yield Table(head, rows)
-    never: dict[str, list[str]] = {}
-    for surface, kind in each["never"]:
-        never.setdefault(surface, []).append(kind.replace("_", " "))
+    never = {surface: [kind.replace("_", " ") for s, kind in each["never"] if s == surface]
+             for surface, _ in each["never"]}  # fmt: skip
     if never:
-        yield (
-            "Never flown: "
-            + "; ".join(f"{surface}: {', '.join(kinds)}" for surface, kinds in never.items())
-            + "."
-        )
+        lacking = (f"{surface}: {', '.join(kinds)}" for surface, kinds in never.items())
+        yield f"Never flown: {'; '.join(lacking)}."
 
 
 def _cell(cell: Document) -> str:
@@ -229,19 +222,16 @@ def as_text(document: Document, folder: str, colour: bool = False) -> str:
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
     """What JUnit XML says of each requirement, and of one that is not met which command flies it again."""
-    return tuple(
-        _expectation(
-            each["id"], _asked(each["asked"]), each["verdict"], each["worst"], each["worst"]["command"]
-        )
-        for each in document["requirements"]
-    )
+    found = []
+    for each in document["requirements"]:
+        worst = each["worst"]
+        again = f"; again: {worst['command']}" if worst["command"] else ""
+        found.append(_expectation(each["id"], _asked(each["asked"]), each["verdict"], worst, again))
+    return tuple(found)
 
 
-def _expectation(
-    name: str, expected: str, verdict: str, found: Document, again: str | None = None
-) -> Expectation:
-    actual = f"{verdict}: {_found(found)}" + (f"; again: {again}" if again else "")
-    return Expectation(name, verdict == MET, expected, actual)
+def _expectation(name: str, expected: str, verdict: str, found: Document, again: str = "") -> Expectation:
+    return Expectation(name, verdict == MET, expected, f"{verdict}: {_found(found)}{again}")
 
 
 def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:

@@ -432,19 +432,14 @@ def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
 def read_sensor_monitor(mon: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
     o, red = mon["output"], mon["redundancy"]
-    c, M = red["config"], red["memory"]
     j = int(o["worst_test_index"])
-    test = red["test"][j]
     worst = SensorTest(
-        float(test["residual"]), float(test["bound_per_s"]),
-        float(test["bound_per_sample"]),
-        float(test["gust_gain"]),
-        test["r"].copy(), test["B"].copy(),
+        *(float(red[name][j]) for name in ("residual", "per_s", "per_sample", "gust")),
+        red["r"][j].copy(), red["B"][j].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
         float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
-        o["is_reading_unused"].astype(bool), float(c["sample_time_s"]),
-        c["gust_change"].copy(), M["predicted_reading"].copy(),
-        M["reading_bound"].copy(), M["engine_commands"].copy(),
+        o["is_reading_unused"].astype(bool), float(red["h"]),
+        *(red[name].copy() for name in ("gust_change", "y_pred", "e", "command")),
     )  # fmt: skip

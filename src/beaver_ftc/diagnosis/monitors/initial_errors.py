@@ -144,19 +144,18 @@ def start_bounds(ini, y):
 @kernel
 def allowed_effect(red, j, m):
     """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
-    test = red.test[j]
-    return abs(test.r[m]) + test.B[m]
+    return abs(red.r[j, m]) + red.B[j, m]
 
 
 @kernel
 def widen_bounds(red, ini):
     """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
-    lost, e = 1.0 - red.config.decay[SLOW_POLE], ini.e
+    lost, e = 1.0 - red.decay[SLOW_POLE], ini.e
     for i in range(N_INITIAL):
         j = CHANGE_TEST[i]
         d = allowed_effect(red, j, SLOW_POLE) + e[i] * ini.H_m[i, j, SLOW_POLE]
         if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
-            d *= (1.0 + e[i]) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+            d *= (1.0 + e[i]) / max(red.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
         ini.d[i] = min(d, ini.e_start[i])
         e[i] = min(e[i] + lost * ini.d[i], ini.e_start[i])
 
@@ -211,8 +210,8 @@ def fill_effects(red, ini, y_now):
                  take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the
                  rest. The vertical is turned, against v
     """
-    M, h, g, e, H = red.memory, red.config.sample_time_s, red.config.g, ini.e, ini.H
-    y, a = M.y_past, M.a
+    h, g, e, H = red.h, red.g, ini.e, ini.H
+    y, a = red.y_past, red.a
     p, q, r = y[0], y[1], y[2]
     V = max(y[AIRSPEED], MIN_AIRSPEED_MPS)
     sa, ca = np.sin(y[ALPHA]), np.cos(y[ALPHA])
@@ -225,11 +224,11 @@ def fill_effects(red, ini, y_now):
     a_side = a[1] * cb - (a[0] * ca + a[2] * sa) * sb
     # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
     roll, yaw = p * ca + r * sa, p * sa - r * ca
-    a_max = max(M.a_size[0], vector_length(a))
+    a_max = max(red.a_size[0], vector_length(a))
     h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
     A, n, G, P = h2 * a_max, h2 * a_max / V, h2 * g, h2 * np.hypot(p, r)
     vert, across = h * V * cb * np.hypot(d0, d2), ct * np.hypot(sb, sa * cb)
-    climb = abs(M.predicted_reading[ALTITUDE] - y[ALTITUDE])
+    climb = abs(red.y_pred[ALTITUDE] - y[ALTITUDE])
     slower = 1.0 - min(e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
     fill_attitude_effects(ini, h, (p, q, r), y)
     # By hypothesis: alpha, beta, V, phi, theta
@@ -284,8 +283,8 @@ def tighten_bounds(red, ini):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of its error in addition: those are in the airspeed's own test.
     """
-    e, V = ini.e, max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    for m in range(red.config.decay.size):
+    e, V = ini.e, max(red.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+    for m in range(red.decay.size):
         ratio = 1.0 + e[H_AIRSPEED]
         for n in range(len(EVIDENCE)):
             h, first, last = EVIDENCE[n]
@@ -317,10 +316,10 @@ def update_bounds(red, ini, y):
     widen_bounds(red, ini)
     fill_effects(red, ini, y)
     for n in range(ini.C.size):
-        leak(ini.C_m[n], red.config.decay, ini.C[n])
+        leak(ini.C_m[n], red.decay, ini.C[n])
     for i in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(ini.H_m[i, j], red.config.decay, ini.H[i, j])
+            leak(ini.H_m[i, j], red.decay, ini.H[i, j])
     tighten_bounds(red, ini)
 
 
@@ -330,12 +329,11 @@ def refutes_initial(red, ini, h, j):
     pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
     ones.
     """
-    test = red.test[j]
     if j >= RPM_TEST:
-        return test.ratio > 1.0
+        return red.ratio[j] > 1.0
     x = ini.e[h] + ini.d[h]
     factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(test.r, factor, test.B, x, ini.H_m[h, j])
+    return exceeds(red.r[j], factor, red.B[j], x, ini.H_m[h, j])
 
 
 @kernel
